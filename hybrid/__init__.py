@@ -1,0 +1,35 @@
+"""Event-driven simulation and linearisation of hybrid (piecewise-smooth) dynamical systems.
+
+A model is a graph: modes are smooth vector fields, transitions are guards and resets. Compilation, and with
+it the import of the compiler, waits for the first call that needs it.
+"""
+
+from hybrid.arc import HybridArc, Jump
+from hybrid.compile import CompiledSystem, compile_system
+from hybrid.errors import ArgumentError, HybridError, ModelError
+from hybrid.saltation import saltation_matrix
+from hybrid.simulate import simulate
+from hybrid.solvers import DOP853, Tsit5
+from hybrid.status import Status, StatusCode
+from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
+
+__all__ = [
+    "DOP853",
+    "ArgumentError",
+    "CompiledSystem",
+    "Guard",
+    "HybridArc",
+    "HybridError",
+    "HybridSystem",
+    "Jump",
+    "Mode",
+    "ModelError",
+    "Reset",
+    "Status",
+    "StatusCode",
+    "Transition",
+    "Tsit5",
+    "compile_system",
+    "saltation_matrix",
+    "simulate",
+]

@@ -1,0 +1,220 @@
+"""Solutions over hybrid time: smooth pieces joined by jumps (Goebel, Sanfelice and Teel 2012)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, overload
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid.errors import ArgumentError
+from hybrid.status import Status
+from hybrid.system import HybridSystem
+
+
+@attrs.frozen(eq=False)
+class Jump:
+    """One fired transition at hybrid time ``(t, j)``.
+
+    Attributes
+    ----------
+    t, j
+        Time, and the number of jumps before this one.
+    transition, source, target
+        Names of the transition and of the modes before and after.
+    x_minus, x_plus
+        States ``(n,)`` before and after.
+    saltation
+        Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
+    transversality
+        ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the saltation
+        matrix grows without bound.
+    """
+
+    t: float
+    j: int
+    transition: str
+    source: str
+    target: str
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+    saltation: np.ndarray
+    transversality: float
+
+
+@attrs.frozen(eq=False, repr=False)
+class Jumps(Sequence[Jump]):
+    """The jumps of an arc in order, each made when looked at; the arrays hold all of them.
+
+    Attributes
+    ----------
+    t, transversality
+        ``(jumps,)``.
+    transition
+        ``(jumps,)`` indices into the system's transitions.
+    x_minus, x_plus
+        ``(jumps, n)``.
+    saltation
+        ``(jumps, n, n)``.
+    """
+
+    system: HybridSystem
+    t: np.ndarray
+    transversality: np.ndarray
+    transition: np.ndarray
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+    saltation: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} jumps>"
+
+    @overload
+    def __getitem__(self, index: int) -> Jump: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Jump]: ...
+    def __getitem__(self, index: int | slice) -> Jump | list[Jump]:
+        if isinstance(index, slice):
+            return [self._jump(i) for i in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"jump {index} of an arc with {len(self)} jumps")
+        return self._jump(index % len(self))
+
+    def __iter__(self) -> Iterator[Jump]:
+        return (self._jump(i) for i in range(len(self)))
+
+    def _jump(self, i: int) -> Jump:
+        transition = self.system.transitions[self.transition[i]]
+        return Jump(
+            float(self.t[i]),
+            i,
+            transition.name,
+            transition.source,
+            transition.target,
+            self.x_minus[i],
+            self.x_plus[i],
+            self.saltation[i],
+            float(self.transversality[i]),
+        )
+
+
+@attrs.frozen(eq=False)
+class Pieces:
+    """The smooth steps of a run: ``S`` polynomials in Bernstein form.
+
+    Attributes
+    ----------
+    t, h
+        Start and length of each step, ``(S,)``.
+    mode, j
+        Mode index and jump count of each, ``(S,)``.
+    coefficients
+        ``(S, d + 1, n)``.
+    """
+
+    t: np.ndarray
+    h: np.ndarray
+    mode: np.ndarray
+    j: np.ndarray
+    coefficients: np.ndarray
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States ``(len(times), n)`` and the index of the step each was taken from; at a jump, after it."""
+        index = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, None)
+        theta = ((times - self.t[index]) / self.h[index])[:, None]
+        rows = self.coefficients[index].copy()
+        for level in range(rows.shape[1] - 1, 0, -1):
+            rows[:, :level] += theta[:, :, None] * (rows[:, 1 : level + 1] - rows[:, :level])
+        return rows[:, 0], index
+
+
+@attrs.frozen(eq=False, repr=False)
+class HybridArc:
+    """A solution over hybrid time ``(t, j)``.
+
+    Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step. With
+    ``samples`` they are the states at those times, at a jump the state after it.
+
+    Attributes
+    ----------
+    system, parameters
+        The model and the parameter values ``(m,)`` of the run.
+    t, j, x, mode
+        Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``, mode names ``(N,)``.
+    jumps
+        Sequence of :class:`Jump`.
+    status
+        How the run ended; what was computed is here even where it ended early.
+    fundamental
+        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices, if they
+        were asked for.
+    steps, rejected
+        Steps tried, and how many of them the error control rejected.
+    """
+
+    system: HybridSystem
+    parameters: np.ndarray
+    t: np.ndarray
+    j: np.ndarray
+    x: np.ndarray
+    mode: np.ndarray
+    jumps: Jumps
+    status: Status
+    fundamental: np.ndarray | None
+    steps: int
+    rejected: int
+    _pieces: Pieces | None = attrs.field(alias="pieces")
+
+    def __repr__(self) -> str:
+        span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
+        return f"<HybridArc {span}, {len(self.jumps)} jumps, {self.status.code.name}>"
+
+    def __call__(self, t: ArrayLike) -> np.ndarray:
+        """State at time ``t``, a scalar or an array, from the dense output: ``t.shape + (n,)``.
+
+        At the time of a jump this is the state after it.
+
+        Raises
+        ------
+        ArgumentError
+            If a time lies outside the run, or the run kept samples only.
+        """
+        times = np.asarray(t, dtype=float)
+        if self._pieces is None:
+            raise ArgumentError("This arc keeps samples only. Run simulate without samples= for dense output.")
+        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
+            raise ArgumentError(
+                f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
+            )
+        flat = times.ravel()
+        if len(self._pieces.t) == 0:
+            return np.broadcast_to(self.x[-1], (*times.shape, self.system.dimension)).copy()
+        states, index = self._pieces.at(flat)
+        # A step ends at its jump: what lies at or after the last of them is the end of the run.
+        states[(flat >= self.t[-1]) & (self._pieces.j[index] < self.j[-1])] = self.x[-1]
+        return states.reshape(*times.shape, self.system.dimension)
+
+
+def hybrid_points(
+    system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times, jump counts, states and mode indices of a run in order: step starts, states before jumps, the end."""
+    sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
+    t_end, x_end, mode_end = end
+    t = np.concatenate([pieces.t, jumps.t, [t_end]])
+    j = np.concatenate([pieces.j, np.arange(len(jumps)), [len(jumps)]])
+    x = np.concatenate([pieces.coefficients[:, 0], jumps.x_minus, [x_end]])
+    mode = np.concatenate([pieces.mode, sources[jumps.transition], [mode_end]])
+    kind = np.concatenate([np.zeros(len(pieces.t)), np.ones(len(jumps)), [1]])
+    order = np.lexsort((kind, j))
+    return t[order], j[order], x[order], mode[order]
+
+
+def join(chunks: list[tuple[Any, ...]]) -> tuple[np.ndarray, ...]:
+    """Concatenate the columns of rows of arrays."""
+    return tuple(np.concatenate(column) for column in zip(*chunks, strict=True))

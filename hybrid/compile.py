@@ -1,0 +1,167 @@
+"""From a model to machine code: six small functions a model, called by kernels that all models share."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
+
+import attrs
+import numpy as np
+
+from hybrid.cache import announced, cache_directory, compiled_into, source_key
+from hybrid.errors import ArgumentError
+from hybrid.load import load_kernels
+
+if TYPE_CHECKING:
+    from hybrid.emit import Emitted
+    from hybrid.system import HybridSystem
+
+ROLES = ("flow", "flow_jacobian", "guard", "guard_gradient", "reset", "reset_jacobian")
+
+
+@attrs.frozen(eq=False, repr=False)
+class CompiledSystem:
+    """A system's roles as machine code and its graph as index arrays; one for all parameter values.
+
+    Attributes
+    ----------
+    system
+        The model.
+    emitted
+        The generated source and what tracing could prove of the model.
+    roles
+        The six compiled functions, in the order of ``ROLES``.
+    """
+
+    system: HybridSystem
+    emitted: Emitted
+    roles: tuple[Any, ...]
+
+    def __repr__(self) -> str:
+        system = self.system
+        lines = [f"CompiledSystem of {system.name or 'a system'}: {system.dimension} states"]
+        for name, affine in zip(system.mode_names, self.emitted.affine_mode, strict=True):
+            lines.append(f"  mode {name}: {'affine' if affine else 'nonlinear'} in the state")
+        for name, affine in zip(system.transition_names, self.emitted.affine_guard, strict=True):
+            lines.append(f"  transition {name}: {'affine guard' if affine else 'guard fitted along each step'}")
+        return "\n".join(lines)
+
+    def model(self, parameters: Mapping[str, float] | None = None) -> Any:
+        """What the kernels are given: roles, parameter values, graph."""
+        from hybrid.kernels.layout import Model
+
+        system = self.system
+        outgoing, first = [], [0]
+        for name in system.mode_names:
+            outgoing += [i for i, transition in enumerate(system.transitions) if transition.source == name]
+            first.append(len(outgoing))
+        transitions = system.transitions
+        return Model(
+            *self.roles,
+            parameters=system.parameter_values(parameters),
+            dimension=system.dimension,
+            first_outgoing=_indices(first),
+            outgoing=_indices(outgoing),
+            target=_indices(system.mode_index(transition.target) for transition in transitions),
+            direction=_indices(transition.guard.direction for transition in transitions),
+            affine_guard=_indices(self.emitted.affine_guard),
+            boundary=_indices(transition.source != transition.target for transition in transitions),
+            marker=_indices(transition.is_marker for transition in transitions),
+            period=system.forcing_period(parameters) or 0.0,
+        )
+
+
+def _indices(values: Any) -> np.ndarray:
+    return np.array([int(value) for value in values], dtype=np.int64)
+
+
+_COMPILED: WeakKeyDictionary[HybridSystem, CompiledSystem] = WeakKeyDictionary()
+_ROLES: dict[str, tuple[Any, ...]] = {}
+
+
+def compile_system(system: HybridSystem) -> CompiledSystem:
+    """Trace, differentiate and compile a model; repeated calls return what the first one made.
+
+    Raises
+    ------
+    ModelError
+        If a function can be neither traced nor differentiated, or a given derivative is wrong.
+    ArgumentError
+        If ``system`` is not a HybridSystem.
+    """
+    from hybrid.system import HybridSystem
+
+    if not isinstance(system, HybridSystem):
+        raise ArgumentError(f"system must be a HybridSystem; got {system!r}. Call the model's factory first.")
+    compiled = _COMPILED.get(system)
+    if compiled is None:
+        from hybrid.emit import emit
+
+        load_kernels()
+        emitted = emit(system)
+        with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
+            compiled = CompiledSystem(system, emitted, _compiled_roles(emitted))
+        _COMPILED[system] = compiled
+    return compiled
+
+
+def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
+    if emitted.opaque:
+        return _decorated(_executed(emitted), cached=False)
+    if emitted.source not in _ROLES:
+        folder = cache_directory() / "models"
+        namespace = _imported(_written(emitted.source, folder))
+        with compiled_into(folder):
+            _ROLES[emitted.source] = _decorated(namespace, cached=True)
+    return _ROLES[emitted.source]
+
+
+def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
+    from numba import cfunc
+
+    from hybrid.kernels.layout import MATRIX_ROLE, VECTOR_ROLE
+
+    return tuple(
+        cfunc(
+            (MATRIX_ROLE if role.endswith("jacobian") else VECTOR_ROLE).signature,
+            cache=cached,
+            error_model="numpy",
+        )(namespace[role])
+        for role in ROLES
+    )
+
+
+def _executed(emitted: Emitted) -> dict[str, Any]:
+    """Roles that call functions of the user's as they are: compiled in this process, never kept."""
+    from numba import njit
+
+    namespace: dict[str, Any] = {
+        name: value if isinstance(value, type) else njit(error_model="numpy")(value)
+        for name, value in emitted.opaque.items()
+    }
+    exec(compile(emitted.source, "<hybrid model>", "exec"), namespace)
+    return namespace
+
+
+def _written(source: str, folder: Path) -> Path:
+    """The file that holds ``source``, written whole or not at all: other processes may be doing the same."""
+    path = folder / f"model_{source_key(source)}.py"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        draft = folder / f".{path.stem}.{os.getpid()}"
+        draft.write_text(source, encoding="utf-8")
+        draft.replace(path)
+    return path
+
+
+def _imported(path: Path) -> dict[str, Any]:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return vars(module)

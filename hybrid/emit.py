@@ -1,0 +1,245 @@
+"""The Python source of a system's six compiled roles.
+
+Each role is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
+fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
+columns, time last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import sympy
+
+from hybrid.derivative import COMPLEX_STEP, complex_step_error, symbolic_jacobian
+from hybrid.errors import ModelError
+from hybrid.names import PARAMETERS, STATE, plain_class
+from hybrid.printer import IMPORTS, assignments, unprintable
+from hybrid.probe import derivative_has_time_column
+from hybrid.roles import Role, field_role, guard_role, reset_role
+from hybrid.symbolic import JUMPING, ONE, ZERO
+from hybrid.trace import Symbols, TraceError, model_symbols, trace
+
+if TYPE_CHECKING:
+    from hybrid.system import HybridSystem
+
+
+@attrs.frozen
+class Emitted:
+    """What the compiler needs to know of a system.
+
+    Parameters
+    ----------
+    source
+        Text of a module with the functions ``flow``, ``flow_jacobian``, ``guard``, ``guard_gradient``,
+        ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. The same model gives the
+        same text, in any process.
+    opaque
+        What the text refers to by name: the model functions that tracing could not follow, to be
+        compiled themselves, and the named tuples they take. Empty if all were traced.
+    affine_guard
+        By transition: whether the guard's gradient, its slope in time included, is proved to depend on
+        parameters only.
+    affine_mode
+        By mode: whether the field's derivative in the state is proved not to depend on the state.
+    autonomous
+        By mode: whether the field is proved not to depend on time.
+    """
+
+    source: str
+    opaque: dict[str, object]
+    affine_guard: tuple[bool, ...]
+    affine_mode: tuple[bool, ...]
+    autonomous: tuple[bool, ...]
+
+
+def emit(system: HybridSystem) -> Emitted:
+    """Trace and differentiate every function of a system, and write the source of its six roles.
+
+    Raises
+    ------
+    ModelError
+        If a function can neither be traced nor differentiated by the complex step, and comes without
+        a derivative.
+    """
+    writer = _Writer(system)
+    fields = [writer.write(field_role(system, mode)) for mode in system.modes]
+    guards = [writer.write(guard_role(transition)) for transition in system.transitions]
+    resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
+    functions = (
+        _function("flow", [field.value for field in fields]),
+        _function("flow_jacobian", [field.derivative for field in fields]),
+        _function("guard", [guard.value for guard in guards]),
+        _function("guard_gradient", [guard.derivative for guard in guards]),
+        _function("reset", [reset.value for reset in resets]),
+        _function("reset_jacobian", [reset.derivative for reset in resets]),
+    )
+    symbols = writer.symbols
+    return Emitted(
+        source="\n\n".join((IMPORTS, *functions)),
+        opaque=writer.opaque,
+        affine_guard=tuple(_is_affine(guard, symbols.variables) for guard in guards),
+        affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
+        autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
+    )
+
+
+@attrs.frozen
+class _Written:
+    """Statements for a function and its derivative; the expressions behind them if it was traced."""
+
+    value: list[str]
+    derivative: list[str]
+    expressions: list[sympy.Expr] | None = None
+    jacobian: list[list[sympy.Expr]] | None = None
+
+
+class _Writer:
+    """Writes the statements of model functions, and gathers those that stay opaque."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        self.symbols: Symbols = model_symbols(system.dimension, len(system.parameters))
+        self.opaque: dict[str, object] = {}
+
+    def write(self, role: Role) -> _Written:
+        targets = ["out[0]"] if role.size is None else [f"out[{i}]" for i in range(role.size)]
+        try:
+            expressions = self._traced(role.function)
+        except ModelError as error:
+            return self._write_opaque(role, targets, error)
+        jacobian = symbolic_jacobian(expressions, self.symbols.variables)
+        if role.derivative is None:
+            derivative = assignments(self._cells(role), [entry for row in jacobian for entry in row])
+        else:
+            derivative = self._given_derivative(role, role.derivative)
+        return _Written(assignments(targets, expressions), derivative, expressions, jacobian)
+
+    def identity(self) -> _Written:
+        """The reset of a transition that has none."""
+        n = self.system.dimension
+        value = assignments([f"out[{i}]" for i in range(n)], self.symbols.x)
+        cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
+        entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
+        return _Written(value, assignments(cells, entries))
+
+    def _traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
+        expressions = trace(function, self.system.state, tuple(self.system.parameters))
+        missing = unprintable(expressions)
+        if missing is not None:
+            raise TraceError(f"the function {missing} has no compiled form")
+        return expressions
+
+    def _write_opaque(self, role: Role, targets: Sequence[str], reason: ModelError) -> _Written:
+        name = self._opaque_name(role.function)
+        value = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
+        value += [f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)]
+        if role.derivative is not None:
+            return _Written(value, self._given_derivative(role, role.derivative))
+        error = complex_step_error(self.system, role)
+        if error is not None:
+            raise ModelError(
+                f"{role.title} cannot be differentiated. Tracing stopped: {reason}. The complex step "
+                f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, np.where), "
+                f"or give its derivative as {role.derivative_name}=."
+            ) from (reason.__cause__ or error)
+        return _Written(value, self._complex_step(role, name))
+
+    def _complex_step(self, role: Role, name: str) -> list[str]:
+        n = self.system.dimension
+        lines = []
+        if isinstance(self.system.state, int):
+            lines.append(f"z = x[:{n}].astype(np.complex128)")
+        for j in range(n + 1):
+            time = f"complex(t, {COMPLEX_STEP!r})" if j == n else "complex(t, 0.0)"
+            if not isinstance(self.system.state, int):
+                parts = (f"complex(x[{i}], {COMPLEX_STEP if i == j else 0.0})" for i in range(n))
+                lines.append(f"v{j} = {name}({time}, State({', '.join(parts)}), {self._parameters()})")
+                continue
+            if j < n:
+                lines.append(f"z[{j}] = complex(x[{j}], {COMPLEX_STEP!r})")
+            # a copy, since the function may hand back a view of its argument
+            lines.append(f"v{j} = {name}({time}, z.copy(), {self._parameters()})")
+            if j < n:
+                lines.append(f"z[{j}] = complex(x[{j}], 0.0)")
+        cells = iter(self._cells(role))
+        for i in range(role.rows):
+            for j in range(n + 1):
+                value = f"v{j}" if role.size is None else f"v{j}[{i}]"
+                lines.append(f"{next(cells)} = {value}.imag / {COMPLEX_STEP!r}")
+        return lines
+
+    def _given_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
+        n, cells = self.system.dimension, self._cells(role)
+        try:
+            entries = self._traced(derivative)
+        except ModelError:
+            return self._opaque_derivative(role, derivative)
+        width = len(entries) // role.rows
+        zeros = [ZERO] * (n + 1 - width)
+        rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(role.rows)]
+        return assignments(cells, [entry for row in rows for entry in row])
+
+    def _opaque_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
+        n = self.system.dimension
+        lines = [f"v = {self._opaque_name(derivative)}(t, {self._state()}, {self._parameters()})"]
+        width = n + 1 if derivative_has_time_column(self.system, role) else n
+        cells = iter(self._cells(role))
+        for i in range(role.rows):
+            row = "v" if role.size is None else f"v[{i}]"
+            lines += [f"{next(cells)} = {f'{row}[{j}]' if j < width else '0.0'}" for j in range(n + 1)]
+        return lines
+
+    def _cells(self, role: Role) -> list[str]:
+        columns = range(self.system.dimension + 1)
+        if role.size is None:
+            return [f"out[{j}]" for j in columns]
+        return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
+
+    def _opaque_name(self, function: Callable[..., Any]) -> str:
+        name = f"model_{sum(key.startswith('model_') for key in self.opaque)}"
+        self.opaque[name] = function
+        return name
+
+    def _state(self) -> str:
+        state = self.system.state
+        if isinstance(state, int):
+            return f"x[:{state}]"
+        self.opaque["State"] = plain_class(STATE, state)
+        return f"State({', '.join(f'x[{i}]' for i in range(len(state)))})"
+
+    def _parameters(self) -> str:
+        names = tuple(self.system.parameters)
+        self.opaque["Parameters"] = plain_class(PARAMETERS, names)
+        return f"Parameters({', '.join(f'p[{i}]' for i in range(len(names)))})"
+
+
+def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Written:
+    role = reset_role(system, system.transitions[index])
+    return writer.identity() if role is None else writer.write(role)
+
+
+def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
+    lines = [f"def {name}(index, t, x, p, out):"]
+    for index, statements in enumerate(branches):
+        lines.append(f"    {'elif' if index else 'if'} index == {index}:")
+        lines += [f"        {statement}" for statement in statements]
+    if len(lines) == 1:
+        lines.append("    pass")
+    return "\n".join(lines) + "\n"
+
+
+def _is_affine(written: _Written, variables: Sequence[sympy.Symbol]) -> bool:
+    """Whether the derivative in the variables, which come first, is proved to depend on none of them."""
+    if written.expressions is None or written.jacobian is None:
+        return False
+    # A floor or a sign has slope zero on both sides of its jumps.
+    jumps = [node for expression in written.expressions for node in expression.atoms(*JUMPING)]
+    entries = [entry for row in written.jacobian for entry in row[: len(variables)]]
+    return _is_free(jumps, variables) and _is_free(entries, variables)
+
+
+def _is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:
+    return expressions is not None and not any(expression.has(*variables) for expression in expressions)

@@ -1,0 +1,128 @@
+"""Real roots of a polynomial in Bernstein form, isolated by Descartes' rule: none is missed, none counted twice.
+
+The number of sign variations of the Bernstein coefficients bounds the number of roots in the open interval
+and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 1 are proofs and anything
+else is cut in two. The coefficients' hull makes "no root" the cheap case, which nearly every step is.
+"""
+
+from numba import float64, int64, njit, types
+
+from hybrid.kernels.layout import KERNEL, MATRIX, VECTOR
+
+NO_ROOT = 2.0
+# Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
+CLUSTER = 1e-14
+
+
+@njit(types.UniTuple(float64, 2)(VECTOR, int64, float64, VECTOR), **KERNEL)
+def value_and_slope(coefficients, degree, theta, scratch):
+    """Value and derivative at ``theta`` by de Casteljau; ``coefficients (degree + 1,)``, ``scratch`` no shorter."""
+    for i in range(degree + 1):
+        scratch[i] = coefficients[i]
+    slope = 0.0
+    for level in range(degree, 0, -1):
+        if level == 1:
+            slope = degree * (scratch[1] - scratch[0])
+        for i in range(level):
+            scratch[i] += theta * (scratch[i + 1] - scratch[i])
+    return scratch[0], slope
+
+
+@njit(float64(VECTOR, int64, int64, VECTOR), **KERNEL)
+def simple_root(coefficients, degree, sign_left, scratch):
+    """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
+    low, high = 0.0, 1.0
+    theta = 0.5
+    ends = coefficients[0] - coefficients[degree]
+    if ends != 0.0:
+        theta = min(max(coefficients[0] / ends, 0.0), 1.0)
+    for _ in range(100):
+        value, slope = value_and_slope(coefficients, degree, theta, scratch)
+        if value == 0.0:
+            return theta
+        if (value > 0.0) == (sign_left > 0):
+            low = theta
+        else:
+            high = theta
+        newton = theta - value / slope if slope != 0.0 else -1.0
+        if not (low < newton < high):
+            newton = 0.5 * (low + high)
+        if abs(newton - theta) <= 2e-16 * abs(newton) or high - low <= 2e-16 * high:
+            return newton
+        theta = newton
+    return theta
+
+
+@njit(types.Tuple((float64, int64))(VECTOR, int64, int64, int64, MATRIX), **KERNEL)
+def first_crossing(coefficients, degree, side, direction, stack):
+    """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
+
+    ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
+    that differs at once is a crossing at 0; ``stack (depth, >= degree + 3)``, its last row scratch.
+    Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero at 1 exactly counts as crossed
+    if the slope there leads across.
+    """
+    scratch = stack[stack.shape[0] - 1]
+    top = 0
+    stack[0, 0] = 0.0
+    stack[0, 1] = 1.0
+    for i in range(degree + 1):
+        stack[0, 2 + i] = coefficients[i]
+    while top >= 0:
+        row = stack[top]
+        start, end = row[0], row[1]
+        first, last, variations = 0, 0, 0
+        for i in range(2, degree + 3):
+            if row[i] != 0.0:
+                sign = 1 if row[i] > 0.0 else -1
+                if last != 0 and sign != last:
+                    variations += 1
+                if first == 0:
+                    first = sign
+                last = sign
+        if first == 0:
+            top -= 1
+            continue
+        if first != side:
+            side = first
+            if direction == 0 or direction == first:
+                return start, side
+        if variations > 1 and end - start > CLUSTER:
+            middle = 0.5 * (start + end)
+            left = stack[top + 1]
+            left[0], left[1] = start, middle
+            row[0] = middle
+            for level in range(degree, -1, -1):
+                left[2 + degree - level] = row[2]
+                for i in range(2, level + 2):
+                    row[i] = 0.5 * (row[i] + row[i + 1])
+            top += 1
+            continue
+        if last != side:
+            side = last
+            if direction == 0 or direction == last:
+                if variations > 1:
+                    return start, side
+                return start + (end - start) * simple_root(row[2:], degree, first, scratch), side
+        top -= 1
+    if coefficients[degree] == 0.0:
+        # Odd or even multiplicity at 1 cannot be told from the sign before it alone: look at the slope.
+        slope = -coefficients[degree - 1]
+        after = 1 if slope > 0.0 else (-1 if slope < 0.0 else side)
+        if after != side:
+            side = after
+            if direction == 0 or direction == after:
+                return 1.0, side
+    return NO_ROOT, side
+
+
+@njit(int64(VECTOR, int64), **KERNEL)
+def divide_by_theta(coefficients, degree):
+    """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree.
+
+    A known root at the start of a step is taken out exactly, so that it can be neither found again nor
+    hide a second root near it.
+    """
+    for i in range(degree):
+        coefficients[i] = coefficients[i + 1] * degree / (i + 1)
+    return degree - 1

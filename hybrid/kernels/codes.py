@@ -1,0 +1,41 @@
+"""Integers shared by the kernels and the statuses that people read."""
+
+DONE = 0
+RECORD_FULL = 1
+MAX_STEPS = 2
+MAX_JUMPS = 3
+STEP_TOO_SMALL = 4
+NON_FINITE = 5
+ACCUMULATION = 6
+STUCK = 7
+
+# What the next call of the driver has to do before it can step: nothing, evaluate the rates anew
+# (the tangent vectors were changed from outside), or take its sides at every guard of a new mode.
+READY = 0
+STALE = 1
+ENTERING = 2
+NO_TRANSITION = -1
+
+# Slots of Run.count.
+MODE = 0
+CYCLE = 1
+JUMPS = 2
+STEPS = 3
+REJECTED = 4
+PHASE_OF_RUN = 5
+LAST_FIRED = 6
+JUMPS_HERE = 7
+SINGULAR_JUMPS = 8
+PENDING = 9
+PREVIOUS_MODE = 10
+COUNTERS = 11
+
+# Slots of Run.clock.
+PHASE = 0
+NEXT_STEP = 1
+LAST_JUMP_CYCLE = 2
+LAST_JUMP_PHASE = 3
+DIVERGENCE = 4
+LOG_DETERMINANT = 5
+LARGEST_SALTATION = 6
+CLOCKS = 7

@@ -1,0 +1,223 @@
+"""The driver: smooth steps, events, jumps, until a given time. All runs of the library are calls of ``advance``."""
+
+import math
+
+from numba import boolean, float64, int64, njit, void
+
+from hybrid.kernels.codes import (
+    ACCUMULATION,
+    CYCLE,
+    DIVERGENCE,
+    DONE,
+    ENTERING,
+    JUMPS,
+    JUMPS_HERE,
+    MAX_JUMPS,
+    MAX_STEPS,
+    MODE,
+    NEXT_STEP,
+    NO_TRANSITION,
+    NON_FINITE,
+    PENDING,
+    PHASE,
+    PHASE_OF_RUN,
+    PREVIOUS_MODE,
+    READY,
+    RECORD_FULL,
+    REJECTED,
+    STALE,
+    STEP_TOO_SMALL,
+    STEPS,
+    STUCK,
+)
+from hybrid.kernels.guards import earliest_crossing, guard_speed, guard_value, land, rounding_band
+from hybrid.kernels.jump import enter, jump
+from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
+from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rates, starting_step
+
+SAFETY = 0.9
+SHRINK = 0.2
+GROW = 6.0
+EPSILON = 2.220446049250313e-16
+# More jumps than this at one instant are not going to end.
+MOST_JUMPS_AT_ONCE = 100
+
+
+@njit(int64(MODEL, RUN, WORK), **KERNEL)
+def arrived(model, run, work):
+    """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run, not to the next."""
+    mode, t = run.count[MODE], run.clock[PHASE]
+    model.flow(mode, t, run.y, model.parameters, work.field)
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+        if run.on_guard[transition] == 0 and abs(value) <= rounding_band(model, run, t, work.gradient):
+            after = 1 if speed > 0.0 else -1
+            direction = model.direction[transition]
+            if speed != 0.0 and after != run.side[transition] and direction in (0, after):
+                return transition
+    return NO_TRANSITION
+
+
+@njit(boolean(MODEL, int64), **KERNEL)
+def all_affine(model, mode):
+    """Whether every guard of the mode is affine, so that no interpolant of the state is needed to follow them."""
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        if model.affine_guard[model.outgoing[slot]] == 0:
+            return False
+    return True
+
+
+@njit(void(MODEL, METHOD, RUN, RECORD, float64, float64, WORK), **KERNEL)
+def remember_step(model, method, run, record, t, h, work):
+    """Write the step just taken from ``run.y`` into the record; its stages are those of ``work``."""
+    slot = record.used[0]
+    mode = run.count[MODE]
+    record.step_time[slot, 0], record.step_time[slot, 1] = t, h
+    record.step_place[slot, 0], record.step_place[slot, 1] = run.count[CYCLE], mode
+    record.step_place[slot, 2] = run.count[JUMPS]
+    interpolation_stages(model, method, mode, t, h, run.y, work)
+    interpolate(method, h, run.y, model.dimension, work)
+    record.step_coefficients[slot] = work.coefficients
+    record.used[0] = slot + 1
+
+
+@njit(void(MODEL, METHOD, RUN, int64, float64, float64, WORK), **KERNEL)
+def accept(model, method, run, tangents, h, correction, work):
+    """Move the run to the end of the attempted step in ``work.new``."""
+    n = model.dimension
+    for i in range(n):
+        run.scale[i] = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
+    for i in range(n * (1 + tangents)):
+        run.y[i] = work.new[i]
+    if tangents > 0:
+        total = 0.0
+        for j in range(method.b.shape[0]):
+            total += method.b[j] * work.traces[j]
+        run.clock[DIVERGENCE] += h * total + correction * work.traces[method.b.shape[0]]
+    mode = run.count[MODE]
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        run.on_guard[model.outgoing[slot]] = 0
+    phase = run.clock[PHASE] + (h + correction)
+    if model.period > 0.0:
+        while phase >= model.period:
+            phase -= model.period
+            run.count[CYCLE] += 1
+    run.clock[PHASE] = phase
+
+
+@njit(void(METHOD, int64, WORK), **KERNEL)
+def carry_rates(method, length, work):
+    """The rates at the end of a step are those at the start of the next."""
+    s = method.b.shape[0]
+    work.traces[0] = work.traces[s]
+    for i in range(length):
+        work.stages[0, i] = work.stages[s, i]
+
+
+@njit(boolean(RUN, int64), **KERNEL)
+def finite(run, length):
+    """Whether the first ``length`` entries of the run's vector are finite."""
+    total = 0.0
+    for i in range(length):
+        total += abs(run.y[i])
+    return math.isfinite(total)
+
+
+@njit(
+    int64(MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK),
+    **ENTRY,
+)
+def advance(
+    model, method, run, record, tangents, orthonormal, stop_cycle, stop_phase, max_steps, max_jumps, work
+):
+    """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
+
+    The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record has been
+    emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. Nothing is allocated.
+    """
+    n = model.dimension
+    length = n * (1 + tangents)
+    recording = record.step_time.shape[0] > 0
+    while True:
+        if run.count[PENDING] != NO_TRANSITION:
+            if run.count[JUMPS] >= max_jumps:
+                return MAX_JUMPS
+            if 0 < record.jump_time.shape[0] == record.used[1]:
+                return RECORD_FULL
+            if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
+                return ACCUMULATION
+            jump(model, run, record, run.count[PENDING], tangents, orthonormal, work)
+            run.count[PENDING] = NO_TRANSITION
+            continue
+        mode = run.count[MODE]
+        if run.count[PHASE_OF_RUN] == ENTERING:
+            if not finite(run, length):
+                return NON_FINITE
+            fires, stuck = enter(model, run, work)
+            if stuck:
+                return ACCUMULATION
+            if fires != NO_TRANSITION:
+                if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
+                    return STUCK
+                run.count[PENDING] = fires
+                continue
+            if mode != run.count[PREVIOUS_MODE]:
+                run.clock[NEXT_STEP] = run.first_step[mode]
+                run.first_step[mode] = 0.0
+            run.count[PHASE_OF_RUN] = STALE
+        t = run.clock[PHASE]
+        remaining = (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - t)
+        if remaining <= 0.0:
+            run.count[PENDING] = arrived(model, run, work)
+            if run.count[PENDING] != NO_TRANSITION:
+                continue
+            return DONE
+        if run.count[PHASE_OF_RUN] == STALE:
+            work.traces[0] = rates(model, mode, t, run.y, tangents, work.jacobian, work.stages[0])
+            if run.clock[NEXT_STEP] <= 0.0:
+                run.clock[NEXT_STEP] = starting_step(model, method, mode, t, run.y, tangents, work)
+            if not run.clock[NEXT_STEP] > 0.0:
+                return NON_FINITE
+            run.count[PHASE_OF_RUN] = READY
+        if recording and record.used[0] == record.step_time.shape[0]:
+            return RECORD_FULL
+        if run.count[STEPS] >= max_steps:
+            return MAX_STEPS
+        proposed = min(run.clock[NEXT_STEP], method.max_step)
+        last = proposed >= remaining
+        h = remaining if last else proposed
+        ratio = attempt(model, method, mode, t, h, run.y, tangents, work)
+        run.count[STEPS] += 1
+        if not ratio <= 1.0:
+            run.count[REJECTED] += 1
+            shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
+            run.clock[NEXT_STEP] = h * shrink
+            if h * shrink <= 4.0 * EPSILON * abs(t) or h * shrink < 1e-200:
+                return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE
+            continue
+        grow = min(GROW, max(SHRINK, SAFETY * max(ratio, 1e-16) ** (-method.exponent)))
+        run.clock[NEXT_STEP] = max(proposed, h * grow) if last else h * grow
+        fired = NO_TRANSITION
+        theta = 0.0
+        if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
+            interpolation_stages(model, method, mode, t, h, run.y, work)
+            if not all_affine(model, mode):
+                interpolate(method, h, run.y, n, work)
+            theta, fired = earliest_crossing(model, method, run, t, h, work)
+        correction = 0.0
+        if fired != NO_TRANSITION:
+            h, correction = land(model, method, fired, mode, t, h, theta, run.y, tangents, work)
+        elif run.first_step[mode] <= 0.0:
+            run.first_step[mode] = h
+        if recording:
+            remember_step(model, method, run, record, t, h, work)
+        accept(model, method, run, tangents, h, correction, work)
+        if fired != NO_TRANSITION:
+            run.count[PENDING] = fired
+        else:
+            if last:
+                run.count[CYCLE] = stop_cycle
+                run.clock[PHASE] = stop_phase
+            carry_rates(method, length, work)

@@ -1,0 +1,200 @@
+"""The tuples that kernels pass around, and their numba types.
+
+A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the state first, then ``k`` tangent vectors
+one after the other, so that each of them is contiguous. ``n`` is the dimension, ``k`` the number of tangents.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import float64, int64, types, void
+
+VECTOR = float64[::1]
+MATRIX = float64[:, ::1]
+CUBE = float64[:, :, ::1]
+INDICES = int64[::1]
+
+VECTOR_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, VECTOR))
+MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
+
+
+class Model(NamedTuple):
+    """The six roles of a compiled system, its parameters and its graph as index arrays.
+
+    ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the transitions that leave mode ``m``, in the
+    order they were listed. ``boundary`` is 1 for a transition that a state on the far side of its guard
+    must take at once, 0 for one that only crossings fire. ``period`` is 0 without a forcing period.
+    """
+
+    flow: object
+    flow_jacobian: object
+    guard: object
+    guard_gradient: object
+    reset: object
+    reset_jacobian: object
+    parameters: np.ndarray
+    dimension: int
+    first_outgoing: np.ndarray
+    outgoing: np.ndarray
+    target: np.ndarray
+    direction: np.ndarray
+    affine_guard: np.ndarray
+    boundary: np.ndarray
+    marker: np.ndarray
+    period: float
+
+
+MODEL = types.NamedTuple(
+    (
+        VECTOR_ROLE,
+        MATRIX_ROLE,
+        VECTOR_ROLE,
+        VECTOR_ROLE,
+        VECTOR_ROLE,
+        MATRIX_ROLE,
+        VECTOR,
+        int64,
+        INDICES,
+        INDICES,
+        INDICES,
+        INDICES,
+        INDICES,
+        INDICES,
+        INDICES,
+        float64,
+    ),
+    Model,
+)
+
+
+class Method(NamedTuple):
+    """An explicit Runge-Kutta pair with its interpolant and its tolerances.
+
+    ``a (S, S)``, ``b (s,)``, ``c (S,)`` with ``s`` stages for the step; row ``s`` is the derivative at the new
+    point and rows up to ``S`` serve the interpolant alone. ``error`` and ``second_error`` ``(s + 1,)`` weigh the stages
+    into the error estimate. ``interpolant (d + 1, S)`` gives the Bernstein coefficients of the step's
+    interpolant: ``y0 + h * interpolant @ stages``.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    error: np.ndarray
+    second_error: np.ndarray
+    interpolant: np.ndarray
+    exponent: float
+    rtol: float
+    atol: float
+    max_step: float
+
+
+METHOD = types.NamedTuple(
+    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, float64, float64, float64, float64), Method
+)
+
+
+class Run(NamedTuple):
+    """The mutable state of one trajectory: all that a run needs to be taken up again.
+
+    ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
+    the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
+    vanishes at the entry of the mode; ``first_step (modes,)`` remembers the step a mode began with;
+    ``scale (n,)`` the size of the components over the last step, against which rounding is judged; ``growth (k,)`` sums the
+    logarithms of the lengths taken out of the tangent vectors by orthonormalisation.
+    """
+
+    count: np.ndarray
+    clock: np.ndarray
+    y: np.ndarray
+    side: np.ndarray
+    on_guard: np.ndarray
+    first_step: np.ndarray
+    scale: np.ndarray
+    growth: np.ndarray
+
+
+RUN = types.NamedTuple((INDICES, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTOR, VECTOR), Run)
+
+
+class Work(NamedTuple):
+    """Scratch memory, allocated once a run.
+
+    ``stages (S, N)`` and ``traces (S,)`` of the current step; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``;
+    ``gradient (n + 1,)``; ``scalar (1,)``; ``field, field_after, state (n,)``; ``saltation (n, n)``; ``coefficients (d + 1, n)`` of the
+    step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``nodes (q + 1,)`` and
+    ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
+    """
+
+    stages: np.ndarray
+    traces: np.ndarray
+    trial: np.ndarray
+    new: np.ndarray
+    error: np.ndarray
+    second_error: np.ndarray
+    jacobian: np.ndarray
+    reset_jacobian: np.ndarray
+    gradient: np.ndarray
+    scalar: np.ndarray
+    field: np.ndarray
+    field_after: np.ndarray
+    state: np.ndarray
+    saltation: np.ndarray
+    coefficients: np.ndarray
+    polynomial: np.ndarray
+    stack: np.ndarray
+    intervals: np.ndarray
+    nodes: np.ndarray
+    fit: np.ndarray
+
+
+WORK = types.NamedTuple(
+    (
+        MATRIX,  # stages
+        VECTOR,  # traces
+        VECTOR,  # trial
+        VECTOR,  # new
+        VECTOR,  # error
+        VECTOR,  # second_error
+        MATRIX,  # jacobian
+        MATRIX,  # reset_jacobian
+        VECTOR,  # gradient
+        VECTOR,  # scalar
+        VECTOR,  # field
+        VECTOR,  # field_after
+        VECTOR,  # state
+        MATRIX,  # saltation
+        MATRIX,  # coefficients
+        VECTOR,  # polynomial
+        MATRIX,  # stack
+        MATRIX,  # intervals
+        VECTOR,  # nodes
+        MATRIX,  # fit
+    ),
+    Work,
+)
+
+
+class Record(NamedTuple):
+    """Room for what a run is asked to remember; arrays of length zero remember nothing.
+
+    ``used (2,)`` counts the steps and jumps in it. A step: its start ``(phase, length)``, ``(cycle, mode, jump count)`` and the Bernstein
+    coefficients ``(d + 1, n)``. A jump: its phase and transversality, ``(cycle, transition)``, the states ``(2, n)`` before and after, and
+    the saltation matrix ``(n, n)``.
+    """
+
+    used: np.ndarray
+    step_time: np.ndarray
+    step_place: np.ndarray
+    step_coefficients: np.ndarray
+    jump_time: np.ndarray
+    jump_place: np.ndarray
+    jump_states: np.ndarray
+    jump_saltation: np.ndarray
+
+
+INDEX_MATRIX = int64[:, ::1]
+RECORD = types.NamedTuple((INDICES, MATRIX, INDEX_MATRIX, CUBE, MATRIX, INDEX_MATRIX, CUBE, CUBE), Record)
+
+# A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time to compile.
+ENTRY = {"nogil": True, "error_model": "numpy", "cache": True}
+KERNEL = ENTRY | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}

@@ -1,0 +1,148 @@
+"""One step of an explicit Runge-Kutta pair for the state and its tangent vectors, and its interpolant."""
+
+import math
+
+from numba import float64, int64, njit, void
+
+from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
+
+
+@njit(float64(MODEL, int64, float64, VECTOR, int64, MATRIX, VECTOR), **KERNEL)
+def rates(model, mode, t, y, tangents, jacobian, out):
+    """Time derivative of ``y (n (1 + k),)`` into ``out``: ``f`` for the state, ``D_x f v`` for each tangent.
+
+    Returns div f, or 0 without tangents.
+    """
+    n = model.dimension
+    model.flow(mode, t, y, model.parameters, out)
+    if tangents == 0:
+        return 0.0
+    model.flow_jacobian(mode, t, y, model.parameters, jacobian)
+    for start in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += jacobian[i, j] * y[start + j]
+            out[start + i] = total
+    divergence = 0.0
+    for i in range(n):
+        divergence += jacobian[i, i]
+    return divergence
+
+
+@njit(void(VECTOR, float64, VECTOR, MATRIX, int64, int64, VECTOR), **KERNEL)
+def combine(y, h, weights, stages, count, length, out):
+    """``out = y + h * weights @ stages`` over the first ``count`` stages and ``length`` components."""
+    for i in range(length):
+        out[i] = 0.0
+    for j in range(count):
+        weight = weights[j]
+        if weight != 0.0:
+            stage = stages[j]
+            for i in range(length):
+                out[i] += weight * stage[i]
+    for i in range(length):
+        out[i] = y[i] + h * out[i]
+
+
+@njit(float64(METHOD, float64, VECTOR, int64, int64, WORK), **KERNEL)
+def error_ratio(method, h, y, dimension, tangents, work):
+    """Largest ratio of estimated error to tolerance over the state and each tangent vector.
+
+    A tangent vector has no absolute size, so its components are weighed against themselves and against the
+    vector's root mean square. The two estimates are combined as in Hairer, Norsett and Wanner 1993, section II.10.
+    """
+    n = dimension
+    length = n * (1 + tangents)
+    count = method.error.shape[0]
+    error, second_error, new = work.error, work.second_error, work.new
+    for i in range(length):
+        error[i] = 0.0
+        second_error[i] = 0.0
+    for j in range(count):
+        weight, second_weight = method.error[j], method.second_error[j]
+        stage = work.stages[j]
+        if weight != 0.0 or second_weight != 0.0:
+            for i in range(length):
+                error[i] += weight * stage[i]
+                second_error[i] += second_weight * stage[i]
+    worst = 0.0
+    for start in range(0, length, n):
+        floor = method.atol
+        if start > 0:
+            square = 0.0
+            for i in range(start, start + n):
+                square += new[i] * new[i]
+            floor = method.rtol * math.sqrt(square / n) + 1e-300
+        first, second = 0.0, 0.0
+        for i in range(start, start + n):
+            scale = floor + method.rtol * max(abs(y[i]), abs(new[i]))
+            first += (error[i] / scale) ** 2
+            second += (second_error[i] / scale) ** 2
+        if first > 0.0:
+            worst = max(worst, h * first / math.sqrt((first + 0.01 * second) * n))
+        elif not first == 0.0:
+            return math.nan
+    return worst
+
+
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **KERNEL)
+def attempt(model, method, mode, t, h, y, tangents, work):
+    """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
+
+    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in ``work.stages[s]``.
+    """
+    length = model.dimension * (1 + tangents)
+    s = method.b.shape[0]
+    for i in range(1, s):
+        combine(y, h, method.a[i], work.stages, i, length, work.trial)
+        work.traces[i] = rates(model, mode, t + method.c[i] * h, work.trial, tangents, work.jacobian, work.stages[i])
+    combine(y, h, method.b, work.stages, s, length, work.new)
+    work.traces[s] = rates(model, mode, t + h, work.new, tangents, work.jacobian, work.stages[s])
+    return error_ratio(method, h, y, model.dimension, tangents, work)
+
+
+@njit(void(MODEL, METHOD, int64, float64, float64, VECTOR, WORK), **KERNEL)
+def interpolation_stages(model, method, mode, t, h, y, work):
+    """Evaluate the stages that only the interpolant of the last attempted step needs, for the state alone."""
+    n = model.dimension
+    for i in range(method.b.shape[0] + 1, method.a.shape[0]):
+        combine(y, h, method.a[i], work.stages, i, n, work.trial)
+        model.flow(mode, t + method.c[i] * h, work.trial, model.parameters, work.stages[i])
+
+
+@njit(void(METHOD, float64, VECTOR, int64, WORK), **KERNEL)
+def interpolate(method, h, y, dimension, work):
+    """Bernstein coefficients ``(d + 1, n)`` of the state over the last attempted step, into ``work.coefficients``."""
+    for i in range(work.coefficients.shape[0]):
+        combine(y, h, method.interpolant[i], work.stages, method.a.shape[0], dimension, work.coefficients[i])
+
+
+@njit(float64(MODEL, METHOD, int64, float64, VECTOR, int64, WORK), **KERNEL)
+def starting_step(model, method, mode, t, y, tangents, work):
+    """A first step length from the sizes of ``y``, ``y'`` and ``y''`` (Hairer, Norsett, Wanner 1993, II.4).
+
+    ``work.stages[0]`` holds the rates at ``(t, y)``; uses ``work.stages[1]`` as scratch.
+    """
+    n = model.dimension
+    length = n * (1 + tangents)
+    size, speed = 0.0, 0.0
+    for i in range(length):
+        scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
+        size += (y[i] / scale) ** 2
+        speed += (work.stages[0, i] / scale) ** 2
+    size, speed = math.sqrt(size / length), math.sqrt(speed / length)
+    h = 1e-6 if size < 1e-5 or speed < 1e-5 else 0.01 * size / speed
+    h = min(h, method.max_step)
+    for i in range(length):
+        work.trial[i] = y[i] + h * work.stages[0, i]
+    rates(model, mode, t + h, work.trial, tangents, work.jacobian, work.stages[1])
+    bend = 0.0
+    for i in range(length):
+        scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
+        bend += ((work.stages[1, i] - work.stages[0, i]) / scale) ** 2
+    bend = math.sqrt(bend / length) / h
+    steepest = max(speed, bend)
+    if not steepest > 1e-15:
+        return min(max(1e-6, 1e-3 * h), method.max_step)
+    return min(100.0 * h, (0.01 / steepest) ** method.exponent, method.max_step)

@@ -1,0 +1,81 @@
+"""Orthonormalisation of tangent vectors and determinants: the linear algebra of a jump and of Benettin's method."""
+
+import math
+
+from numba import float64, int64, njit
+
+from hybrid.kernels.layout import KERNEL, MATRIX, VECTOR
+
+# Below this length a unit vector's image is rounding: the map that produced it is singular.
+COLLAPSED = 1e-13
+
+
+@njit(int64(VECTOR, int64, int64, VECTOR, float64), **KERNEL)
+def orthonormalise(y, n, k, growth, threshold):
+    """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``; add the logarithms of their lengths to ``growth (k,)``.
+
+    Modified Gram-Schmidt, twice, which is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold``
+    times the longest image has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of
+    vectors that collapsed now.
+    """
+    collapsed = 0
+    longest = 0.0
+    for c in range(k):
+        start = n * (1 + c)
+        square = 0.0
+        for i in range(start, start + n):
+            square += y[i] * y[i]
+        longest = max(longest, math.sqrt(square))
+        for _ in range(2):
+            for other in range(n, start, n):
+                dot = 0.0
+                for i in range(n):
+                    dot += y[other + i] * y[start + i]
+                for i in range(n):
+                    y[start + i] -= dot * y[other + i]
+        square = 0.0
+        for i in range(start, start + n):
+            square += y[i] * y[i]
+        length = math.sqrt(square)
+        if length > threshold * longest and length > 0.0:
+            growth[c] += math.log(length)
+            for i in range(start, start + n):
+                y[i] /= length
+        else:
+            collapsed += 1 if growth[c] != -math.inf else 0
+            growth[c] = -math.inf
+            for i in range(start, start + n):
+                y[i] = 0.0
+    return collapsed
+
+
+@njit(float64(MATRIX, MATRIX, int64), **KERNEL)
+def log_abs_determinant(matrix, magnitude, n):
+    """``log |det|`` of a matrix ``(n, n)``, overwritten, by elimination; minus infinity if singular to rounding.
+
+    ``magnitude``, scratch of at least that shape, follows the size of the terms that each entry was made of: a pivot
+    that is only their rounding is a zero, while one that is merely small (as near a grazing) is not.
+    """
+    total = 0.0
+    for i in range(n):
+        for j in range(n):
+            magnitude[i, j] = abs(matrix[i, j])
+    for column in range(n):
+        pivot = column
+        for i in range(column + 1, n):
+            if abs(matrix[i, column]) > abs(matrix[pivot, column]):
+                pivot = i
+        size = abs(matrix[pivot, column])
+        if not size > 1e-14 * magnitude[pivot, column]:
+            return -math.inf
+        for j in range(n):
+            matrix[column, j], matrix[pivot, j] = matrix[pivot, j], matrix[column, j]
+            magnitude[column, j], magnitude[pivot, j] = magnitude[pivot, j], magnitude[column, j]
+        total += math.log(size)
+        for i in range(column + 1, n):
+            factor = matrix[i, column] / matrix[column, column]
+            for j in range(column, n):
+                term = factor * matrix[column, j]
+                matrix[i, j] -= term
+                magnitude[i, j] = max(magnitude[i, j], abs(factor) * magnitude[column, j])
+    return total

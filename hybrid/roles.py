@@ -1,0 +1,81 @@
+"""The functions of a model, each with the derivative that may come with it and the words to name it by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import attrs
+
+if TYPE_CHECKING:
+    from hybrid.system import HybridSystem, Mode, Transition
+
+
+@attrs.frozen
+class Role:
+    """One model function: a field, a guard or a reset.
+
+    Parameters
+    ----------
+    owner
+        Whose it is, as an error text begins: ``"Mode 'flight'"``.
+    name, derivative_name
+        What the function and its derivative are called: ``"field"`` and ``"jacobian"``.
+    function, derivative
+        The user's functions of ``(t, x, p)``; ``derivative`` is None where it is to be derived.
+    size
+        Number of values, or None for a scalar.
+    """
+
+    owner: str
+    name: str
+    function: Callable[..., Any]
+    derivative_name: str
+    derivative: Callable[..., Any] | None
+    size: int | None
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of the derivative."""
+        return 1 if self.size is None else self.size
+
+    @property
+    def title(self) -> str:
+        """How an error text about the function begins."""
+        return f"{self.owner}: {self.name}"
+
+    @property
+    def derivative_title(self) -> str:
+        """How an error text about the derivative begins."""
+        return f"{self.owner}: {self.derivative_name}"
+
+
+def field_role(system: HybridSystem, mode: Mode) -> Role:
+    """The field of a mode."""
+    return Role(f"Mode {mode.name!r}", "field", mode.field, "jacobian", mode.jacobian, system.dimension)
+
+
+def guard_role(transition: Transition) -> Role:
+    """The guard of a transition."""
+    guard = transition.guard
+    return Role(f"Transition {transition.name!r}", "guard", guard.function, "gradient", guard.gradient, None)
+
+
+def reset_role(system: HybridSystem, transition: Transition) -> Role | None:
+    """The reset of a transition, None if that is the identity."""
+    reset = transition.reset
+    if reset is None:
+        return None
+    owner = f"Transition {transition.name!r}"
+    return Role(owner, "reset", reset.function, "jacobian", reset.jacobian, system.dimension)
+
+
+def roles(system: HybridSystem) -> Iterator[Role]:
+    """Every model function of a system, fields first."""
+    for mode in system.modes:
+        yield field_role(system, mode)
+    for transition in system.transitions:
+        yield guard_role(transition)
+        reset = reset_role(system, transition)
+        if reset is not None:
+            yield reset

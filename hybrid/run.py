@@ -1,0 +1,322 @@
+"""One trajectory in the hands of the kernels: its state, its scratch memory, and how to take it further."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.compile import CompiledSystem, compile_system
+from hybrid.errors import ArgumentError
+from hybrid.kernels import codes
+from hybrid.load import load_kernels
+from hybrid.solvers import DOP853, RungeKutta
+from hybrid.status import Status, run_status
+from hybrid.system import HybridSystem
+
+# Degree of the polynomials fitted to guards that are not affine.
+FIT_DEGREE = 8
+# Deep enough for intervals halved down to rounding.
+ISOLATION_DEPTH = 64
+UNLIMITED = np.iinfo(np.int64).max
+
+
+def method_tuple(solver: RungeKutta) -> Any:
+    """The kernel's view of a solver: tableau and tolerances."""
+    from hybrid.kernels.layout import Method
+
+    tableau = solver.tableau
+    return Method(
+        tableau.a,
+        tableau.b,
+        tableau.c,
+        tableau.error,
+        tableau.second_error,
+        tableau.interpolant,
+        1.0 / tableau.error_order,
+        solver.rtol,
+        solver.atol,
+        solver.max_step,
+    )
+
+
+def workspace(method: Any, dimension: int, tangents: int) -> Any:
+    """Scratch memory for one run."""
+    from hybrid.kernels.layout import Work
+
+    n, length = dimension, dimension * (1 + tangents)
+    stages, degree = len(method.a), len(method.interpolant) - 1
+    nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
+    width = max(degree, FIT_DEGREE) + 4
+    return Work(
+        stages=np.zeros((stages, length)),
+        traces=np.zeros(stages),
+        trial=np.zeros(length),
+        new=np.zeros(length),
+        error=np.zeros(length),
+        second_error=np.zeros(length),
+        jacobian=np.zeros((n, n + 1)),
+        reset_jacobian=np.zeros((n, n + 1)),
+        gradient=np.zeros(n + 1),
+        scalar=np.zeros(1),
+        field=np.zeros(n),
+        field_after=np.zeros(n),
+        state=np.zeros(n),
+        saltation=np.zeros((n, n)),
+        coefficients=np.zeros((degree + 1, n)),
+        polynomial=np.zeros(width),
+        stack=np.zeros((ISOLATION_DEPTH, width)),
+        intervals=np.zeros((ISOLATION_DEPTH, 2)),
+        nodes=nodes,
+        fit=np.linalg.inv(_bernstein_basis(nodes)),
+    )
+
+
+def _bernstein_basis(nodes: np.ndarray) -> np.ndarray:
+    from scipy.special import comb
+
+    degree = len(nodes) - 1
+    j = np.arange(degree + 1)
+    return comb(degree, j) * nodes[:, None] ** j * (1 - nodes[:, None]) ** (degree - j)
+
+
+def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
+    """A record with room for that many steps and jumps; none means that they are not kept."""
+    from hybrid.kernels.layout import Record
+
+    n = dimension
+    return Record(
+        used=np.zeros(2, dtype=np.int64),
+        step_time=np.zeros((steps, 2)),
+        step_place=np.zeros((steps, 3), dtype=np.int64),
+        step_coefficients=np.zeros((steps, degree + 1, n)),
+        jump_time=np.zeros((jumps, 2)),
+        jump_place=np.zeros((jumps, 2), dtype=np.int64),
+        jump_states=np.zeros((jumps, 2, n)),
+        jump_saltation=np.zeros((jumps, n, n)),
+    )
+
+
+def check_state(system: HybridSystem, x0: Any) -> np.ndarray:
+    """``x0`` as a finite vector ``(n,)``; ArgumentError if it is not one."""
+    try:
+        state = np.array(x0, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"x0 must hold {system.dimension} numbers; got {x0!r}.") from None
+    names = ", ".join(system.state_names)
+    if state.shape != (system.dimension,):
+        raise ArgumentError(
+            f"x0 has shape {state.shape}; the state needs shape ({system.dimension},): {names}."
+        )
+    for name, value in zip(system.state_names, state, strict=True):
+        if not np.isfinite(value):
+            raise ArgumentError(f"x0: component {name!r} must be finite; got {value}.")
+    return state
+
+
+def check_solver(solver: object) -> RungeKutta:
+    """The solver, or the default one; ArgumentError for anything else."""
+    if solver is None:
+        return DOP853()
+    if isinstance(solver, RungeKutta) and hasattr(solver, "tableau"):
+        return solver
+    raise ArgumentError(
+        f"solver must be a solver object; got {solver!r}. Write for instance hybrid.DOP853(rtol=1e-8)."
+    )
+
+
+def split_time(t: float, period: float) -> tuple[int, float]:
+    """Time as a whole number of periods and a phase in ``[0, period)``; without a period (0) all of it is phase."""
+    if period <= 0.0:
+        return 0, float(t)
+    cycle = int(np.floor(t / period))
+    phase = t - cycle * period
+    return (cycle + 1, 0.0) if phase >= period else (cycle, max(phase, 0.0))
+
+
+@attrs.frozen(eq=False)
+class Trajectory:
+    """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed."""
+
+    compiled: CompiledSystem
+    model: Any
+    method: Any
+    run: Any
+    work: Any
+    tangents: int
+    max_steps: int
+
+    @property
+    def system(self) -> HybridSystem:
+        """The model that runs."""
+        return self.compiled.system
+
+    @property
+    def t(self) -> float:
+        """Current time."""
+        return float(self.run.count[codes.CYCLE] * self.model.period + self.run.clock[codes.PHASE])
+
+    @property
+    def x(self) -> np.ndarray:
+        """Current state ``(n,)``, a copy."""
+        return self.run.y[: self.model.dimension].copy()
+
+    @property
+    def mode(self) -> str:
+        """Current mode."""
+        return self.system.mode_names[self.run.count[codes.MODE]]
+
+    @property
+    def jumps(self) -> int:
+        """Jumps so far."""
+        return int(self.run.count[codes.JUMPS])
+
+    @property
+    def tangent_matrix(self) -> np.ndarray:
+        """Tangent vectors as columns ``(n, k)``, a copy."""
+        n = self.model.dimension
+        return self.run.y[n:].reshape(self.tangents, n).T.copy()
+
+    def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:
+        """Run to time ``t`` or until something else ends it; a code of ``hybrid.kernels.codes``."""
+        return self.advance_to(*split_time(t, self.model.period), record, max_jumps)
+
+    def advance_to(self, cycle: int, phase: float, record: Any, max_jumps: int = UNLIMITED) -> int:
+        """Run to a number of whole periods and a phase."""
+        return int(
+            load_kernels().advance(
+                self.model,
+                self.method,
+                self.run,
+                record,
+                self.tangents,
+                False,
+                cycle,
+                phase,
+                self.max_steps,
+                max_jumps,
+                self.work,
+            )
+        )
+
+    def no_record(self) -> Any:
+        """A record that keeps nothing."""
+        return empty_record(self.model.dimension, len(self.method.interpolant) - 1)
+
+    def status(self, code: int) -> Status:
+        """Status of the run after ``advance`` returned ``code``."""
+        last = self.run.count[codes.LAST_FIRED]
+        name = self.system.transition_names[last] if last >= 0 else None
+        return run_status(code, self.t, self.mode, name)
+
+
+def start(
+    system: HybridSystem,
+    x0: Any,
+    t0: float,
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    solver: RungeKutta | None = None,
+    tangent: np.ndarray | None = None,
+) -> Trajectory:
+    """A trajectory at its start, everything about the call checked.
+
+    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any.
+    """
+    compiled = compile_system(system)
+    state = check_state(system, x0)
+    solver = check_solver(solver)
+    model = compiled.model(parameters)
+    method = method_tuple(solver)
+    tangents = 0 if tangent is None else tangent.shape[1]
+    y = state if tangent is None else np.concatenate([state, tangent.T.ravel()])
+    run = _fresh_run(system, model, y, tangents, t0)
+    work = workspace(method, system.dimension, tangents)
+    run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
+    return Trajectory(compiled, model, method, run, work, tangents, solver.max_steps)
+
+
+def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t0: float) -> Any:
+    from hybrid.kernels.layout import Run
+
+    count = np.zeros(codes.COUNTERS, dtype=np.int64)
+    clock = np.zeros(codes.CLOCKS)
+    count[codes.CYCLE], clock[codes.PHASE] = split_time(t0, model.period)
+    count[codes.PHASE_OF_RUN] = codes.ENTERING
+    for slot in (codes.LAST_FIRED, codes.PENDING, codes.PREVIOUS_MODE):
+        count[slot] = codes.NO_TRANSITION
+    clock[codes.LAST_JUMP_PHASE] = np.nan
+    transitions = len(system.transitions)
+    return Run(
+        count=count,
+        clock=clock,
+        y=y,
+        side=np.zeros(transitions, dtype=np.int64),
+        on_guard=np.zeros(transitions, dtype=np.int64),
+        first_step=np.zeros(len(system.modes)),
+        scale=np.abs(y[: system.dimension]),
+        growth=np.zeros(tangents),
+    )
+
+
+def choose_mode(system: HybridSystem, model: Any, run: Any, work: Any, mode: str | None) -> int:
+    """Index of the mode a run starts in: the one named, the only one, or the only one whose guards allow the state.
+
+    Raises
+    ------
+    ModelError
+        If the name is unknown; if the state violates every mode, or more than one allows it.
+    """
+    if mode is not None:
+        index = system.mode_index(mode)
+        _guards_beyond(system, model, run, work, index)
+        return index
+    beyond = [_guards_beyond(system, model, run, work, index) for index in range(len(system.modes))]
+    if len(system.modes) == 1:
+        strictly = [name for name, on_guard in beyond[0] if not on_guard]
+        if not strictly:
+            return 0
+    allowed = [index for index, guards in enumerate(beyond) if not guards]
+    if len(allowed) == 1:
+        return allowed[0]
+    where = f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}"
+    if not allowed:
+        faults = "; ".join(
+            f"mode {name!r} is left through {', '.join(repr(guard) for guard, _ in guards)}"
+            for name, guards in zip(system.mode_names, beyond, strict=True)
+        )
+        raise ArgumentError(
+            f"{where} violates every mode: {faults}. Start on the other side of a guard, or name the mode with "
+            "mode= if that side is meant."
+        )
+    candidates = ", ".join(system.mode_names[index] for index in allowed)
+    raise ArgumentError(f"{where} is allowed in more than one mode: {candidates}. Choose one with mode=.")
+
+
+def _guards_beyond(
+    system: HybridSystem, model: Any, run: Any, work: Any, index: int
+) -> list[tuple[str, bool]]:
+    """Transitions of the mode whose guard the state is beyond (or on, moving beyond), and whether it is just on it."""
+    from hybrid.kernels.guards import guard_values
+    from hybrid.kernels.jump import enter
+
+    phase = run.clock[codes.PHASE]
+    values = np.zeros(len(system.transitions))
+    guard_values(model, phase, run.y, values)
+    run.count[codes.MODE] = index
+    enter(model, run, work)
+    beyond = []
+    for i, transition in enumerate(system.transitions):
+        if transition.source != system.mode_names[index]:
+            continue
+        if not np.isfinite(values[i]):
+            raise ArgumentError(
+                f"Transition {transition.name!r}: the guard is {values[i]} at t = {phase}, "
+                f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}. A guard must be finite wherever its mode runs."
+            )
+        if transition.guard.direction == run.side[i] and not transition.is_marker:
+            beyond.append((transition.name, bool(run.on_guard[i])))
+    return beyond

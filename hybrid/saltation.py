@@ -1,0 +1,72 @@
+"""The saltation matrix of one transition at one point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid.compile import compile_system
+from hybrid.errors import ArgumentError
+from hybrid.run import check_state, method_tuple, split_time, workspace
+from hybrid.solvers import Tsit5
+from hybrid.system import HybridSystem, Transition, finite_number
+
+
+def saltation_matrix(
+    system: HybridSystem,
+    transition: str | Transition,
+    t: float,
+    x: ArrayLike,
+    *,
+    parameters: Mapping[str, float] | None = None,
+) -> np.ndarray:
+    """Saltation matrix ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``.
+
+    It carries a perturbation of the state just before the jump, at the unperturbed jump's time, to the perturbation just after.
+    The time terms serve moving guards and time-dependent resets.
+
+    Parameters
+    ----------
+    system, transition
+        The model, and the transition or its name.
+    t, x
+        Time and state ``(n,)`` before the jump, on the guard.
+    parameters
+        Values that override the system's.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n, n)``.
+
+    Raises
+    ------
+    ArgumentError
+        If the crossing is not transverse (``D_t g + D_x g f_minus`` is zero): the matrix does not exist there.
+    ModelError
+        If the transition does not exist.
+
+    References
+    ----------
+    N. J. Kong, J. J. Payne, J. Zhu, A. M. Johnson, Saltation matrices: the essential tool for linearizing hybrid
+    dynamical systems, Proceedings of the IEEE, 2024, arXiv:2306.06862.
+    """
+    compiled = compile_system(system)
+    index = system.transition_index(transition)
+    state = check_state(system, x)
+    model = compiled.model(parameters)
+    work = workspace(method_tuple(Tsit5()), system.dimension, 0)
+    phase = split_time(finite_number("t", t), model.period)[1]
+    source = system.mode_index(system.transitions[index].source)
+    from hybrid.kernels.jump import saltation
+
+    transversality = saltation(model, index, source, phase, state, np.empty(system.dimension), work)
+    if not np.all(np.isfinite(work.saltation)):
+        raise ArgumentError(
+            f"Transition {system.transitions[index].name!r}: the saltation matrix does not exist at t = {t}, "
+            f"x = {tuple(float(v) for v in state)}; the transversality is {transversality}. "
+            "A grazing crossing has no linear tangent map."
+        )
+    return work.saltation.copy()

@@ -1,0 +1,223 @@
+"""From a model and a start to a hybrid arc."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid.arc import HybridArc, Jumps, Pieces, hybrid_points, join
+from hybrid.errors import ArgumentError
+from hybrid.kernels import codes
+from hybrid.run import Trajectory, empty_record, start
+from hybrid.solvers import RungeKutta
+from hybrid.system import HybridSystem
+
+# Room of the record that kernels fill before Python empties it: large enough that the crossing costs nothing.
+STEPS_AT_ONCE = 2048
+JUMPS_AT_ONCE = 1024
+
+
+def simulate(
+    system: HybridSystem,
+    x0: ArrayLike,
+    t_span: tuple[float, float],
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    solver: RungeKutta | None = None,
+    tangent: ArrayLike | bool | None = None,
+    samples: ArrayLike | None = None,
+    max_jumps: int = 100_000,
+) -> HybridArc:
+    """Solve a hybrid system from ``x0`` over ``t_span``.
+
+    Parameters
+    ----------
+    system
+        The model.
+    x0
+        State ``(n,)`` at the start.
+    t_span
+        ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
+    mode
+        Mode to start in; by default the only one, or the only one whose guards allow ``x0``.
+    parameters
+        Values that override the system's.
+    solver
+        Method and tolerances, by default ``DOP853(rtol=1e-10, atol=1e-12)``.
+    tangent
+        True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is controlled
+        with the state's.
+    samples
+        Increasing times at which to keep the state; nothing else is then kept but the jumps.
+    max_jumps
+        The run ends with a status at this many jumps.
+
+    Returns
+    -------
+    HybridArc
+        With a status; a run that ends early keeps what it has.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Examples
+    --------
+    >>> import models
+    >>> arc = simulate(models.bouncing_ball(), x0=(1.0, 0.0), t_span=(0.0, 1.0))
+    >>> round(arc.jumps[0].t, 4)
+    0.4515
+    """
+    t0, t1 = _time_span(t_span)
+    times = None if samples is None else _sample_times(samples, t0, t1)
+    vectors = None if tangent is None or tangent is False else _tangent_matrix(tangent, system)
+    if not max_jumps >= 0:
+        raise ArgumentError(f"max_jumps must be at least 0; got {max_jumps!r}.")
+    trajectory = start(
+        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors
+    )
+    return _Recorder(trajectory, times).run(t0, t1, int(max_jumps))
+
+
+def _time_span(t_span: Any) -> tuple[float, float]:
+    try:
+        t0, t1 = (float(t) for t in t_span)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"t_span must be a pair (t0, t1); got {t_span!r}.") from None
+    if not (np.isfinite(t0) and np.isfinite(t1)):
+        raise ArgumentError(f"t_span must be finite; got ({t0}, {t1}).")
+    if t1 < t0:
+        raise ArgumentError(
+            f"t_span must not run backwards; got ({t0}, {t1}). Write ({t1}, {t0}), or reverse the sign of the fields."
+        )
+    return t0, t1
+
+
+def _sample_times(samples: ArrayLike, t0: float, t1: float) -> np.ndarray:
+    times = np.array(samples, dtype=float)
+    if times.ndim != 1 or not np.all(np.diff(times) >= 0):
+        raise ArgumentError(f"samples must be increasing times of shape (N,); got shape {times.shape}.")
+    if times.size and not (times[0] >= t0 and times[-1] <= t1):
+        raise ArgumentError(
+            f"samples must lie in t_span, [{t0}, {t1}]; they run from {times[0]} to {times[-1]}."
+        )
+    return times
+
+
+def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
+    n = system.dimension
+    if tangent is True:
+        return np.eye(n)
+    matrix = np.array(tangent, dtype=float)
+    if matrix.ndim == 1:
+        matrix = matrix[:, None]
+    if matrix.ndim != 2 or matrix.shape[0] != n or matrix.shape[1] == 0 or not np.all(np.isfinite(matrix)):
+        raise ArgumentError(
+            f"tangent must be True or a finite matrix of shape ({n}, k), one tangent vector a column; "
+            f"got shape {matrix.shape}."
+        )
+    return matrix
+
+
+class _Recorder:
+    """Runs a trajectory in bursts and files what the kernel wrote down in each."""
+
+    def __init__(self, trajectory: Trajectory, times: np.ndarray | None) -> None:
+        self.trajectory = trajectory
+        self.times = times
+        n = trajectory.model.dimension
+        degree = len(trajectory.method.interpolant) - 1
+        self.record = empty_record(n, degree, STEPS_AT_ONCE, JUMPS_AT_ONCE)
+        self.steps = [_step_columns(empty_record(n, degree), 0.0)]
+        self.jumps = [_jump_columns(empty_record(n, degree), 0.0)]
+        self.states = np.full((0 if times is None else len(times), n), np.nan)
+        self.places = np.zeros((len(self.states), 2), dtype=np.int64)
+        self.sampled = 0
+
+    def run(self, t0: float, t1: float, max_jumps: int) -> HybridArc:
+        trajectory, run = self.trajectory, self.trajectory.run
+        code = codes.RECORD_FULL
+        while code == codes.RECORD_FULL:
+            code = trajectory.advance(t1, self.record, max_jumps)
+            self._file()
+        jumps = Jumps(trajectory.system, *join(self.jumps))
+        t_end = t1 if code == codes.DONE else trajectory.t
+        end = (t_end, trajectory.x, int(run.count[codes.MODE]))
+        names = np.array(trajectory.system.mode_names)
+        pieces = None
+        if self.times is None:
+            pieces = Pieces(*join(self.steps))
+            t, j, x, mode = hybrid_points(trajectory.system, pieces, jumps, end)
+        else:
+            self._sample_end(*end)
+            t, x = self.times[: self.sampled], self.states[: self.sampled]
+            mode, j = self.places[: self.sampled].T
+        return HybridArc(
+            system=trajectory.system,
+            parameters=trajectory.model.parameters,
+            t=t,
+            j=j,
+            x=x,
+            mode=names[mode],
+            jumps=jumps,
+            status=trajectory.status(code),
+            fundamental=trajectory.tangent_matrix if trajectory.tangents else None,
+            steps=int(run.count[codes.STEPS]),
+            rejected=int(run.count[codes.REJECTED]),
+            pieces=pieces,
+        )
+
+    def _file(self) -> None:
+        period = self.trajectory.model.period
+        columns = _step_columns(self.record, period)
+        self.jumps.append(_jump_columns(self.record, period))
+        if self.times is None:
+            self.steps.append(columns)
+        else:
+            self._sample(Pieces(*columns))
+        self.record.used[:] = 0
+
+    def _sample(self, pieces: Pieces) -> None:
+        """States at the samples that fall before the current end of the run."""
+        assert self.times is not None
+        stop = int(np.searchsorted(self.times, self.trajectory.t, side="left"))
+        if stop > self.sampled and len(pieces.t):
+            part = slice(self.sampled, stop)
+            self.states[part], index = pieces.at(self.times[part])
+            self.places[part] = np.column_stack([pieces.mode[index], pieces.j[index]])
+            self.sampled = stop
+
+    def _sample_end(self, t: float, x: np.ndarray, mode: int) -> None:
+        """States at the samples that fall on the very end of the run: those after its last jump."""
+        assert self.times is not None
+        stop = int(np.searchsorted(self.times, t, side="right"))
+        self.states[self.sampled : stop] = x
+        self.places[self.sampled : stop] = mode, self.trajectory.jumps
+        self.sampled = stop
+
+
+def _step_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
+    used = record.used[0]
+    cycle, mode, j = record.step_place[:used].T
+    phase, h = record.step_time[:used].T
+    return cycle * period + phase, h.copy(), mode.copy(), j.copy(), record.step_coefficients[:used].copy()
+
+
+def _jump_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
+    used = record.used[1]
+    cycle, transition = record.jump_place[:used].T
+    phase, transversality = record.jump_time[:used].T
+    states = record.jump_states[:used]
+    return (
+        cycle * period + phase,
+        transversality.copy(),
+        transition.copy(),
+        states[:, 0].copy(),
+        states[:, 1].copy(),
+        record.jump_saltation[:used].copy(),
+    )

@@ -1,0 +1,72 @@
+"""The numbers that make an explicit Runge-Kutta pair, in the arrangement its kernel wants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import comb
+
+import attrs
+import numpy as np
+
+Row = Mapping[int, float]
+
+
+@attrs.frozen(eq=False)
+class Tableau:
+    """Butcher tableau of an explicit pair with an interpolant.
+
+    With ``s`` stages for the step, ``S >= s + 1`` in all (row ``s`` is the derivative at the new point) and an
+    interpolant of degree ``d``.
+
+    Parameters
+    ----------
+    order
+        Order of the step.
+    error_order
+        Order of the error estimate: the step length follows its power ``-1 / error_order``.
+    a, b, c
+        ``(S, S)``, ``(s,)``, ``(S,)``.
+    error, second_error
+        ``(s + 1,)`` each; the second is zero for pairs with one estimate.
+    interpolant
+        ``(d + 1, S)``: Bernstein coefficients over the step are ``y0 + h interpolant @ stages``.
+    """
+
+    order: int
+    error_order: int
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    error: np.ndarray
+    second_error: np.ndarray
+    interpolant: np.ndarray
+
+
+def dense(rows: Sequence[Row], width: int) -> np.ndarray:
+    """Rows given as ``{column: value}`` as a matrix ``(len(rows), width)``."""
+    matrix = np.zeros((len(rows), width))
+    for i, row in enumerate(rows):
+        for j, value in row.items():
+            matrix[i, j] = value
+    return matrix
+
+
+def times_theta(coefficients: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients (rows) of a polynomial multiplied by its variable, one degree higher."""
+    degree = len(coefficients)
+    factor = np.arange(1, degree + 1)[:, None] / degree
+    return np.vstack([np.zeros_like(coefficients[:1]), factor * coefficients])
+
+
+def times_one_minus_theta(coefficients: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients (rows) of a polynomial multiplied by ``1 - theta``, one degree higher."""
+    return times_theta(coefficients[::-1])[::-1]
+
+
+def bernstein_from_powers(powers: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients (rows) from those of ``1, theta, theta^2, ...`` (rows)."""
+    degree = len(powers) - 1
+    change = np.array(
+        [[comb(j, k) / comb(degree, k) for k in range(degree + 1)] for j in range(degree + 1)]
+    )
+    return change @ powers

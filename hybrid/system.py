@@ -1,0 +1,360 @@
+"""The model as a graph: modes are nodes with smooth fields, transitions are edges with guards and resets."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid.errors import ArgumentError, ModelError, unknown_name
+from hybrid.names import named_values
+from hybrid.probe import probe_system
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+ModelFunction = Callable[..., Any]
+
+
+def _callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if not callable(value):
+        raise ModelError(
+            f"{type(instance).__name__}: {attribute.name} must be a function of (t, x, p); got {value!r}."
+        )
+
+
+def _optional_callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if value is not None:
+        _callable(instance, attribute, value)
+
+
+def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if not isinstance(value, str) or not value:
+        raise ModelError(
+            f"{type(instance).__name__}: {attribute.name} must be a non-empty string; got {value!r}."
+        )
+
+
+@attrs.frozen
+class Guard:
+    """A scalar function ``g(t, x, p)``; its transition fires when it crosses zero in its direction.
+
+    Parameters
+    ----------
+    function
+        ``g(t, x, p)``, one scalar.
+    direction
+        -1 fires from positive to negative, +1 from negative to positive, 0 both ways.
+    gradient
+        Optional ``(D_x g, D_t g)`` as a function of ``(t, x, p)`` that returns ``n + 1`` values, or
+        ``n`` if the guard does not depend on time. Derived from ``function`` when left out.
+
+    Raises
+    ------
+    ModelError
+        If ``function`` is not callable or ``direction`` is none of -1, 0, +1.
+    """
+
+    function: ModelFunction = attrs.field(validator=_callable)
+    direction: int = attrs.field(default=0)
+    gradient: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+
+    @direction.validator
+    def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:
+        if value not in (-1, 0, 1):
+            raise ModelError(
+                f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {value!r}."
+            )
+
+
+@attrs.frozen
+class Reset:
+    """The map ``R(t, x, p)`` applied at the crossing; it returns one value per state.
+
+    Parameters
+    ----------
+    function
+        ``R(t, x, p)``, ``n`` values.
+    jacobian
+        Optional ``(t, x, p)`` function that returns the rows of ``D_x R``, each of ``n`` values, or of
+        ``n + 1`` with ``D_t R`` last. Derived from ``function`` when left out.
+
+    Raises
+    ------
+    ModelError
+        If a given function is not callable.
+    """
+
+    function: ModelFunction = attrs.field(validator=_callable)
+    jacobian: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+
+
+@attrs.frozen
+class Mode:
+    """A smooth vector field ``f(t, x, p)``: a node of the graph.
+
+    Parameters
+    ----------
+    name
+        How transitions refer to it.
+    field
+        ``f(t, x, p)``, one value per state: the time derivative of the state.
+    jacobian
+        Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, each of ``n`` values, or of
+        ``n + 1`` with ``D_t f`` last. Derived from ``field`` when left out.
+
+    Raises
+    ------
+    ModelError
+        If the name is empty or a given function is not callable.
+    """
+
+    name: str = attrs.field(validator=_nonempty_name)
+    field: ModelFunction = attrs.field(validator=_callable)
+    jacobian: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+
+
+def _as_guard(value: Any) -> Guard:
+    if isinstance(value, Guard):
+        return value
+    raise ModelError(f"Transition: guard must be a Guard; got {value!r}. Write Guard(function, direction=...).")
+
+
+def _as_reset(value: Any) -> Reset | None:
+    if value is None or isinstance(value, Reset):
+        return value
+    raise ModelError(f"Transition: reset must be a Reset or None (identity); got {value!r}. Write Reset(function).")
+
+
+@attrs.frozen
+class Transition:
+    """An edge of the graph: where it leaves from, where it leads, when it fires and what it does.
+
+    A transition from a mode to itself without a reset changes nothing and only marks the crossing: a
+    section.
+
+    Parameters
+    ----------
+    source, target
+        Names of modes.
+    guard
+        When it fires.
+    reset
+        What happens to the state there; ``None`` is the identity.
+    name
+        Defaults to ``"source->target"``.
+
+    Raises
+    ------
+    ModelError
+        If guard or reset are of the wrong type or a name is empty.
+    """
+
+    source: str = attrs.field(validator=_nonempty_name)
+    target: str = attrs.field(validator=_nonempty_name)
+    guard: Guard = attrs.field(converter=_as_guard)
+    reset: Reset | None = attrs.field(default=None, converter=_as_reset)
+    name: str = attrs.field(kw_only=True, validator=_nonempty_name)
+
+    @name.default
+    def _default_name(self) -> str:
+        return f"{self.source}->{self.target}"
+
+    @property
+    def is_marker(self) -> bool:
+        """Whether it changes neither mode nor state, and so only marks a crossing."""
+        return self.source == self.target and self.reset is None
+
+
+def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
+    for name in names:
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name[0] == "_":
+            raise ModelError(
+                f"HybridSystem: {kind} name {name!r} cannot be written as an attribute. Use a Python "
+                "identifier that is no keyword and does not begin with an underscore."
+            )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ModelError(f"HybridSystem: {kind} names must differ; given twice: {', '.join(twice)}.")
+
+
+def _as_state(value: Any) -> tuple[str, ...] | int:
+    if isinstance(value, bool) or isinstance(value, str):
+        raise ModelError(
+            f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
+            f"Write state=({value!r},) for one component."
+        )
+    if isinstance(value, int | np.integer):
+        if value < 1:
+            raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
+        return int(value)
+    names = tuple(value)
+    if not names:
+        raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
+    _check_identifiers(names, "state")
+    return names
+
+
+def _as_parameters(value: Any) -> Mapping[str, float]:
+    checked = {}
+    _check_identifiers(tuple(value), "parameter")
+    for name, number in dict(value).items():
+        checked[name] = finite_number(f"HybridSystem: parameter {name!r}", number)
+    return MappingProxyType(checked)
+
+
+def finite_number(what: str, value: object) -> float:
+    """``value`` as a finite float, or an ArgumentError that begins with ``what``."""
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{what} must be a number; got {value!r}.") from None
+    if not np.isfinite(number):
+        raise ArgumentError(f"{what} must be finite; got {number}.")
+    return number
+
+
+@attrs.frozen(eq=False)
+class HybridSystem:
+    """A hybrid (piecewise-smooth) dynamical system: modes joined by transitions.
+
+    Model functions are plain Python on scalars, ``f(t, x, p)``, with ``x.q`` and ``p.e`` by name and
+    NumPy functions for mathematics. They must be pure: they are traced once, not called in the loop.
+
+    Parameters
+    ----------
+    state
+        Names of the components, or their number ``n`` (then model functions get a plain array).
+    parameters
+        Default values by name; any call may override them.
+    modes, transitions
+        Nodes and edges. Among simultaneous crossings the transition listed first fires.
+    period
+        Forcing period, a number or a function of ``p``. Every model function must have this period in
+        ``t``; time is then kept as whole periods and a phase.
+    name
+        For reports and figures.
+
+    Raises
+    ------
+    ModelError
+        If names clash or do not exist, a mode cannot be reached, or a function has the wrong arity or
+        the wrong number of values.
+    """
+
+    state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=_as_state)
+    parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=_as_parameters)
+    modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=tuple)
+    transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=tuple)
+    period: float | ModelFunction | None = attrs.field(default=None, kw_only=True)
+    name: str = attrs.field(default="", kw_only=True)
+
+    def __attrs_post_init__(self) -> None:
+        self._check_graph()
+        probe_system(self)
+
+    @property
+    def dimension(self) -> int:
+        """Number of state components ``n``."""
+        return self.state if isinstance(self.state, int) else len(self.state)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the components; ``x0, x1, ...`` if only their number was given."""
+        return tuple(f"x{i}" for i in range(self.state)) if isinstance(self.state, int) else self.state
+
+    @cached_property
+    def mode_names(self) -> tuple[str, ...]:
+        """Names of the modes in the order of their indices."""
+        return tuple(mode.name for mode in self.modes)
+
+    @cached_property
+    def transition_names(self) -> tuple[str, ...]:
+        """Names of the transitions in the order of their indices."""
+        return tuple(transition.name for transition in self.transitions)
+
+    @cached_property
+    def graph(self) -> nx.MultiDiGraph:
+        """The modes and transitions as a networkx graph, for looking at, checking and drawing.
+
+        Nodes carry ``mode``, edges are keyed by the transition's name and carry ``transition``.
+        """
+        import networkx as nx
+
+        graph = nx.MultiDiGraph(name=self.name)
+        for mode in self.modes:
+            graph.add_node(mode.name, mode=mode)
+        for transition in self.transitions:
+            graph.add_edge(transition.source, transition.target, key=transition.name, transition=transition)
+        return graph
+
+    def mode_index(self, name: str) -> int:
+        """Index of a mode; ModelError with the available names if there is none."""
+        if name not in self.mode_names:
+            raise ModelError(unknown_name("Mode", name, self.mode_names, "Modes"))
+        return self.mode_names.index(name)
+
+    def transition_index(self, name: str | Transition) -> int:
+        """Index of a transition given by name or object; ModelError with the available names if none."""
+        key = name.name if isinstance(name, Transition) else name
+        if key not in self.transition_names:
+            raise ModelError(unknown_name("Transition", key, self.transition_names, "Transitions"))
+        return self.transition_names.index(key)
+
+    def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
+        """Parameter vector ``(m,)`` with the given overrides; ArgumentError for unknown names."""
+        values = dict(self.parameters)
+        for name, number in dict(overrides or {}).items():
+            if name not in values:
+                raise ArgumentError(unknown_name("Parameter", name, values, "Parameters"))
+            values[name] = finite_number(f"Parameter {name!r}", number)
+        return np.array(list(values.values()), dtype=float)
+
+    def forcing_period(self, overrides: Mapping[str, float] | None = None) -> float | None:
+        """Forcing period at the given parameters, or None if the system declares none."""
+        if self.period is None:
+            return None
+        value: Any = self.period
+        if callable(value):
+            value = value(named_values("Parameters", tuple(self.parameters), self.parameter_values(overrides)))
+        period = finite_number("HybridSystem: period", value)
+        if period <= 0:
+            raise ArgumentError(f"HybridSystem: period must be positive; got {period}. Check the parameters.")
+        return period
+
+    def _check_graph(self) -> None:
+        if not self.modes:
+            raise ModelError("HybridSystem: at least one mode is needed; got none.")
+        for what, items, kind in (("mode", self.modes, Mode), ("transition", self.transitions, Transition)):
+            for item in items:
+                if not isinstance(item, kind):
+                    raise ModelError(f"HybridSystem: each {what} must be a {kind.__name__}; got {item!r}.")
+            names = [item.name for item in items]
+            twice = sorted({name for name in names if names.count(name) > 1})
+            if twice:
+                raise ModelError(
+                    f"HybridSystem: {what} names must differ; given twice: {', '.join(twice)}. "
+                    f"Give each {what} a name of its own."
+                )
+        for transition in self.transitions:
+            for end in ("source", "target"):
+                name = getattr(transition, end)
+                if name not in self.mode_names:
+                    what = f"Transition {transition.name!r}: {end} mode"
+                    raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
+        self._check_reachable()
+
+    def _check_reachable(self) -> None:
+        """A mode that no transition enters or leaves, in a system of several, is a slip of the pen."""
+        linked = {name for tr in self.transitions if tr.source != tr.target for name in (tr.source, tr.target)}
+        lonely = [name for name in self.mode_names if name not in linked]
+        if len(self.modes) > 1 and lonely:
+            raise ModelError(
+                f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
+                f"{', '.join(self.mode_names)}. Add a transition, or make it a system of its own."
+            )

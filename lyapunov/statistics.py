@@ -1,0 +1,223 @@
+"""How far a mean of growth rates can be trusted, and means that converge faster where they may.
+
+Growth rates of successive intervals are correlated, sometimes over hundreds of intervals, and sometimes so
+that they cancel: on a torus, or for the logistic map, they are differences of a function along the orbit and
+their mean converges like ``1/M``, not ``1/sqrt(M)``. The textbook ``std / sqrt(M)`` is wrong in both cases.
+The accumulator here keeps a bounded number of batches however long the run, and the standard error is read
+off those.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MAX_BATCHES = 1024
+
+# Slots of the state of an accumulator.
+CLOSED = 0
+BATCH_SIZE = 1
+IN_OPEN_BATCH = 2
+
+# Few frequencies stay close to the zero where the spectrum is wanted; many make the estimate steady. With 8,
+# and the fall of the spectrum judged on some 32 batches, two standard errors cover the truth in 94 to 96 % of
+# runs of autoregressive noise as soon as the run has five times the length of its correlation.
+FREQUENCIES = 8
+COARSE_BATCHES = 32
+
+# A correlation that close to 1 between batches of a 32nd of the run cannot be told from a drift.
+MAX_CORRELATION = 0.9
+
+# Student's t quantile at the probability of two sigmas, 95.45 %, over two, for 1 to 8 degrees of freedom.
+TWO_SIGMA_OF_STUDENT = np.array(
+    [6.9838651, 2.26326834, 1.65341109, 1.43465471, 1.32432472, 1.25826203, 1.21440257, 1.18320789]
+)
+
+
+def new_batches(k: int) -> tuple[Array, NDArray[np.int64]]:
+    """Empty accumulator for ``k`` columns: batch sums ``(MAX_BATCHES, k)`` and state ``(3,)`` for `push`."""
+    return np.zeros((MAX_BATCHES, k)), np.array([0, 1, 0], dtype=np.int64)
+
+
+def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
+    """Add ``values (k,)`` to ``batch_sums (B, k)``, ``B`` even, merging neighbours when all are full.
+
+    ``state (3,)`` counts the closed batches, the values a batch takes, and those in the open batch, the row
+    after the closed ones. Kernels compile this function: it knows arrays and integers only.
+    """
+    if state[CLOSED] == batch_sums.shape[0]:
+        half = batch_sums.shape[0] // 2
+        for i in range(half):
+            for c in range(batch_sums.shape[1]):
+                batch_sums[i, c] = batch_sums[2 * i, c] + batch_sums[2 * i + 1, c]
+        batch_sums[half:] = 0.0
+        state[CLOSED] = half
+        state[BATCH_SIZE] *= 2
+    row = state[CLOSED]
+    for c in range(batch_sums.shape[1]):
+        batch_sums[row, c] += values[c]
+    state[IN_OPEN_BATCH] += 1
+    if state[IN_OPEN_BATCH] == state[BATCH_SIZE]:
+        state[CLOSED] += 1
+        state[IN_OPEN_BATCH] = 0
+
+
+def closed_batch_means(batch_sums: Array, state: NDArray[np.int64]) -> Array:
+    """Means ``(b, k)`` of the closed batches of an accumulator; the open one is left out."""
+    return batch_sums[: state[CLOSED]] / state[BATCH_SIZE]
+
+
+def standard_error(series: Array) -> Array:
+    """Standard error of the mean of a correlated series, two of which cover the truth 95 % of the time.
+
+    Parameters
+    ----------
+    series : (M, k) array
+        One row an interval: the growth rates over it. Nothing is assumed of their correlation, but
+        that the run is several times longer than it lasts.
+
+    Returns
+    -------
+    (k,) array
+        See `standard_error_from_batches`, which is given at most `MAX_BATCHES` batches of equal size.
+    """
+    series = np.asarray(series, dtype=float)
+    size = max(1, math.ceil(len(series) / MAX_BATCHES))
+    return standard_error_from_batches(_merge(series, size))
+
+
+def standard_error_from_batches(batch_means: Array) -> Array:
+    r"""Standard error of the mean of equal batches, from their lowest cosine frequencies.
+
+    The variance of a mean is the spectrum at frequency zero over the length. It is estimated by
+    the mean square of the projections on the first :math:`\nu = 8` cosines of a whole run [1]_, [2]_,
+
+    .. math:: s^2 = \frac{1}{b \nu} \sum_{j=1}^{\nu} \Lambda_j^2, \qquad
+        \Lambda_j = \sqrt{\tfrac{2}{b}} \sum_{i=1}^{b} y_i \cos \frac{\pi j (i - 1/2)}{b},
+
+    which, unlike the variance of batch means, stays close where the sum of the series is bounded. In a short
+    run of a slow series even these frequencies see only the flank of the peak at zero: :math:`s^2` is divided
+    by the part they would see of a first-order autoregressive process, fitted to some 32 coarser batches.
+    Anticorrelation is not credited. The result is widened by Student's t, so that plus and minus two of it
+    hold the truth 95.45 % of the time.
+
+    Parameters
+    ----------
+    batch_means : (b, k) array
+        Means of consecutive stretches of the series.
+
+    Returns
+    -------
+    (k,) array
+        ``nan`` for fewer than 4 batches; ``0`` for a column with minus infinity, whose mean is exactly that;
+        ``nan`` for a column with ``nan`` or plus infinity.
+
+    References
+    ----------
+    .. [1] U. K. Müller, "HAC corrections for strongly autocorrelated time series", J. Bus. Econ. Stat. 32
+       (2014) 311, https://doi.org/10.1080/07350015.2014.931238
+    .. [2] E. Lazarus, D. J. Lewis, J. H. Stock, M. W. Watson, "HAR inference: recommendations for practice",
+       J. Bus. Econ. Stat. 36 (2018) 541, https://doi.org/10.1080/07350015.2018.1506926
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(0).standard_normal((10_000, 1))
+    >>> bool(0.005 < standard_error(noise)[0] < 0.02)
+    True
+    """
+    means = np.asarray(batch_means, dtype=float)
+    count = len(means)
+    if count < 4:
+        return np.full(means.shape[1:], np.nan)
+    finite = np.isfinite(means).all(axis=0)
+    deviations = np.where(finite, means, 0.0)
+    deviations = deviations - deviations.mean(axis=0)
+
+    nu = min(FREQUENCIES, count // 2)
+    spectrum = (_cosines(count, nu) @ deviations) ** 2
+    coarse = _merge(deviations, max(1, count // COARSE_BATCHES))
+    seen = _autoregressive_spectrum(_lag_one_correlation(coarse), len(coarse), nu)
+    error = np.sqrt(spectrum.mean(axis=0) / seen / count) * TWO_SIGMA_OF_STUDENT[nu - 1]
+
+    collapsed = (means == -np.inf).any(axis=0) & ~(np.isnan(means) | (means == np.inf)).any(axis=0)
+    return np.where(finite, error, np.where(collapsed, 0.0, np.nan))
+
+
+def _merge(series: Array, size: int) -> Array:
+    """Means of batches of ``size`` rows; a remainder is dropped at the start, where transients are."""
+    count = len(series) // size
+    return series[len(series) - count * size :].reshape(count, size, *series.shape[1:]).mean(axis=1)
+
+
+def _cosines(count: int, nu: int) -> Array:
+    """First ``nu`` rows after the constant of the orthonormal discrete cosine transform of type II."""
+    i, j = np.arange(count) + 0.5, np.arange(1, nu + 1)
+    return np.sqrt(2.0 / count) * np.cos(np.pi / count * np.outer(j, i))
+
+
+def _lag_one_correlation(deviations: Array) -> Array:
+    """Correlation of neighbours, cut to 0 .. 0.9, less its bias ``-(1 + 3 r) / n`` (Marriott, Pope 1954)."""
+    variance = (deviations**2).sum(axis=0)
+    covariance = (deviations[1:] * deviations[:-1]).sum(axis=0)
+    r = np.divide(covariance, variance, out=np.zeros_like(variance), where=variance > 0.0)
+    return np.clip(r + (1.0 + 3.0 * r) / len(deviations), 0.0, MAX_CORRELATION)
+
+
+def _autoregressive_spectrum(r: Array, count: int, nu: int) -> Array:
+    """Mean over the first ``nu`` cosine frequencies of an AR(1) spectrum that is 1 at frequency zero."""
+    angle = np.pi / count * np.arange(1, nu + 1).reshape(-1, *(1,) * r.ndim)
+    return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=0)
+
+
+def bump_weight(t: Array) -> Array:
+    """``exp(-1 / (t (1 - t)))`` on ``0 < t < 1``: flat to all orders at both ends."""
+    return np.exp(-1.0 / (t * (1.0 - t)))
+
+
+def hann_weight(t: Array) -> Array:
+    """``2 sin(pi t)^2`` on ``0 < t < 1``: flat to first order at both ends, and less costly on noise."""
+    return 2.0 * np.sin(np.pi * t) ** 2
+
+
+def weighted_mean(series: Array, weight: Callable[[Array], Array] = bump_weight) -> Array:
+    r"""Weighted Birkhoff average, which converges fast where the motion is quasi-periodic.
+
+    .. math:: \bar y = \sum_i w(t_i) y_i \Big/ \sum_i w(t_i), \qquad t_i = (i - 1/2) / M
+
+    On a smooth quasi-periodic series its error falls faster than any power of ``M`` with `bump_weight` and
+    like ``M**-3`` with `hann_weight`, where the plain mean has ``1/M``. On chaotic series it gains nothing:
+    on white noise its variance is 1.96 (bump) or 1.5 (Hann) times that of the plain mean.
+
+    Parameters
+    ----------
+    series : (M, k) array
+        One row an interval.
+    weight : callable
+        `bump_weight`, `hann_weight` or any positive function of times between 0 and 1.
+
+    Returns
+    -------
+    (k,) array
+        Minus infinity for a column that has such an entry.
+
+    References
+    ----------
+    S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30 (2017) 4111,
+    https://doi.org/10.1088/1361-6544/aa84c2.
+
+    Examples
+    --------
+    >>> series = 0.25 + np.cos(2.4 * np.arange(2000))[:, np.newaxis]
+    >>> bool(abs(weighted_mean(series)[0] - 0.25) < 1e-14)
+    True
+    """
+    series = np.asarray(series, dtype=float)
+    w = weight((np.arange(len(series)) + 0.5) / len(series))
+    finite = np.isfinite(series).all(axis=0)
+    # The bump underflows to zero at the ends, and zero times infinity would hide the collapse.
+    return np.where(finite, w / w.sum() @ np.where(finite, series, 0.0), series.sum(axis=0))

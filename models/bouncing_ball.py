@@ -1,0 +1,49 @@
+"""A ball that bounces on fixed ground: the smallest system with impacts, and with chatter."""
+
+from __future__ import annotations
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def bouncing_ball() -> HybridSystem:
+    r"""Ball falling on rigid fixed ground with Newton's law of restitution.
+
+    .. math::
+
+        \ddot q = -g, \quad q \ge 0, \qquad v \mapsto -e\, v \text{ at } q = 0, v < 0
+
+    Returns
+    -------
+    HybridSystem
+        State ``q`` (height, m), ``v`` (velocity, m/s); mode ``flight``; transition ``bounce``.
+        Parameters: ``g = 9.81`` m/s^2; ``e = 0.8``, the coefficient of restitution, ``0 <= e <= 1``.
+
+    Notes
+    -----
+    Exact answers, with ``v_minus`` the velocity just before an impact:
+
+    - the saltation matrix is ``[[-e, 0], [g (1 + e) / abs(v_minus), -e]]``;
+    - from rest at height ``h`` the impacts are at
+      ``t_k = sqrt(2 h / g) (1 + 2 (e + ... + e^(k-1)))``, the k-th at the speed ``e^(k-1) sqrt(2 g h)``;
+    - so for ``e < 1`` they accumulate at ``sqrt(2 h / g) (1 + e) / (1 - e)``, where the ball comes to rest.
+
+    References
+    ----------
+    R. Goebel, R. G. Sanfelice, A. R. Teel, "Hybrid dynamical systems", IEEE Control Systems Magazine
+    29(2), 28-93, 2009, example 1. doi:10.1109/MCS.2008.931718
+    """
+    return HybridSystem(
+        name="bouncing ball",
+        state=("q", "v"),
+        parameters={"g": 9.81, "e": 0.8},
+        modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, direction=-1),
+                Reset(lambda t, x, p: (0.0, -p.e * x.v)),
+                name="bounce",
+            )
+        ],
+    )

@@ -1,0 +1,173 @@
+"""The reference systems as hybrid systems, each in its most natural modelling."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def solvable_oscillator() -> HybridSystem:
+    """``u'' - 2 b u' + (w^2 + b^2)(u - s) = 0``, ``w = 2 pi``; ``s = sgn(u)`` whenever ``u' = 0``.
+
+    From ``abs(u) < 1`` the other turning points, where ``s`` is kept, all have ``abs(u) > 1``. So ``s`` flips where
+    the velocity turns towards ``s`` on the far side of zero, which the minimum (maximum) of two signs expresses.
+    A turning point where ``s`` already has the sign of ``u`` is then no zero of the guard.
+    """
+
+    def field(s):
+        return lambda t, x, p: (x.v, 2 * p.b * x.v - ((2 * np.pi) ** 2 + p.b**2) * (x.u - s))
+
+    return HybridSystem(
+        state=("u", "v"),
+        parameters={"b": 0.5},
+        modes=[Mode("plus", field(1.0)), Mode("minus", field(-1.0))],
+        transitions=[
+            Transition("plus", "minus", Guard(lambda t, x, p: np.minimum(x.v, -x.u), direction=+1)),
+            Transition("minus", "plus", Guard(lambda t, x, p: np.maximum(x.v, -x.u), direction=-1)),
+        ],
+    )
+
+
+def rimless_wheel() -> HybridSystem:
+    """Rimless wheel of leg length ``l`` on a slope ``gamma``, ``2 alpha`` between its legs."""
+    return HybridSystem(
+        state=("theta", "omega"),
+        parameters={"g": 9.8, "l": 1.0, "alpha": np.pi / 8, "gamma": 0.08},
+        modes=[Mode("stance", lambda t, x, p: (x.omega, p.g / p.l * np.sin(x.theta)))],
+        transitions=[
+            Transition(
+                "stance",
+                "stance",
+                Guard(lambda t, x, p: x.theta - p.gamma - p.alpha, direction=+1),
+                Reset(lambda t, x, p: (p.gamma - p.alpha, np.cos(2 * p.alpha) * x.omega)),
+                name="step",
+            )
+        ],
+    )
+
+
+def buck_converter() -> HybridSystem:
+    """Voltage-mode buck converter whose ramp is driven by a clock, a state: ``tau`` runs from 0 to 1.
+
+    The ramp jumps back at the end of its period. As a state with a reset the clock makes that an event like any
+    other and every model function smooth, where a function of time with a jump would be neither.
+    """
+
+    def error(x, p):
+        return p.gain * (x.v - p.reference) - (p.low + (p.high - p.low) * x.tau)
+
+    def field(on):
+        return lambda t, x, p: ((x.i - x.v / p.R) / p.C, (on * p.E - x.v) / p.L, 1 / p.T)
+
+    ramp_ends = Guard(lambda t, x, p: x.tau - 1, direction=+1)
+    clock = Reset(lambda t, x, p: (x.v, x.i, 0.0))
+    return HybridSystem(
+        state=("v", "i", "tau"),
+        parameters={
+            "E": 25.0, "L": 20e-3, "C": 47e-6, "R": 22.0, "T": 400e-6,
+            "reference": 11.3, "gain": 8.4, "low": 3.8, "high": 8.2,
+        },
+        modes=[Mode("off", field(0.0)), Mode("on", field(1.0))],
+        transitions=[
+            Transition("off", "on", Guard(lambda t, x, p: error(x, p), direction=-1), name="close"),
+            Transition("on", "off", Guard(lambda t, x, p: error(x, p), direction=+1), name="open"),
+            Transition("on", "off", ramp_ends, clock, name="ramp ends"),
+            Transition("off", "off", ramp_ends, clock, name="skipped"),
+        ],
+    )  # fmt: skip
+
+
+def switched_linear() -> HybridSystem:
+    """Hiskens and Pai's pair of linear systems, switched on two lines through the origin."""
+    return HybridSystem(
+        state=("x1", "x2"),
+        modes=[
+            Mode("first", lambda t, x, p: (x.x1 - 100 * x.x2, 10 * x.x1 + x.x2)),
+            Mode("second", lambda t, x, p: (x.x1 + 10 * x.x2, -100 * x.x1 + x.x2)),
+        ],
+        transitions=[
+            Transition("first", "second", Guard(lambda t, x, p: x.x2 - 2.75 * x.x1)),
+            Transition("second", "first", Guard(lambda t, x, p: x.x2 - 0.36 * x.x1)),
+        ],
+    )
+
+
+def stick_slip() -> HybridSystem:
+    """Block on a belt with friction that falls with speed; the block never outruns the belt.
+
+    The release is a fold: at ``x = Fs`` the slip begins with ``v = belt`` and no acceleration, on the guard of the
+    next sticking, which it leaves with ``v'' = -belt``.
+    """
+
+    def slip(t, x, p):
+        return x.v, p.Fs / (1 + p.delta * (p.belt - x.v)) - x.x
+
+    return HybridSystem(
+        state=("x", "v"),
+        parameters={"belt": 0.2, "delta": 3.0, "Fs": 1.0},
+        modes=[Mode("stick", lambda t, x, p: (p.belt, 0.0)), Mode("slip", slip)],
+        transitions=[
+            Transition("stick", "slip", Guard(lambda t, x, p: x.x - p.Fs, direction=+1), name="release"),
+            Transition(
+                "slip",
+                "stick",
+                Guard(lambda t, x, p: x.v - p.belt, direction=+1),
+                Reset(lambda t, x, p: (x.x, p.belt)),
+                name="catch",
+            ),
+        ],
+    )
+
+
+def constant_fields() -> HybridSystem:
+    """``(1, -1)`` left of ``x1 = 0`` and ``(1, 1)`` right of it."""
+    return HybridSystem(
+        state=("x1", "x2"),
+        modes=[Mode("left", lambda t, x, p: (1.0, -1.0)), Mode("right", lambda t, x, p: (1.0, 1.0))],
+        transitions=[Transition("left", "right", Guard(lambda t, x, p: x.x1, direction=+1))],
+    )
+
+
+def incline() -> HybridSystem:
+    """A ball that falls on a frictionless incline ``x sin(a) + y cos(a) = 0`` and slides on."""
+
+    def project(t, x, p):
+        along = np.cos(p.a) * x.vx - np.sin(p.a) * x.vy
+        return x.x, x.y, np.cos(p.a) * along, -np.sin(p.a) * along
+
+    def slide(t, x, p):
+        along = p.g * np.sin(p.a)
+        return x.vx, x.vy, np.cos(p.a) * along, -np.sin(p.a) * along
+
+    return HybridSystem(
+        state=("x", "y", "vx", "vy"),
+        parameters={"g": 9.81, "a": 0.4},
+        modes=[Mode("fall", lambda t, x, p: (x.vx, x.vy, 0.0, -p.g)), Mode("slide", slide)],
+        transitions=[
+            Transition(
+                "fall",
+                "slide",
+                Guard(lambda t, x, p: np.sin(p.a) * x.x + np.cos(p.a) * x.y, direction=-1),
+                Reset(project),
+                name="landing",
+            )
+        ],
+    )
+
+
+def jerk() -> HybridSystem:
+    """``x''' = -0.6 x'' - x' + abs(x) - 1``, split where the absolute value has its kink."""
+
+    def field(sign):
+        return lambda t, x, p: (x.v, x.a, -p.damping * x.a - x.v + sign * x.x - 1)
+
+    return HybridSystem(
+        state=("x", "v", "a"),
+        parameters={"damping": 0.6},
+        modes=[Mode("left", field(-1.0)), Mode("right", field(1.0))],
+        transitions=[
+            Transition("left", "right", Guard(lambda t, x, p: x.x, direction=+1)),
+            Transition("right", "left", Guard(lambda t, x, p: x.x, direction=-1)),
+        ],
+    )

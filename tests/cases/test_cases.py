@@ -1,0 +1,208 @@
+"""The published and exactly solvable cases, through simulation, saltation, orbits and exponents."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+import lyapunov
+from tests.cases import systems
+from tests.reference.load import complex_pairs, reference
+
+TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
+
+OSCILLATOR = reference("solvable_oscillator")
+WHEEL = reference("rimless_wheel")
+BUCK = reference("buck_converter")
+SWITCHED = reference("switched_linear")
+FRICTION = reference("stick_slip")
+SALTATION = reference("saltation")
+
+converters = pytest.mark.parametrize("converter", BUCK, ids=lambda converter: f"{converter['E']:g} V")
+runs = pytest.mark.parametrize("run", SWITCHED, ids=lambda run: str(run["x0"]))
+
+
+def in_order(multipliers):
+    return sorted(map(complex, multipliers), key=lambda m: (round(m.real, 9), m.imag))
+
+
+class TestSolvableOscillator:
+    @pytest.fixture(scope="class")
+    def arc(self):
+        start = (OSCILLATOR["u"][0], 0.0)
+        return hybrid.simulate(systems.solvable_oscillator(), start, (0.0, 10.5), mode="plus", solver=TIGHT)
+
+    def test_flips_come_at_whole_times(self, arc):
+        expected = [n for n in OSCILLATOR["flips"] if n <= 10]
+        np.testing.assert_allclose([jump.t for jump in arc.jumps], expected, atol=1e-9)
+
+    def test_orbit_follows_the_map(self, arc):
+        u = [jump.x_minus[0] for jump in arc.jumps]
+        expected = [OSCILLATOR["u"][n] for n in OSCILLATOR["flips"] if n <= 10]
+        np.testing.assert_allclose(u, expected, atol=1e-8)
+
+    def test_saltation(self, arc):
+        for jump, expected in zip(arc.jumps, OSCILLATOR["saltation"], strict=False):
+            np.testing.assert_allclose(jump.saltation, expected, atol=1e-7)
+
+    def test_a_start_on_the_guard_neither_fires_nor_is_lost(self):
+        """The start is a turning point where the sign of ``u`` is already that of ``s``."""
+        for mode, sign in (("plus", 1.0), ("minus", -1.0)):
+            arc = hybrid.simulate(systems.solvable_oscillator(), (0.9 * sign, 0.0), (0.0, 0.9), mode=mode)
+            assert not arc.jumps
+
+    def test_spectrum(self):
+        result = lyapunov.lyapunov_spectrum(
+            systems.solvable_oscillator(), (0.3, 0.0), mode="plus", interval=1.0, intervals=400
+        )
+        np.testing.assert_allclose(result.exponents, OSCILLATOR["exponents"], atol=0.02)
+
+
+class TestRimlessWheel:
+    def test_saltation(self):
+        alpha, gamma = math.pi / 8, 0.08
+        before = (gamma + alpha, WHEEL["omega"] / math.cos(2 * alpha))
+        found = hybrid.saltation_matrix(systems.rimless_wheel(), "step", 0.0, before)
+        np.testing.assert_allclose(found, WHEEL["saltation"], rtol=1e-12, atol=1e-14)
+
+    def test_steps_settle_on_the_fixed_point(self):
+        arc = hybrid.simulate(systems.rimless_wheel(), (WHEEL["theta"], 1.3), (0.0, 60.0), solver=TIGHT)
+        last, previous = arc.jumps[-1], arc.jumps[-2]
+        np.testing.assert_allclose(last.x_plus, [WHEEL["theta"], WHEEL["omega"]], rtol=1e-10)
+        assert last.t - previous.t == pytest.approx(WHEEL["period"], rel=1e-9)
+
+    def test_orbit(self):
+        """From mid-step: the closing point is no event."""
+        upright = hybrid.simulate(systems.rimless_wheel(), (WHEEL["theta"], WHEEL["omega"]), (0.0, 0.5)).x[-1]
+        orbit = hybrid.periodic_orbit(systems.rimless_wheel(), upright + (0.0, 0.01), period=1.0)
+        assert orbit.period == pytest.approx(WHEEL["period"], rel=1e-8)
+        np.testing.assert_allclose(in_order(orbit.multipliers), sorted(WHEEL["multipliers"]), atol=1e-7)
+
+
+class TestBuckConverter:
+    """State ``(v, i, tau)``: the clock adds the multiplier 1 of an autonomous flow."""
+
+    T = 400e-6
+
+    @converters
+    def test_one_ramp(self, converter):
+        arc = hybrid.simulate(
+            systems.buck_converter(),
+            (*converter["x0"], 0.0),
+            (0.0, 1.2 * self.T),
+            mode="off",
+            parameters={"E": converter["E"]},
+            solver=TIGHT,
+        )
+        close, ramp_ends = arc.jumps[:2]
+        assert close.t / self.T == pytest.approx(converter["off_fraction"], abs=1e-10)
+        assert ramp_ends.t == pytest.approx(self.T, rel=1e-12)
+        np.testing.assert_allclose(ramp_ends.x_plus, [*converter["x0"], 0.0], atol=1e-9)
+        # Only the voltage is felt by the guard besides the clock, so this block is the matrix of the driven system.
+        np.testing.assert_allclose(close.saltation[:2, :2], converter["saltation"], atol=1e-9)
+
+    @converters
+    def test_orbit(self, converter):
+        start = np.array([*converter["x0"], 0.0]) + (1e-4, 1e-5, 0.0)
+        mid = hybrid.simulate(
+            systems.buck_converter(), start, (0.0, 0.1 * self.T), mode="off", parameters={"E": converter["E"]}
+        ).x[-1]
+        orbit = hybrid.periodic_orbit(
+            systems.buck_converter(), mid, mode="off", parameters={"E": converter["E"]}, period=self.T
+        )
+        assert orbit.period == pytest.approx(self.T, rel=1e-9)
+        expected = in_order([*complex_pairs(converter["multipliers"]), 1.0])
+        np.testing.assert_allclose(in_order(orbit.multipliers), expected, atol=1e-6)
+        assert np.prod(orbit.multipliers) == pytest.approx(converter["determinant"], rel=1e-7)
+
+
+class TestSwitchedLinear:
+    @runs
+    def test_switching_times_and_sensitivities(self, run):
+        arc = hybrid.simulate(
+            systems.switched_linear(),
+            run["x0"],
+            (0.0, run["t_end"]),
+            mode="first",
+            tangent=True,
+            solver=TIGHT,
+        )
+        np.testing.assert_allclose([jump.t for jump in arc.jumps], run["switching_times"], atol=1e-12)
+        np.testing.assert_allclose(arc.x[-1], run["x_end"], atol=1e-10)
+        np.testing.assert_allclose(arc.fundamental, run["sensitivity"], atol=1e-9)
+
+
+class TestStickSlip:
+    START = (0.5, 0.2)
+
+    @pytest.fixture(scope="class")
+    def arc(self):
+        span = (0.0, 2.4 * FRICTION["period"])
+        return hybrid.simulate(systems.stick_slip(), self.START, span, mode="stick", solver=TIGHT)
+
+    def test_release_does_not_stick_again_at_once(self, arc):
+        """The slip starts on the guard of sticking, at no speed."""
+        release, catch, again = arc.jumps[:3]
+        assert release.t == pytest.approx(2.5, rel=1e-10)
+        assert catch.t - release.t == pytest.approx(FRICTION["slip"], rel=1e-8)
+        assert again.t - catch.t == pytest.approx(FRICTION["stick"], rel=1e-8)
+
+    def test_state_at_the_catch(self, arc):
+        np.testing.assert_allclose(arc.jumps[1].x_plus, [FRICTION["x_restick"], 0.2], atol=1e-8)
+
+    def test_largest_displacement(self, arc):
+        t = np.linspace(2.6, 4.0, 20001)
+        assert arc(t)[:, 0].max() == pytest.approx(FRICTION["x_largest"], abs=1e-8)
+
+    def test_release_is_smooth_and_the_catch_loses_a_direction(self, arc):
+        release, catch = arc.jumps[:2]
+        np.testing.assert_allclose(release.saltation, np.eye(2), atol=1e-8)
+        assert np.linalg.matrix_rank(catch.saltation, tol=1e-8) == 1
+
+    def test_orbit(self):
+        orbit = hybrid.periodic_orbit(systems.stick_slip(), self.START, mode="stick", period=12.0)
+        assert orbit.period == pytest.approx(FRICTION["period"], rel=1e-8)
+        np.testing.assert_allclose(in_order(orbit.multipliers), [0.0, 1.0], atol=1e-8)
+
+    def test_a_lost_direction_has_exponent_minus_infinity(self):
+        result = lyapunov.lyapunov_spectrum(
+            systems.stick_slip(), self.START, mode="stick", interval=FRICTION["period"], intervals=20
+        )
+        assert result.exponents[0] == pytest.approx(0.0, abs=1e-3)
+        assert result.exponents[1] == -math.inf
+
+
+class TestSaltation:
+    def test_constant_fields(self):
+        found = hybrid.saltation_matrix(systems.constant_fields(), "left->right", 0.0, (0.0, 0.0))
+        np.testing.assert_allclose(found, SALTATION["constant_fields"], atol=1e-15)
+
+    def test_landing_on_an_incline(self):
+        """The same projection for positions and velocities, whatever the velocity of landing."""
+        angle = SALTATION["incline"]["angle"]
+        system = systems.incline()
+        for velocity in ((0.0, -2.0), (1.0, -3.0), (-0.5, -1.0)):
+            landing = (-math.cos(angle), math.sin(angle), *velocity)
+            found = hybrid.saltation_matrix(system, "landing", 0.0, landing, parameters={"a": angle})
+            np.testing.assert_allclose(found, SALTATION["incline"]["saltation"], atol=1e-12)
+
+
+class TestJerk:
+    """Piecewise-linear chaos with a continuous field."""
+
+    START = (-1.0, 0.1, 0.0)
+
+    def test_saltation_is_the_identity(self):
+        arc = hybrid.simulate(systems.jerk(), self.START, (0.0, 50.0), mode="left")
+        assert len(arc.jumps) > 5
+        for jump in arc.jumps:
+            np.testing.assert_allclose(jump.saltation, np.eye(3), atol=1e-9)
+
+    def test_spectrum(self):
+        """Linz and Sprott (1999) print (0.0362, 0, -0.6362), from a run of unknown length."""
+        result = lyapunov.lyapunov_spectrum(
+            systems.jerk(), self.START, mode="left", interval=2.0, intervals=10_000
+        )
+        np.testing.assert_allclose(result.exponents, [0.0369, 0.0, -0.6369], atol=3e-3)
+        assert result.exponents.sum() == pytest.approx(-0.6, abs=1e-6)

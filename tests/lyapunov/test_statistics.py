@@ -1,0 +1,201 @@
+"""The standard error covers the truth, and the weighted mean converges, as their docstrings say."""
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+from scipy.stats import norm, t
+
+from lyapunov import statistics
+from lyapunov.statistics import (
+    bump_weight,
+    closed_batch_means,
+    hann_weight,
+    new_batches,
+    push,
+    standard_error,
+    standard_error_from_batches,
+    weighted_mean,
+)
+
+RUNS = 1000
+GOLDEN = np.pi * (np.sqrt(5.0) - 1.0)
+
+
+def autoregressive(phi, length, rng):
+    noise = rng.standard_normal((length, RUNS))
+    noise[0] /= np.sqrt(1.0 - phi**2)
+    return lfilter([1.0], [1.0, -phi], noise, axis=0)
+
+
+def moving_average(theta, length, rng):
+    noise = rng.standard_normal((length + 1, RUNS))
+    return noise[1:] + theta * noise[:-1]
+
+
+def logistic_growth(length, rng):
+    x = np.sin(0.5 * np.pi * rng.random(RUNS)) ** 2
+    growth = np.empty((length, RUNS))
+    for row in growth:
+        row[:] = np.log(np.abs(4.0 - 8.0 * x))
+        x = 4.0 * x * (1.0 - x)
+    return growth
+
+
+def quasi_periodic(length, mean=0.0, columns=16):
+    phases = np.linspace(0.0, 2.0 * np.pi, columns, endpoint=False)
+    return mean + np.cos(GOLDEN * np.arange(length)[:, np.newaxis] + phases)
+
+
+def coverage(series, truth=0.0):
+    return np.mean(np.abs(series.mean(axis=0) - truth) <= 2.0 * standard_error(series))
+
+
+def error_ratio(series):
+    """Mean standard error over the scatter of the means that it should be."""
+    return standard_error(series).mean() / series.mean(axis=0).std()
+
+
+@pytest.mark.parametrize("length", [1000, 3000])
+@pytest.mark.parametrize("phi", [0.0, 0.5, 0.9, 0.99])
+def test_two_standard_errors_cover_the_mean_of_autoregressive_noise(phi, length):
+    series = autoregressive(phi, length, np.random.default_rng(1))
+    assert 0.93 <= coverage(series) <= 0.98
+    assert 1.0 <= error_ratio(series) <= 1.7
+
+
+def test_slow_correlation_under_white_noise_is_not_missed():
+    rng = np.random.default_rng(2)
+    slow = np.sqrt(1.0 - 0.98**2) * autoregressive(0.98, 3000, rng)
+    series = slow + 3.0 * rng.standard_normal(slow.shape)
+    assert 0.93 <= coverage(series) <= 0.98
+
+
+def test_anticorrelated_noise_is_not_overstated():
+    series = moving_average(-0.7, 3000, np.random.default_rng(3))
+    assert 0.93 <= coverage(series) <= 0.98
+    assert error_ratio(series) <= 1.3
+
+
+def test_short_runs_are_covered_too():
+    rng = np.random.default_rng(4)
+    for length in (4, 6, 10, 50):
+        assert coverage(autoregressive(0.0, length, rng)) >= 0.92, length
+
+
+def test_logistic_map_covers_log_two_and_converges_like_its_bounded_sum():
+    rng = np.random.default_rng(5)
+    short, long = logistic_growth(500, rng), logistic_growth(4000, rng)
+    assert coverage(long, np.log(2.0)) >= 0.95
+    assert error_ratio(long) < 2.0
+    assert standard_error(short).mean() / standard_error(long).mean() == pytest.approx(8.0, rel=0.25)
+
+
+def test_error_of_a_quasi_periodic_mean_falls_like_its_length():
+    lengths = np.array([500, 4000, 32_000, 256_000])
+    errors = np.array([standard_error(quasi_periodic(m, mean=0.3)).mean() for m in lengths])
+    slope = np.polyfit(np.log(lengths), np.log(errors), 1)[0]
+    assert slope == pytest.approx(-1.0, abs=0.25)
+    assert np.all(errors > 0.0)
+
+
+def test_two_standard_errors_cover_the_zero_of_a_quasi_periodic_mean():
+    for length in (100, 1000, 10_000):
+        series = quasi_periodic(length)
+        assert np.all(np.abs(series.mean(axis=0)) <= 2.0 * standard_error(series)), length
+
+
+def test_constant_series_has_no_error():
+    assert np.all(standard_error(np.full((1000, 2), 0.25)) == 0.0)
+
+
+def test_collapsed_column_is_exact_and_leaves_the_others_alone():
+    series = np.random.default_rng(6).standard_normal((5000, 3))
+    expected = standard_error(series)
+    series[7, 1] = -np.inf
+    np.testing.assert_array_equal(standard_error(series), [expected[0], 0.0, expected[2]])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_undefined_growth_has_no_error(bad):
+    series = np.random.default_rng(6).standard_normal((100, 2))
+    series[3, 0] = bad
+    assert np.isnan(standard_error(series)).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("length", [0, 1, 3])
+def test_too_short_a_series_has_no_error(length):
+    assert np.isnan(standard_error(np.ones((length, 2)))).all()
+
+
+@given(scale=st.floats(1e-6, 1e6), shift=st.floats(-1e3, 1e3))
+def test_error_scales_with_the_series_and_ignores_its_mean(scale, shift):
+    series = autoregressive(0.5, 300, np.random.default_rng(7))[:, :3]
+    np.testing.assert_allclose(
+        standard_error(scale * (series + shift)), scale * standard_error(series), rtol=1e-6
+    )
+
+
+def test_student_factors():
+    two_sigma = norm.cdf(2.0)
+    expected = t.ppf(two_sigma, np.arange(1, 9)) / 2.0
+    np.testing.assert_allclose(statistics.TWO_SIGMA_OF_STUDENT, expected, rtol=1e-7)
+
+
+def accumulate(series, batches, add=push):
+    sums, state = new_batches(series.shape[1])
+    sums = sums[:batches]
+    for row in series:
+        add(sums, state, row)
+    return sums, state
+
+
+@given(length=st.integers(0, 300), half=st.integers(1, 10))
+def test_accumulator_keeps_the_means_of_equal_batches(length, half):
+    series = np.random.default_rng(length).standard_normal((length, 2))
+    sums, state = accumulate(series, 2 * half)
+    closed, size, in_open = state
+    assert closed <= 2 * half
+    assert closed * size + in_open == length
+    expected = series[: closed * size].reshape(closed, size, 2).mean(axis=1)
+    np.testing.assert_allclose(closed_batch_means(sums, state), expected, atol=1e-13)
+
+
+def test_accumulator_gives_the_error_of_the_whole_series():
+    series = autoregressive(0.9, 9000, np.random.default_rng(8))[:, :2]
+    error = standard_error_from_batches(closed_batch_means(*accumulate(series, statistics.MAX_BATCHES)))
+    np.testing.assert_allclose(error, standard_error(series), rtol=0.1)
+
+
+def test_accumulator_compiles_and_agrees_with_itself_in_python():
+    series = np.random.default_rng(9).standard_normal((100, 3))
+    series[50, 2] = -np.inf
+    compiled, in_python = accumulate(series, 16, numba.njit(push)), accumulate(series, 16)
+    np.testing.assert_array_equal(compiled[0], in_python[0])
+    np.testing.assert_array_equal(compiled[1], in_python[1])
+    assert standard_error_from_batches(closed_batch_means(*compiled))[2] == 0.0
+
+
+def test_weighted_mean_of_a_quasi_periodic_series_reaches_rounding():
+    assert np.abs(weighted_mean(quasi_periodic(400, mean=0.3)) - 0.3).max() < 1e-13
+
+
+def test_hann_weight_gains_two_orders_over_the_plain_mean():
+    lengths = np.array([89, 233, 610, 1597, 4181]) + 30
+    errors = [np.abs(weighted_mean(quasi_periodic(m), hann_weight)).max() for m in lengths]
+    assert np.polyfit(np.log(lengths), np.log(errors), 1)[0] == pytest.approx(-3.0, abs=0.5)
+
+
+@pytest.mark.parametrize(("weight", "inflation"), [(bump_weight, 1.96), (hann_weight, 1.5)])
+def test_weights_cost_variance_on_white_noise(weight, inflation):
+    noise = np.random.default_rng(10).standard_normal((500, 20_000))
+    assert 500 * weighted_mean(noise, weight).var() == pytest.approx(inflation, rel=0.03)
+
+
+@pytest.mark.parametrize("row", [0, 500])
+def test_weighted_mean_of_a_collapsed_column_is_minus_infinity(row):
+    series = np.ones((1000, 2))
+    series[row, 0] = -np.inf
+    np.testing.assert_allclose(weighted_mean(series), [-np.inf, 1.0])

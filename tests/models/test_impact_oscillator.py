@@ -1,0 +1,120 @@
+"""The impact oscillator against closed forms: orbits with one impact, twenty impacts, the sum of exponents."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+import lyapunov
+from models import impact_oscillator
+from models.impact_oscillator import one_impact_orbits
+from tests.reference.load import complex_pairs, reference
+
+REFERENCE = reference("impact_oscillator")
+ORBITS = REFERENCE["orbits"]
+FLIGHT = REFERENCE["flight"]
+NAMES = ("k", "c", "A", "w", "d", "r")
+TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-13)
+
+every_orbit = pytest.mark.parametrize("orbit", ORBITS, ids=lambda orbit: f"w={orbit['w']}, n={orbit['n']}")
+
+
+def in_order(multipliers):
+    return sorted(multipliers, key=lambda m: (round(m.real, 9), m.imag))
+
+
+def parameters_of(orbit):
+    return {name: orbit[name] for name in NAMES}
+
+
+def forced_fully(orbit):
+    """Phase of the section: half a flight after the impact, away from the event."""
+    impact = orbit["theta"] / orbit["w"]
+    return impact, impact + math.pi * orbit["n"] / orbit["w"]
+
+
+@every_orbit
+def test_closed_form_orbit(orbit):
+    closed, *others = one_impact_orbits(**parameters_of(orbit), n=orbit["n"])
+    assert not others
+    assert closed.V == pytest.approx(orbit["V"], rel=1e-12)
+    assert closed.theta == pytest.approx(orbit["theta"], abs=1e-12)
+    np.testing.assert_allclose(in_order(closed.multipliers), complex_pairs(orbit["multipliers"]), atol=1e-12)
+
+
+def test_published_orbit():
+    (orbit,) = one_impact_orbits(1, 0.1, 1, 1, 1, 0.8)
+    assert orbit.V == pytest.approx(1.695732937595, abs=1e-12)
+    assert orbit.theta == pytest.approx(0.075952164938, abs=1e-12)
+
+
+def test_no_orbit_where_the_stop_is_out_of_reach():
+    assert one_impact_orbits(1, 0.1, 1, 1, 11, 0.8) == []
+
+
+def test_closed_form_holds_at_critical_damping():
+    orbits = one_impact_orbits(1, 2.0, 1, 1, 0.1, 0.8)
+    nearby = one_impact_orbits(1, 2.0 + 1e-9, 1, 1, 0.1, 0.8)
+    assert len(orbits) == len(nearby) == 1
+    assert orbits[0].V == pytest.approx(nearby[0].V, rel=1e-7)
+
+
+@every_orbit
+def test_shooting_finds_the_closed_form_orbit(orbit):
+    impact, t0 = forced_fully(orbit)
+    parameters = parameters_of(orbit)
+    start = hybrid.simulate(
+        impact_oscillator(), (orbit["d"], -orbit["r"] * orbit["V"]), (impact, t0), parameters=parameters
+    ).x[-1]
+    found = hybrid.periodic_orbit(
+        impact_oscillator(), start + 1e-3, parameters=parameters, t0=t0, periods=orbit["n"]
+    )
+    np.testing.assert_allclose(found.x0, start, atol=1e-7)
+    np.testing.assert_allclose(in_order(found.multipliers), complex_pairs(orbit["multipliers"]), atol=1e-8)
+    assert found.period == pytest.approx(2 * math.pi * orbit["n"] / orbit["w"], rel=1e-14)
+
+
+def test_twenty_impacts():
+    arc = hybrid.simulate(impact_oscillator(), FLIGHT["x0"], (0.0, FLIGHT["t_end"]), solver=TIGHT)
+    np.testing.assert_allclose([jump.t for jump in arc.jumps], FLIGHT["t"], rtol=1e-10)
+    np.testing.assert_allclose([jump.x_minus[1] for jump in arc.jumps], FLIGHT["v_minus"], rtol=1e-9)
+    np.testing.assert_allclose(arc.x[-1], FLIGHT["x_end"], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("solver", "order", "tolerances"),
+    [(hybrid.DOP853, 8, (1e-6, 1e-8, 1e-10)), (hybrid.Tsit5, 5, (1e-5, 1e-7, 1e-9))],
+)
+def test_error_across_impacts_falls_with_the_tolerance(solver, order, tolerances):
+    """An event found to less than the solver's order would put a floor under the error."""
+    errors = []
+    for tolerance in tolerances:
+        arc = hybrid.simulate(
+            impact_oscillator(),
+            FLIGHT["x0"],
+            (0.0, FLIGHT["t_end"]),
+            solver=solver(rtol=tolerance, atol=tolerance),
+        )
+        errors.append(np.abs(arc.x[-1] - FLIGHT["x_end"]).max())
+    slope = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
+    assert slope > order / (order + 1) - 0.15
+
+
+def test_areas_contract_as_the_damping_and_the_impacts_say():
+    """``det Phi = r^(2 N) exp(-c t)`` after N impacts, on any orbit: here a chaotic one."""
+    c, r, t_end = 0.1, 0.8, 20.0
+    parameters = {"c": c, "w": 2.8, "d": 0.0, "r": r}
+    arc = hybrid.simulate(
+        impact_oscillator(), (-0.1, 0.0), (0.0, t_end), parameters=parameters, tangent=True, solver=TIGHT
+    )
+    assert len(arc.jumps) > 3
+    exact = r ** (2 * len(arc.jumps)) * math.exp(-c * t_end)
+    assert np.linalg.det(arc.fundamental) == pytest.approx(exact, rel=1e-7)
+
+
+def test_exponents_of_the_published_orbit():
+    exact = math.log(0.8 * math.exp(-0.1 * math.pi)) / (2 * math.pi)
+    result = lyapunov.lyapunov_spectrum(impact_oscillator(), (0.0, 0.0), intervals=2000)
+    np.testing.assert_allclose(result.exponents, [exact, exact], atol=3e-3)
+    assert result.exponents.sum() == pytest.approx(2 * exact, abs=1e-3)

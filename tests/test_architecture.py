@@ -1,0 +1,126 @@
+"""Imports go one way, and files stay small: ``kernels <- compile <- simulate <- lyapunov``."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("hybrid", "models", "lyapunov")
+KERNELS_MAY_IMPORT = ("__future__", "hybrid.kernels", "math", "numba", "numpy", "typing")
+HEAVY = ("matplotlib", "networkx", "numba", "scipy", "sympy")
+MAX_LINES = 500
+
+
+class Import(NamedTuple):
+    """``from module import name``; ``name`` is empty for ``import module``."""
+
+    path: Path
+    line: int
+    module: str
+    name: str
+
+    def __str__(self):
+        statement = f"from {self.module} import {self.name}" if self.name else f"import {self.module}"
+        return f"{self.path.relative_to(ROOT)}:{self.line}: {statement}"
+
+    def is_of(self, *packages):
+        return any(self.module == package or self.module.startswith(f"{package}.") for package in packages)
+
+
+def sources(folder):
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+def imports_of(path):
+    """Every import statement of a file, also those inside functions, relative ones resolved."""
+    package = path.relative_to(ROOT).parent.parts
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
+        if isinstance(node, ast.Import):
+            yield from (Import(path, node.lineno, alias.name, "") for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = ".".join((*base, node.module) if node.module else base)
+            yield from (Import(path, node.lineno, module, alias.name) for alias in node.names)
+
+
+def imports_in(folder):
+    return [found for path in sources(folder) for found in imports_of(path)]
+
+
+def report(offences):
+    return "\n" + "\n".join(map(str, offences))
+
+
+def test_the_walk_finds_imports_of_every_form(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
+    path = tmp_path / "hybrid" / "kernels" / "step.py"
+    path.parent.mkdir(parents=True)
+    path.write_text("import attrs\ndef f():\n    from ..system import Mode\n    from . import codes\n")
+    assert [str(found) for found in imports_in("hybrid")] == [
+        "hybrid/kernels/step.py:1: import attrs",
+        "hybrid/kernels/step.py:3: from hybrid.system import Mode",
+        "hybrid/kernels/step.py:4: from hybrid.kernels import codes",
+    ]
+
+
+def test_kernels_know_only_numpy_numba_and_each_other():
+    offences = [found for found in imports_in("hybrid/kernels") if not found.is_of(*KERNELS_MAY_IMPORT)]
+    assert not offences, report(offences)
+
+
+def test_hybrid_knows_neither_its_models_nor_its_users():
+    offences = [found for found in imports_in("hybrid") if found.is_of("models", "lyapunov")]
+    assert not offences, report(offences)
+
+
+def test_models_use_only_what_hybrid_exports():
+    exported = __import__("hybrid").__all__
+
+    def allowed(found):
+        if found.module == "hybrid":
+            return not found.name or found.name in exported
+        return found.is_of("models", "numpy", *sys.stdlib_module_names)
+
+    offences = [found for found in imports_in("models") if not allowed(found)]
+    assert not offences, report(offences)
+
+
+def test_only_the_demo_of_lyapunov_knows_a_model():
+    offences = [
+        found
+        for found in imports_in("lyapunov")
+        if found.is_of("models") and found.path.name != "__main__.py" and not found.path.match("demo*.py")
+    ]
+    assert not offences, report(offences)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_files_are_small(package):
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in sources(package)}
+    offences = [
+        f"{path.relative_to(ROOT)}:{length}: longer than {MAX_LINES} lines"
+        for path, length in lengths.items()
+        if length > MAX_LINES
+    ]
+    assert not offences, report(offences)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_module_says_what_it_is_for(package):
+    offences = [
+        f"{path.relative_to(ROOT)}:1: no docstring"
+        for path in sources(package)
+        if not ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert not offences, report(offences)
+
+
+def test_importing_hybrid_is_light():
+    program = f"import sys, hybrid; print(*sorted(sys.modules.keys() & {set(HEAVY)!r}))"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [], f"import hybrid also imports {done.stdout}"
