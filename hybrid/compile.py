@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -149,7 +150,7 @@ def _executed(emitted: Emitted) -> dict[str, Any]:
 
 def _written(source: str, folder: Path) -> Path:
     """The file that holds ``source``, written whole or not at all: other processes may be doing the same."""
-    path = folder / f"model_{source_key(source)}.py"
+    path = folder / f"hybrid_model_{source_key(source)}.py"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         draft = folder / f".{path.stem}.{os.getpid()}"
@@ -163,5 +164,7 @@ def _imported(path: Path) -> dict[str, Any]:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    # Numba finds the globals of a cached function again through the name of its module.
+    sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return vars(module)

@@ -192,5 +192,5 @@ def _compare(system: HybridSystem, role: Role, given: np.ndarray, reference: _Re
     column = (*system.state_names, "t")[j]
     raise ModelError(
         f"{role.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
-        f"{reference.source} of the {role.name} gives {expected}. Mend it, or leave it out to have it derived."
+        f"{reference.source} of the {role.name} gives {expected}. Mend it, or leave it out: it is derived."
     )

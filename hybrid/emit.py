@@ -108,9 +108,10 @@ class _Writer:
         targets = ["out[0]"] if role.size is None else [f"out[{i}]" for i in range(role.size)]
         try:
             expressions = self._traced(role.function)
+            jacobian = symbolic_jacobian(expressions, self.symbols.variables)
+            _check_printable(entry for row in jacobian for entry in row)
         except ModelError as error:
             return self._write_opaque(role, targets, error)
-        jacobian = symbolic_jacobian(expressions, self.symbols.variables)
         if role.derivative is None:
             derivative = assignments(self._cells(role), [entry for row in jacobian for entry in row])
         else:
@@ -127,9 +128,7 @@ class _Writer:
 
     def _traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
         expressions = trace(function, self.system.state, tuple(self.system.parameters))
-        missing = unprintable(expressions)
-        if missing is not None:
-            raise TraceError(f"the function {missing} has no compiled form")
+        _check_printable(expressions)
         return expressions
 
     def _write_opaque(self, role: Role, targets: Sequence[str], reason: ModelError) -> _Written:
@@ -142,7 +141,7 @@ class _Writer:
         if error is not None:
             raise ModelError(
                 f"{role.title} cannot be differentiated. Tracing stopped: {reason}. The complex step "
-                f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, np.where), "
+                f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, np.where) "
                 f"or give its derivative as {role.derivative_name}=."
             ) from (reason.__cause__ or error)
         return _Written(value, self._complex_step(role, name))
@@ -214,6 +213,12 @@ class _Writer:
         names = tuple(self.system.parameters)
         self.opaque["Parameters"] = plain_class(PARAMETERS, names)
         return f"Parameters({', '.join(f'p[{i}]' for i in range(len(names)))})"
+
+
+def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
+    missing = unprintable(expressions)
+    if missing is not None:
+        raise TraceError(f"the function {missing} has no compiled form")
 
 
 def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Written:

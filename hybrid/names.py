@@ -23,8 +23,7 @@ class UnknownComponentError(ModelError, AttributeError):
 @cache
 def plain_class(kind: str, names: tuple[str, ...]) -> type[Any]:
     """A bare namedtuple class with the given fields, of the sort that compiled code understands."""
-    # mypy wants literal field names
-    return namedtuple(kind.title().replace(" ", ""), names)  # type: ignore[misc]
+    return namedtuple(kind.title().replace(" ", ""), names)
 
 
 @cache

@@ -6,6 +6,7 @@ The text depends on nothing but the expressions, so that it can be the key of a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import ClassVar
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
@@ -45,8 +46,8 @@ MATH_FUNCTIONS: dict[type[sympy.Basic], str] = {
 IMPORTS = (
     "import numpy as np\n"
     "from math import (\n"
-    "    acos, acosh, asin, asinh, atan, atan2, atanh, copysign, cos, cosh, exp, expm1, fmod, hypot, inf, log,\n"
-    "    log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
+    "    acos, acosh, asin, asinh, atan, atan2, atanh, copysign, cos, cosh, exp, expm1, fmod, hypot, inf,\n"
+    "    log, log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
     ")\n"
 )
 
@@ -128,7 +129,7 @@ class _Printer:
         return self.PRINTERS[expression.func](self, expression)
 
     def _sum(self, expression: sympy.Expr) -> tuple[str, int]:
-        parts = []
+        parts: list[str] = []
         # SymPy puts the number first; a - 1 reads better than -1 + a, and is the same sum
         for term in (*expression.args[1:], expression.args[0]):
             text = self.text(term, PRODUCT)
@@ -232,7 +233,7 @@ class _Printer:
     def _exp2(self, expression: sympy.Expr) -> tuple[str, int]:
         return f"2.0**{self.text(expression.args[0], ATOM)}", POWER
 
-    PRINTERS: dict[type[sympy.Basic], Callable[[_Printer, sympy.Expr], tuple[str, int]]] = {
+    PRINTERS: ClassVar[dict[type[sympy.Basic], Callable[[_Printer, sympy.Expr], tuple[str, int]]]] = {
         sympy.Add: _sum,
         sympy.Mul: _product,
         sympy.Pow: _power,

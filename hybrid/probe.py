@@ -1,4 +1,4 @@
-"""One call of every model function when a system is made, so that a slip is met there and in its own words."""
+"""One call of every model function when a system is made, to meet a slip where it is made."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ def probe_system(system: HybridSystem) -> None:
 
 def sample_state(system: HybridSystem) -> np.ndarray:
     """The fixed point ``(n,)`` of the probe, in (1/2, 3/2)."""
-    return 0.5 + np.mod(SAMPLE_STRIDE * np.arange(1, system.dimension + 1), 1.0)
+    fractions: np.ndarray = np.mod(SAMPLE_STRIDE * np.arange(1, system.dimension + 1), 1.0)
+    return 0.5 + fractions
 
 
 def derivative_has_time_column(system: HybridSystem, role: Role) -> bool:

@@ -179,6 +179,14 @@ class Trajectory:
         n = self.model.dimension
         return self.run.y[n:].reshape(self.tangents, n).T.copy()
 
+    def jacobian(self) -> np.ndarray:
+        """``D_x f`` of the current mode at the current point, ``(n, n)``."""
+        from hybrid.kernels.step import flow_jacobian
+
+        run, n = self.run, self.model.dimension
+        flow_jacobian(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, self.work.jacobian)
+        return self.work.jacobian[:, :n].copy()
+
     def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:
         """Run to time ``t`` or until something else ends it; a code of ``hybrid.kernels.codes``."""
         return self.advance_to(*split_time(t, self.model.period), record, max_jumps)

@@ -4,6 +4,8 @@ SymPy's own Max, Piecewise, sign and Mod reason about their arguments, which is 
 which can change how they round. These do neither: they fold plain numbers and know their derivative.
 """
 
+# ruff: noqa: D102 - the methods are the hooks that SymPy documents
+
 from __future__ import annotations
 
 import math
@@ -50,18 +52,26 @@ class PiecewiseConstant(RealFunction):
 
 
 class Floor(PiecewiseConstant):
+    """The largest integer not above ``u``."""
+
     value = staticmethod(math.floor)
 
 
 class Ceiling(PiecewiseConstant):
+    """The smallest integer not below ``u``."""
+
     value = staticmethod(math.ceil)
 
 
 class Truncate(PiecewiseConstant):
+    """``u`` without its fraction."""
+
     value = staticmethod(math.trunc)
 
 
 class Sign(PiecewiseConstant):
+    """-1, 0 or 1."""
+
     value = staticmethod(lambda u: float((u > 0) - (u < 0)))
 
 
@@ -72,30 +82,44 @@ class Step(PiecewiseConstant):
 
 
 class Less(PiecewiseConstant):
+    """1 if ``a < b``, else 0."""
+
     value = staticmethod(lambda a, b: float(a < b))
 
 
 class LessEqual(PiecewiseConstant):
+    """1 if ``a <= b``, else 0."""
+
     value = staticmethod(lambda a, b: float(a <= b))
 
 
 class Equal(PiecewiseConstant):
+    """1 if ``a == b``, else 0."""
+
     value = staticmethod(lambda a, b: float(a == b))
 
 
 class And(PiecewiseConstant):
+    """1 if neither is 0."""
+
     value = staticmethod(lambda a, b: float(bool(a and b)))
 
 
 class Or(PiecewiseConstant):
+    """1 unless both are 0."""
+
     value = staticmethod(lambda a, b: float(bool(a or b)))
 
 
 class Not(PiecewiseConstant):
+    """1 if ``a`` is 0."""
+
     value = staticmethod(lambda a: float(not a))
 
 
 class Absolute(RealFunction):
+    """``|u|``, of slope 0 at 0."""
+
     value = staticmethod(abs)
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
@@ -103,6 +127,8 @@ class Absolute(RealFunction):
 
 
 class Maximum(RealFunction):
+    """The larger of two, of slope 1/2 in each where they tie."""
+
     value = staticmethod(max)
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
@@ -111,6 +137,8 @@ class Maximum(RealFunction):
 
 
 class Minimum(RealFunction):
+    """The smaller of two, of slope 1/2 in each where they tie."""
+
     value = staticmethod(min)
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
@@ -137,6 +165,8 @@ class TruncatedRemainder(RealFunction):
 
 
 class Atan2(RealFunction):
+    """The angle of the point ``(x, y)``, called with ``y`` first."""
+
     value = staticmethod(math.atan2)
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
@@ -145,6 +175,8 @@ class Atan2(RealFunction):
 
 
 class CubeRoot(RealFunction):
+    """The real cube root, of the sign of ``u``."""
+
     value = staticmethod(lambda u: math.copysign(abs(u) ** (1 / 3), u))
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
@@ -177,7 +209,7 @@ class Gate(RealFunction):
 JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)
 
 
-@cacheit  # subexpressions are shared, and would be walked once for each use
+@cacheit  # type: ignore[untyped-decorator]  # subexpressions are shared, and would be walked once for each use
 def close_gates(expression: sympy.Expr) -> sympy.Expr:
     """Let a factor that switches a product off win over one that is infinite where it does.
 

@@ -10,8 +10,6 @@ off those.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -174,50 +172,69 @@ def _autoregressive_spectrum(r: Array, count: int, nu: int) -> Array:
     return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=0)
 
 
-def bump_weight(t: Array) -> Array:
-    """``exp(-1 / (t (1 - t)))`` on ``0 < t < 1``: flat to all orders at both ends."""
-    return np.exp(-1.0 / (t * (1.0 - t)))
+class TaperedMean:
+    r"""Mean of a series as it grows, weighted so that regular motion averages out fast.
 
+    .. math:: \bar y_M = \sum_{i=1}^{M} w_i y_i \Big/ \sum_{i=1}^{M} w_i, \qquad
+        w_i = (i - \tfrac12)^2 (M - i + \tfrac12)^2
 
-def hann_weight(t: Array) -> Array:
-    """``2 sin(pi t)^2`` on ``0 < t < 1``: flat to first order at both ends, and less costly on noise."""
-    return 2.0 * np.sin(np.pi * t) ** 2
-
-
-def weighted_mean(series: Array, weight: Callable[[Array], Array] = bump_weight) -> Array:
-    r"""Weighted Birkhoff average, which converges fast where the motion is quasi-periodic.
-
-    .. math:: \bar y = \sum_i w(t_i) y_i \Big/ \sum_i w(t_i), \qquad t_i = (i - 1/2) / M
-
-    On a smooth quasi-periodic series its error falls faster than any power of ``M`` with `bump_weight` and
-    like ``M**-3`` with `hann_weight`, where the plain mean has ``1/M``. On chaotic series it gains nothing:
-    on white noise its variance is 1.96 (bump) or 1.5 (Hann) times that of the plain mean.
+    A weighted Birkhoff average [1]_: the weight and its slope vanish at both ends, so on periodic and quasi-periodic
+    series the error falls like ``M**-3``, where the plain mean has ``1 / M``. The bump of [1]_ does still better, but
+    needs to know ``M`` beforehand; this weight is a polynomial in ``M``, so three sums give the estimate at every
+    ``M``. On white noise its variance is 10/7 that of the plain mean.
 
     Parameters
     ----------
-    series : (M, k) array
-        One row an interval.
-    weight : callable
-        `bump_weight`, `hann_weight` or any positive function of times between 0 and 1.
-
-    Returns
-    -------
-    (k,) array
-        Minus infinity for a column that has such an entry.
+    columns
+        Number of series.
 
     References
     ----------
-    S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30 (2017) 4111,
-    https://doi.org/10.1088/1361-6544/aa84c2.
-
-    Examples
-    --------
-    >>> series = 0.25 + np.cos(2.4 * np.arange(2000))[:, np.newaxis]
-    >>> bool(abs(weighted_mean(series)[0] - 0.25) < 1e-14)
-    True
+    .. [1] S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30 (2017) 4111,
+       https://doi.org/10.1088/1361-6544/aa84c2.
     """
-    series = np.asarray(series, dtype=float)
-    w = weight((np.arange(len(series)) + 0.5) / len(series))
-    finite = np.isfinite(series).all(axis=0)
-    # The bump underflows to zero at the ends, and zero times infinity would hide the collapse.
-    return np.where(finite, w / w.sum() @ np.where(finite, series, 0.0), series.sum(axis=0))
+
+    def __init__(self, columns: int) -> None:
+        self.count = 0
+        self._moments = np.zeros((3, columns))
+        self._collapsed = np.zeros(columns, dtype=bool)
+
+    def add(self, rows: Array) -> None:
+        """Append ``rows (m, columns)`` to the series."""
+        place = self.count + np.arange(len(rows)) + 0.5
+        self._collapsed |= (rows == -np.inf).any(axis=0)
+        finite = np.where(rows == -np.inf, 0.0, rows)
+        self._moments += np.stack([place**2, place**3, place**4]) @ finite
+        self.count += len(rows)
+
+    def value(self) -> Array:
+        """The mean ``(columns,)`` so far; ``nan`` of nothing, minus infinity once such an entry came."""
+        if self.count == 0:
+            return np.full(self._moments.shape[1], np.nan)
+        mean = _tapered(self._moments[:, None], np.array([self.count]))[0]
+        return np.where(self._collapsed, -np.inf, mean)
+
+
+def running_tapered_mean(series: Array) -> Array:
+    """`TaperedMean` of the first 1, 2, ... rows of a series ``(M, k)``, as rows ``(M, k)``."""
+    place = np.arange(len(series))[:, None] + 0.5
+    finite = np.where(series == -np.inf, 0.0, series)
+    moments = np.stack([np.cumsum(place**power * finite, axis=0) for power in (2, 3, 4)])
+    collapsed = np.logical_or.accumulate(series == -np.inf, axis=0)
+    return np.where(collapsed, -np.inf, _tapered(moments, np.arange(1, len(series) + 1)))
+
+
+def _tapered(moments: Array, count: Array) -> Array:
+    """Tapered means ``(m, k)`` from the moments ``(3, m, k)`` of the first ``count (m,)`` rows."""
+    size = np.asarray(count, dtype=float)[:, None]
+    # Sum of the weights, in closed form by the sums of even powers at half-integers.
+    square = size * (4 * size**2 - 1) / 12
+    cube = size**2 * (2 * size**2 - 1) / 8
+    fourth = size * (48 * size**4 - 40 * size**2 + 7) / 240
+    total = size**2 * square - 2 * size * cube + fourth
+    return (size**2 * moments[0] - 2 * size * moments[1] + moments[2]) / total
+
+
+def taper_inflation() -> float:
+    """Standard error of the tapered mean over that of the plain one, on noise: ``sqrt(10 / 7)``."""
+    return math.sqrt(10.0 / 7.0)

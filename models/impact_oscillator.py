@@ -70,8 +70,8 @@ def one_impact_orbits(
     With :math:`x_p = R \cos(\varphi)`, :math:`\varphi = w t - \psi`, the forced response and :math:`\Phi` the
     free flow over :math:`T = 2 \pi n / w`, the orbit closes if
     :math:`(\Phi - I)(d - x_p, -\dot x_p)^\top = V\, (\Phi\, (0, r)^\top + (0, 1)^\top)`. So
-    :math:`d - x_p = a V`, :math:`-\dot x_p = b V`, and :math:`\cos^2 \varphi + \sin^2 \varphi = 1` leaves a quadratic in
-    :math:`V`. Roots with ``V <= 0`` or that pass the stop between impacts are left out.
+    :math:`d - x_p = a V`, :math:`-\dot x_p = b V`, and :math:`\cos^2 \varphi + \sin^2 \varphi = 1` leaves a
+    quadratic in :math:`V`. Roots with ``V <= 0`` or that pass the stop between impacts are left out.
 
     Parameters
     ----------

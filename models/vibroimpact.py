@@ -35,8 +35,8 @@ def vibroimpact() -> HybridSystem:
     and at D = 0.05 m the Floquet exponent at omega = 7.40 is -0.0548936 against the paper's -0.056.
 
     Slips of the printed paper, put right above: its second equation has ``omega_1`` and ``m_1`` where
-    ``omega_2`` and ``m_2`` belong; an ``omega_3`` appears that nothing defines; ``z = x2 - x1`` stands against
-    ``Fcon(x1 - x2)``; and the entry ``a34`` of its linearisation lacks ``chi``.
+    ``omega_2`` and ``m_2`` belong; an ``omega_3`` appears that nothing defines; ``z = x2 - x1`` stands
+    against ``Fcon(x1 - x2)``; and the entry ``a34`` of its linearisation lacks ``chi``.
 
     Known facts:
 
@@ -44,9 +44,9 @@ def vibroimpact() -> HybridSystem:
       ``-(2 xi1 omega1 + 2 xi2 omega2 chi + 2 xi2 omega2)``, -0.8995392 with the defaults.
     - At omega = 7.40 an orbit of one period and one impact is stable, with exponents -0.05489357 and
       -0.39487603, twice each; at 7.46 there is a torus, at 7.92 chaos, and other attractors coexist.
-    - Field and state are continuous at both transitions: their saltation matrices are the identity. Yet the
-      contact's stiffness starts like the square root of the penetration and lasts under a thousandth of a period
-      or so, and it acts on tangents as much as a rigid impact does: they need error control of their own.
+    - Field and state are continuous at both transitions: their saltation matrices are the identity. Yet a
+      contact lasts a thousandth of a period, its stiffness starts like the square root of the penetration,
+      and it turns tangent vectors as much as a rigid impact does: they need error control of their own.
 
     References
     ----------

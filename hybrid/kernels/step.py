@@ -4,7 +4,7 @@ import math
 
 from numba import float64, int64, njit, void
 
-from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
 
 
 @njit(float64(MODEL, int64, float64, VECTOR, int64, MATRIX, VECTOR), **KERNEL)
@@ -28,6 +28,12 @@ def rates(model, mode, t, y, tangents, jacobian, out):
     for i in range(n):
         divergence += jacobian[i, i]
     return divergence
+
+
+@njit(void(MODEL, int64, float64, VECTOR, MATRIX), **ENTRY)
+def flow_jacobian(model, mode, t, x, out):
+    """``(D_x f, D_t f)`` into ``out (n, n + 1)``."""
+    model.flow_jacobian(mode, t, x, model.parameters, out)
 
 
 @njit(void(VECTOR, float64, VECTOR, MATRIX, int64, int64, VECTOR), **KERNEL)

@@ -10,9 +10,10 @@ from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 def solvable_oscillator() -> HybridSystem:
     """``u'' - 2 b u' + (w^2 + b^2)(u - s) = 0``, ``w = 2 pi``; ``s = sgn(u)`` whenever ``u' = 0``.
 
-    From ``abs(u) < 1`` the other turning points, where ``s`` is kept, all have ``abs(u) > 1``. So ``s`` flips where
-    the velocity turns towards ``s`` on the far side of zero, which the minimum (maximum) of two signs expresses.
-    A turning point where ``s`` already has the sign of ``u`` is then no zero of the guard.
+    In mode ``plus`` the sign must change where the velocity rises through zero at negative ``u``. There, and
+    only there, the smaller of ``v`` and ``-u`` rises through zero, since ``u`` cannot fall through zero while
+    ``v`` is positive. A turning point at which ``s`` already has the sign of ``u``, such as the start, is no
+    zero of it.
     """
 
     def field(s):
@@ -50,8 +51,8 @@ def rimless_wheel() -> HybridSystem:
 def buck_converter() -> HybridSystem:
     """Voltage-mode buck converter whose ramp is driven by a clock, a state: ``tau`` runs from 0 to 1.
 
-    The ramp jumps back at the end of its period. As a state with a reset the clock makes that an event like any
-    other and every model function smooth, where a function of time with a jump would be neither.
+    The ramp jumps back at the end of its period. With the clock a state and its return a reset, that is an
+    event like any other and every model function is smooth; a ramp made a function of time would be neither.
     """
 
     def error(x, p):
@@ -96,8 +97,8 @@ def switched_linear() -> HybridSystem:
 def stick_slip() -> HybridSystem:
     """Block on a belt with friction that falls with speed; the block never outruns the belt.
 
-    The release is a fold: at ``x = Fs`` the slip begins with ``v = belt`` and no acceleration, on the guard of the
-    next sticking, which it leaves with ``v'' = -belt``.
+    The release is a fold: at ``x = Fs`` the slip begins with ``v = belt`` and no acceleration, on the guard
+    of the next sticking, which it leaves with ``v'' = -belt``.
     """
 
     def slip(t, x, p):

@@ -39,7 +39,7 @@ def test_a_wrong_entry_is_named_with_point_given_and_expected():
 
 
 def test_the_complex_step_catches_the_eighth_digit():
-    with pytest.raises(ModelError, match="entry D_v of q is 1.00000001"):
+    with pytest.raises(ModelError, match=r"entry D_v of q is 1\.00000001"):
         oscillator(lambda t, x, p: ((0, 1 + 1e-8, 0), (-3 * p.k * x.q**2, 0, -p.w * np.sin(p.w * t))))
 
 

@@ -1,15 +1,15 @@
-"""The founding system's orbits and multipliers, to some twenty digits and without differential-equation solvers.
+"""The founding system's orbits and multipliers, to twenty digits and more.
 
-Free flight is linear and solved in closed form. In contact the force ``z^(3/2)`` is not smooth at the ends, so
-time is rescaled by ``dt = w ds`` with ``w = sqrt(z)``: the equations become polynomial in
-``(w, x2, v1, v2, t, cos, sin)``, impact and release are simple zeros of ``w``, and a Taylor series converges. The
-map over forcing periods is differentiated by central differences at fifty digits, where these lose nothing.
+Free flight is linear and solved in closed form. In contact the force ``z^(3/2)`` is not smooth at the ends,
+so time is rescaled by ``dt = w ds`` with ``w = sqrt(z)``: the equations become polynomial in
+``(w, x2, v1, v2, t, cos, sin)``, impact and release are simple zeros of ``w``, and a Taylor series converges.
+The map over forcing periods is differentiated by central differences at fifty digits, where these lose
+nothing that a double could hold.
 """
 
 from __future__ import annotations
 
 import mpmath as mp
-import numpy as np
 
 M1, OMEGA1, XI1 = mp.mpf(1000), mp.mpf("6.283"), mp.mpf("0.036")
 M2, OMEGA2, XI2 = mp.mpf(100), mp.mpf("5.646"), mp.mpf("0.036")
@@ -40,7 +40,8 @@ class FoundingSystem:
     def __init__(self, D: str):
         with mp.workdps(60):
             self.D = mp.mpf(D)
-            self.K = mp.mpf(4) / 3 * mp.mpf("0.318") * mp.mpf("2.1e11") * mp.pi / (2 * (1 - mp.mpf("0.3") ** 2))
+            softness = (1 - mp.mpf("0.3") ** 2) / (mp.mpf("2.1e11") * mp.pi)
+            self.K = mp.mpf(4) / 3 * mp.mpf("0.318") / (2 * softness)
             self._solve_free_flight()
 
     def _solve_free_flight(self) -> None:
@@ -82,7 +83,8 @@ class FoundingSystem:
             gaps = [gap(t) for t in samples]
         for left, right, a, b in zip(samples, samples[1:], gaps, gaps[1:], strict=False):
             if a < 0 <= b:
-                return mp.findroot(gap, (left, right), solver="illinois", tol=mp.mpf(10) ** (-2 * mp.mp.dps + 10))
+                tolerance = mp.mpf(10) ** (-2 * mp.mp.dps + 10)  # of the gap squared
+                return mp.findroot(gap, (left, right), solver="illinois", tol=tolerance)
         return None
 
     def contact(self, x, t0):
@@ -101,7 +103,7 @@ class FoundingSystem:
 
     def contact_series(self, y):
         """Taylor coefficients in ``s`` of ``(w, x2, v1, v2, t, cos, sin)``."""
-        w, x2, v1, v2, t, cos, sin = series = [[value] for value in y]
+        w, x2, v1, v2, _, cos, sin = series = [[value] for value in y]
         z, force, a1, a2 = [], [], [], []
         for k in range(TAYLOR_ORDER):
             z.append(_product(w, w, k))
@@ -163,12 +165,12 @@ def _orbit_facts(system, guess, periods):
         multipliers, _ = mp.eig(system.jacobian(x, periods))
         T = 2 * mp.pi * periods / OMEGA
         exponents = sorted((mp.log(abs(m)) / T for m in multipliers), reverse=True)
-        multipliers = np.array([complex(m) for m in multipliers])
+        multipliers = sorted(map(complex, multipliers), key=lambda m: (-round(abs(m), 12), m.imag))
         return {
             "x0": [float(v) for v in x],
             "periods": periods,
             "impacts": impacts,
             "residual": float(mp.norm(image - x)),
-            "multipliers": [[m.real, m.imag] for m in sorted(multipliers, key=lambda m: (-round(abs(m), 12), m.imag))],
+            "multipliers": [[m.real, m.imag] for m in multipliers],
             "exponents": [float(e) for e in exponents],
         }

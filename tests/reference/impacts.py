@@ -1,4 +1,4 @@
-"""Impact oscillator and bouncing ball: free flight in closed form, impacts by root finding at forty digits."""
+"""Impact oscillator and bouncing ball: flight in closed form, impacts by root finding at forty digits."""
 
 from __future__ import annotations
 
@@ -22,11 +22,9 @@ def impact_oscillator() -> dict:
         for values, guess in PARAMETER_SETS:
             oscillator = ImpactOscillator(*values)
             for V, theta in oscillator.one_impact_orbits(guess):
-                orbits.append(
-                    dict(zip(("k", "c", "A", "w", "d", "r", "n"), values, strict=True))
-                    | {"V": float(V), "theta": float(theta)}
-                    | {"multipliers": [[float(m.real), float(m.imag)] for m in oscillator.multipliers(V, theta)]}
-                )
+                parameters = dict(zip(("k", "c", "A", "w", "d", "r", "n"), values, strict=True))
+                pairs = [[float(m.real), float(m.imag)] for m in oscillator.multipliers(V, theta)]
+                orbits.append(parameters | {"V": float(V), "theta": float(theta), "multipliers": pairs})
         return {"orbits": orbits, "flight": ImpactOscillator(*PARAMETER_SETS[0][0]).impacts((0, 0), 20)}
 
 
@@ -111,14 +109,14 @@ class ImpactOscillator:
         return all(state(t0 + T * i / 2000)[0] < self.d for i in range(1, 2000))
 
     def multipliers(self, V, theta):
-        """From central differences of the impact map ``(V, theta) -> (V, theta)``, no saltation matrix used."""
+        """By central differences of the map from ``(V, theta)`` to the next impact; no saltation matrix."""
         T, step = 2 * mp.pi * self.n / self.w, mp.mpf(10) ** -13
 
         def impact_map(V, theta):
             t0 = theta / self.w
             state = self.flight(self.d, -self.r * V, t0)
             gap = lambda t: state(t)[0] - self.d  # noqa: E731
-            t = mp.findroot(gap, (t0 + T * (1 - mp.mpf("1e-9")), t0 + T), solver="secant", tol=mp.mpf(10) ** -70)
+            t = mp.findroot(gap, (t0 + T * (1 - mp.mpf("1e-9")), t0 + T), tol=mp.mpf(10) ** -70)
             return mp.matrix([state(t)[1], self.w * t])
 
         dV = (impact_map(V + step, theta) - impact_map(V - step, theta)) / (2 * step)

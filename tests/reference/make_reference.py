@@ -1,7 +1,7 @@
 """Write the JSON files beside this script: exact or high-precision answers, computed without the library.
 
-Every number is correct to the last digit or two of a double, since all are computed with at least 25 digits and rounded
-at the end. Run ``python tests/reference/make_reference.py`` (about two minutes).
+All are computed with thirty digits or more and rounded to doubles at the end, so every digit counts.
+Run ``python tests/reference/make_reference.py``; it takes about four minutes.
 """
 
 from __future__ import annotations

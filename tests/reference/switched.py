@@ -1,4 +1,4 @@
-"""Systems that switch: oscillator with a solvable map, rimless wheel, converter, friction, saltation by hand."""
+"""Systems that switch: solvable oscillator, rimless wheel, converter, friction, saltation by hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STEP = mp.mpf("0.05")
 
 
 def solvable_oscillator(b=0.5, u0=0.3, count=20) -> dict:
-    """Corron, Blakely and Stahl: the map at integer times, the spectrum, the saltation matrix of each flip."""
+    """Corron, Blakely and Stahl: the map at whole times, spectrum, the saltation matrix of each flip."""
     with mp.workdps(DIGITS):
         b, u = mp.mpf(b), mp.mpf(u0)
         orbit, saltation = [u], []
@@ -38,12 +38,13 @@ def rimless_wheel(length="1", g="9.8", alpha=None, gamma="0.08") -> dict:
         omega = mp.cot(2 * alpha) * mp.sqrt(4 * g / length * mp.sin(alpha) * mp.sin(gamma))
         start = gamma - alpha
         speed = lambda th: mp.sqrt(omega**2 + 2 * g / length * (mp.cos(start) - mp.cos(th)))  # noqa: E731
+        saltation = _wheel_saltation(g / length, alpha, gamma, omega)
         return {
             "theta": float(start),
             "omega": float(omega),
             "period": float(mp.quad(lambda th: 1 / speed(th), [start, 0, gamma + alpha])),
             "multipliers": [1.0, float(mp.cos(2 * alpha) ** 2)],
-            "saltation": [[float(v) for v in row] for row in _wheel_saltation(g / length, alpha, gamma, omega)],
+            "saltation": [[float(v) for v in row] for row in saltation],
         }
 
 
@@ -133,7 +134,7 @@ def stick_slip(belt="0.2", delta="3") -> dict:
         while slip[-1][2] <= belt:
             t, x, v = slip[-1]
             slip.append((t + STEP, *_slip_step(x, v, STEP, belt, delta)))
-        t_turn, x_largest = _slip_until(slip, 0, -1, belt, delta)
+        _, x_largest = _slip_until(slip, 0, -1, belt, delta)
         t_slip, x_restick = _slip_until(slip, belt, +1, belt, delta)
         t_stick = (1 - x_restick) / belt
         return {

@@ -1,0 +1,117 @@
+"""What NumPy's universal functions do to SymPy expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import sympy
+from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+
+from hybrid.symbolic import (
+    HALF,
+    ONE,
+    ZERO,
+    Absolute,
+    And,
+    Atan2,
+    Ceiling,
+    CubeRoot,
+    Equal,
+    Floor,
+    Less,
+    LessEqual,
+    Maximum,
+    Minimum,
+    Not,
+    Or,
+    Remainder,
+    Select,
+    Sign,
+    Truncate,
+    TruncatedRemainder,
+    number,
+)
+
+
+def _clip(a: sympy.Expr, low: sympy.Expr, high: sympy.Expr) -> sympy.Expr:
+    return Minimum(Maximum(a, low), high)
+
+
+def _heaviside(a: sympy.Expr, at_zero: sympy.Expr) -> sympy.Expr:
+    return Select(Less(a, ZERO), ZERO, Select(Less(ZERO, a), ONE, at_zero))
+
+
+DEGREE = number(np.pi / 180.0)
+
+# By the name of the ufunc, which its aliases share.
+RULES: dict[str, Callable[..., sympy.Expr]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+    "floor_divide": lambda a, b: Floor(a / b),
+    "remainder": Remainder,
+    "fmod": TruncatedRemainder,
+    "power": lambda a, b: a**b,
+    "float_power": lambda a, b: a**b,
+    "negative": lambda a: -a,
+    "positive": lambda a: a,
+    "absolute": Absolute,
+    "fabs": Absolute,
+    "sign": Sign,
+    "square": lambda a: a**2,
+    "reciprocal": lambda a: 1 / a,
+    "sqrt": lambda a: a**HALF,
+    "cbrt": CubeRoot,
+    "exp": sympy.exp,
+    "exp2": exp2,
+    "expm1": expm1,
+    "log": sympy.log,
+    "log2": log2,
+    "log10": log10,
+    "log1p": log1p,
+    "sin": sympy.sin,
+    "cos": sympy.cos,
+    "tan": sympy.tan,
+    "arcsin": sympy.asin,
+    "arccos": sympy.acos,
+    "arctan": sympy.atan,
+    "arctan2": Atan2,
+    "sinh": sympy.sinh,
+    "cosh": sympy.cosh,
+    "tanh": sympy.tanh,
+    "arcsinh": sympy.asinh,
+    "arccosh": sympy.acosh,
+    "arctanh": sympy.atanh,
+    "hypot": hypot,
+    "deg2rad": lambda a: DEGREE * a,
+    "radians": lambda a: DEGREE * a,
+    "rad2deg": lambda a: a / DEGREE,
+    "degrees": lambda a: a / DEGREE,
+    "floor": Floor,
+    "ceil": Ceiling,
+    "trunc": Truncate,
+    "maximum": Maximum,
+    "minimum": Minimum,
+    "fmax": Maximum,
+    "fmin": Minimum,
+    "clip": _clip,
+    "heaviside": _heaviside,
+    "less": Less,
+    "less_equal": LessEqual,
+    "greater": lambda a, b: Less(b, a),
+    "greater_equal": lambda a, b: LessEqual(b, a),
+    "equal": Equal,
+    "not_equal": lambda a, b: Not(Equal(a, b)),
+    "logical_and": And,
+    "logical_or": Or,
+    "logical_not": Not,
+    # Python's &, | and ~ on truth values
+    "bitwise_and": And,
+    "bitwise_or": Or,
+    "invert": Not,
+}
+
+# These contract arrays by sums of products, which object arrays do through the scalars' operators.
+CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")
