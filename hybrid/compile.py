@@ -1,4 +1,4 @@
-"""From a model to machine code: six small functions a model, called by kernels that all models share."""
+"""From a model to machine code: a handful of small functions a model, called by kernels that all models share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hybrid.emit import Emitted
     from hybrid.system import HybridSystem
 
-ROLES = ("flow", "flow_jacobian", "guard", "guard_gradient", "reset", "reset_jacobian")
+ROLES = ("flow", "flow_jacobian", "variational_flow", "guard", "guard_gradient", "reset", "reset_jacobian")
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -35,7 +35,7 @@ class CompiledSystem:
     emitted
         The generated source and what tracing could prove of the model.
     roles
-        The six compiled functions, in the order of ``ROLES``.
+        The compiled functions, in the order of ``ROLES``.
     """
 
     system: HybridSystem

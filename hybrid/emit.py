@@ -1,12 +1,14 @@
-"""The Python source of a system's six compiled roles.
+"""The Python source of a system's compiled roles.
 
 Each role is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
 fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
-columns, time last.
+columns, time last. The variational flow is the one role that reads all of ``x (n (1 + k),)``: the state and ``k`` tangent
+vectors. It writes their derivatives and, one place further, the divergence of the field.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +27,9 @@ from hybrid.trace import Symbols, TraceError, model_symbols, trace
 if TYPE_CHECKING:
     from hybrid.system import HybridSystem
 
+# A cell of a matrix in the statements for a derivative.
+_CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
+
 
 @attrs.frozen
 class Emitted:
@@ -33,8 +38,8 @@ class Emitted:
     Parameters
     ----------
     source
-        Text of a module with the functions ``flow``, ``flow_jacobian``, ``guard``, ``guard_gradient``,
-        ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. The same model gives the
+        Text of a module with the functions ``flow``, ``flow_jacobian``, ``variational_flow``, ``guard``,
+        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. The same model gives the
         same text, in any process.
     opaque
         What the text refers to by name: the model functions that tracing could not follow, to be
@@ -56,7 +61,7 @@ class Emitted:
 
 
 def emit(system: HybridSystem) -> Emitted:
-    """Trace and differentiate every function of a system, and write the source of its six roles.
+    """Trace and differentiate every function of a system, and write the source of its roles.
 
     Raises
     ------
@@ -71,6 +76,7 @@ def emit(system: HybridSystem) -> Emitted:
     functions = (
         _function("flow", [field.value for field in fields]),
         _function("flow_jacobian", [field.derivative for field in fields]),
+        _function("variational_flow", [_variational(field, system.dimension) for field in fields]),
         _function("guard", [guard.value for guard in guards]),
         _function("guard_gradient", [guard.derivative for guard in guards]),
         _function("reset", [reset.value for reset in resets]),
@@ -94,6 +100,7 @@ class _Written:
     derivative: list[str]
     expressions: list[sympy.Expr] | None = None
     jacobian: list[list[sympy.Expr]] | None = None
+    given: bool = False
 
 
 class _Writer:
@@ -116,7 +123,8 @@ class _Writer:
             derivative = assignments(self._cells(role), [entry for row in jacobian for entry in row])
         else:
             derivative = self._given_derivative(role, role.derivative)
-        return _Written(assignments(targets, expressions), derivative, expressions, jacobian)
+        given = role.derivative is not None
+        return _Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
     def identity(self) -> _Written:
         """The reset of a transition that has none."""
@@ -234,6 +242,27 @@ def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n"
+
+
+def _variational(field: _Written, n: int) -> list[str]:
+    """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
+
+    Entries that are proved zero cost nothing, and what field and Jacobian share is computed once.
+    """
+    entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
+    if field.expressions is None or field.jacobian is None or field.given:
+        local = [_CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
+        lines = [*field.value, *local]
+    else:
+        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}
+        targets = [*(f"out[{i}]" for i in range(n)), *entry.values()]
+        lines = assignments(targets, [*field.expressions, *(field.jacobian[i][j] for i, j in entry)])
+    lines.append(f"for v in range({n}, len(x), {n}):")
+    for i in range(n):
+        terms = [f"{entry[i, j]}*x[v + {j}]" for j in range(n) if (i, j) in entry]
+        lines.append(f"    out[v + {i}] = {' + '.join(terms) or '0.0'}")
+    trace = [entry[i, i] for i in range(n) if (i, i) in entry]
+    return [*lines, f"out[len(x)] = {' + '.join(trace) or '0.0'}"]
 
 
 def _is_affine(written: _Written, variables: Sequence[sympy.Symbol]) -> bool:

@@ -51,8 +51,8 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
     nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
     width = max(degree, FIT_DEGREE) + 4
     return Work(
-        stages=np.zeros((stages, length)),
-        traces=np.zeros(stages),
+        stages=np.zeros((stages, length + 1)),
+        speeds=np.zeros(stages),
         trial=np.zeros(length),
         new=np.zeros(length),
         error=np.zeros(length),

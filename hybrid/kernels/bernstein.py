@@ -5,9 +5,9 @@ and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 
 else is cut in two. The coefficients' hull makes "no root" the cheap case, which nearly every step is.
 """
 
-from numba import float64, int64, njit, types
+from numba import boolean, float64, int64, njit, types
 
-from hybrid.kernels.layout import KERNEL, MATRIX, VECTOR
+from hybrid.kernels.layout import INLINE, KERNEL, MATRIX, VECTOR
 
 NO_ROOT = 2.0
 # Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
@@ -114,6 +114,15 @@ def first_crossing(coefficients, degree, side, direction, stack):
             if direction == 0 or direction == after:
                 return 1.0, side
     return NO_ROOT, side
+
+
+@njit(boolean(VECTOR, int64, int64), **INLINE)
+def stays(coefficients, degree, side):
+    """Whether all coefficients have the sign ``side``: the proof that serves nearly every step."""
+    for i in range(degree + 1):
+        if not coefficients[i] * side > 0.0:
+            return False
+    return True
 
 
 @njit(int64(VECTOR, int64), **KERNEL)

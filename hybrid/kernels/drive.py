@@ -12,6 +12,8 @@ from hybrid.kernels.codes import (
     ENTERING,
     JUMPS,
     JUMPS_HERE,
+    LAST_RATIO,
+    LAST_STEP,
     MAX_JUMPS,
     MAX_STEPS,
     MODE,
@@ -32,7 +34,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.kernels.guards import earliest_crossing, guard_speed, guard_value, land, rounding_band
 from hybrid.kernels.jump import enter, jump
-from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
 from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rates, starting_step
 
 SAFETY = 0.9
@@ -60,7 +62,7 @@ def arrived(model, run, work):
     return NO_TRANSITION
 
 
-@njit(boolean(MODEL, int64), **KERNEL)
+@njit(boolean(MODEL, int64), **INLINE)
 def all_affine(model, mode):
     """Whether every guard of the mode is affine, so that no interpolant of the state is needed to follow them."""
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -83,7 +85,7 @@ def remember_step(model, method, run, record, t, h, work):
     record.used[0] = slot + 1
 
 
-@njit(void(MODEL, METHOD, RUN, int64, float64, float64, WORK), **KERNEL)
+@njit(void(MODEL, METHOD, RUN, int64, float64, float64, WORK), **INLINE)
 def accept(model, method, run, tangents, h, correction, work):
     """Move the run to the end of the attempted step in ``work.new``."""
     n = model.dimension
@@ -92,10 +94,11 @@ def accept(model, method, run, tangents, h, correction, work):
     for i in range(n * (1 + tangents)):
         run.y[i] = work.new[i]
     if tangents > 0:
+        s, place = method.b.shape[0], n * (1 + tangents)
         total = 0.0
-        for j in range(method.b.shape[0]):
-            total += method.b[j] * work.traces[j]
-        run.clock[DIVERGENCE] += h * total + correction * work.traces[method.b.shape[0]]
+        for j in range(s):
+            total += method.b[j] * work.stages[j, place]
+        run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
     mode = run.count[MODE]
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         run.on_guard[model.outgoing[slot]] = 0
@@ -107,13 +110,26 @@ def accept(model, method, run, tangents, h, correction, work):
     run.clock[PHASE] = phase
 
 
-@njit(void(METHOD, int64, WORK), **KERNEL)
+@njit(void(METHOD, int64, WORK), **INLINE)
 def carry_rates(method, length, work):
     """The rates at the end of a step are those at the start of the next."""
     s = method.b.shape[0]
-    work.traces[0] = work.traces[s]
-    for i in range(length):
+    for i in range(length + 1):
         work.stages[0, i] = work.stages[s, i]
+
+
+@njit(float64(METHOD, RUN, float64, float64), **INLINE)
+def growth_factor(method, run, h, ratio):
+    """Factor to the next step from this error ratio, and from its trend over the last two steps.
+
+    The trend (Gustafsson 1994, doi:10.1145/198429.198437) foresees the shrinking steps towards a singularity, such as
+    the end of a Hertz contact, where each step would otherwise be tried too long.
+    """
+    factor = ratio ** (-method.exponent)
+    if run.clock[LAST_STEP] > 0.0:
+        trend = h / run.clock[LAST_STEP] * (run.clock[LAST_RATIO] / ratio) ** method.exponent
+        factor = min(factor, factor * trend)
+    return min(GROW, max(SHRINK, SAFETY * factor))
 
 
 @njit(boolean(RUN, int64), **KERNEL)
@@ -166,6 +182,7 @@ def advance(
             if mode != run.count[PREVIOUS_MODE]:
                 run.clock[NEXT_STEP] = run.first_step[mode]
                 run.first_step[mode] = 0.0
+            run.clock[LAST_STEP] = 0.0
             run.count[PHASE_OF_RUN] = STALE
         t = run.clock[PHASE]
         remaining = (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - t)
@@ -175,7 +192,7 @@ def advance(
                 continue
             return DONE
         if run.count[PHASE_OF_RUN] == STALE:
-            work.traces[0] = rates(model, mode, t, run.y, tangents, work.jacobian, work.stages[0])
+            rates(model, mode, t, run.y, tangents, work.stages[0])
             if run.clock[NEXT_STEP] <= 0.0:
                 run.clock[NEXT_STEP] = starting_step(model, method, mode, t, run.y, tangents, work)
             if not run.clock[NEXT_STEP] > 0.0:
@@ -197,8 +214,9 @@ def advance(
             if h * shrink <= 4.0 * EPSILON * abs(t) or h * shrink < 1e-200:
                 return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE
             continue
-        grow = min(GROW, max(SHRINK, SAFETY * max(ratio, 1e-16) ** (-method.exponent)))
+        grow = growth_factor(method, run, h, max(ratio, 1e-16))
         run.clock[NEXT_STEP] = max(proposed, h * grow) if last else h * grow
+        run.clock[LAST_STEP], run.clock[LAST_RATIO] = h, max(ratio, 1e-16)
         fired = NO_TRANSITION
         theta = 0.0
         if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:

@@ -4,9 +4,9 @@ import math
 
 from numba import float64, int64, njit, types, void
 
-from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing
+from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
 from hybrid.kernels.codes import MODE, NO_TRANSITION
-from hybrid.kernels.layout import ENTRY, KERNEL, MATRIX, METHOD, MODEL, RUN, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, RUN, VECTOR, WORK
 from hybrid.kernels.step import attempt, rates
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size;
@@ -18,7 +18,7 @@ SHORTEST_CUT = 1e-12
 EULER_IS_ENOUGH = 1e-8
 
 
-@njit(float64(MODEL, int64, float64, VECTOR, VECTOR), **KERNEL)
+@njit(float64(MODEL, int64, float64, VECTOR, VECTOR), **INLINE)
 def guard_value(model, transition, t, x, scalar):
     """``g(t, x, p)``; ``scalar (1,)`` is scratch."""
     model.guard(transition, t, x, model.parameters, scalar)
@@ -32,7 +32,7 @@ def guard_values(model, t, x, out):
         model.guard(transition, t, x, model.parameters, out[transition : transition + 1])
 
 
-@njit(float64(MODEL, int64, float64, VECTOR, VECTOR, VECTOR), **KERNEL)
+@njit(float64(MODEL, int64, float64, VECTOR, VECTOR, VECTOR), **INLINE)
 def guard_speed(model, transition, t, x, field, gradient):
     """Transversality ``D_t g + D_x g f``; leaves ``(D_x g, D_t g)`` in ``gradient (n + 1,)``."""
     model.guard_gradient(transition, t, x, model.parameters, gradient)
@@ -42,22 +42,22 @@ def guard_speed(model, transition, t, x, field, gradient):
     return speed
 
 
-@njit(int64(MODEL, METHOD, int64, float64, float64, VECTOR, float64, WORK), **KERNEL)
+@njit(int64(MODEL, METHOD, int64, float64, float64, VECTOR, float64, WORK), **INLINE)
 def affine_polynomial(model, method, transition, t, h, x, value, work):
     """Bernstein coefficients of an affine guard along the step, exactly those of the interpolant; returns the degree."""
     n = model.dimension
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
-    degree = method.interpolant.shape[0] - 1
-    for i in range(degree + 1):
-        work.polynomial[i] = value + h * work.gradient[n] * i / degree
-    for j in range(method.a.shape[0]):
-        stage = work.stages[j]
+    degree, count = method.interpolant.shape[0] - 1, method.a.shape[0]
+    for j in range(count):
         speed = 0.0
         for i in range(n):
-            speed += work.gradient[i] * stage[i]
-        speed *= h
-        for i in range(degree + 1):
-            work.polynomial[i] += method.interpolant[i, j] * speed
+            speed += work.gradient[i] * work.stages[j, i]
+        work.speeds[j] = h * speed
+    for i in range(degree + 1):
+        total = value + h * work.gradient[n] * i / degree
+        for j in range(count):
+            total += method.interpolant[i, j] * work.speeds[j]
+        work.polynomial[i] = total
     return degree
 
 
@@ -142,7 +142,7 @@ def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
     return NO_ROOT, side
 
 
-@njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, WORK), **KERNEL)
+@njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, WORK), **INLINE)
 def earliest_crossing(model, method, run, t, h, work):
     """Earliest crossing on the attempted step over all guards of the mode, and its transition.
 
@@ -161,6 +161,8 @@ def earliest_crossing(model, method, run, t, h, work):
             degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
             for _ in range(on_guard):
                 degree = divide_by_theta(work.polynomial, degree)
+            if stays(work.polynomial, degree, side):
+                continue
             theta, side = first_crossing(
                 work.polynomial, degree, side, model.direction[transition], work.stack
             )

@@ -19,7 +19,7 @@ MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 
 
 class Model(NamedTuple):
-    """The six roles of a compiled system, its parameters and its graph as index arrays.
+    """The roles of a compiled system, its parameters and its graph as index arrays.
 
     ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the transitions that leave mode ``m``, in the
     order they were listed. ``boundary`` is 1 for a transition that a state on the far side of its guard
@@ -28,6 +28,7 @@ class Model(NamedTuple):
 
     flow: object
     flow_jacobian: object
+    variational_flow: object
     guard: object
     guard_gradient: object
     reset: object
@@ -48,6 +49,7 @@ MODEL = types.NamedTuple(
     (
         VECTOR_ROLE,
         MATRIX_ROLE,
+        VECTOR_ROLE,
         VECTOR_ROLE,
         VECTOR_ROLE,
         VECTOR_ROLE,
@@ -119,14 +121,14 @@ RUN = types.NamedTuple((INDICES, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTO
 class Work(NamedTuple):
     """Scratch memory, allocated once a run.
 
-    ``stages (S, N)`` and ``traces (S,)`` of the current step; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``;
+    ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``;
     ``gradient (n + 1,)``; ``scalar (1,)``; ``field, field_after, state (n,)``; ``saltation (n, n)``; ``coefficients (d + 1, n)`` of the
     step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``nodes (q + 1,)`` and
     ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
     """
 
     stages: np.ndarray
-    traces: np.ndarray
+    speeds: np.ndarray
     trial: np.ndarray
     new: np.ndarray
     error: np.ndarray
@@ -150,7 +152,7 @@ class Work(NamedTuple):
 WORK = types.NamedTuple(
     (
         MATRIX,  # stages
-        VECTOR,  # traces
+        VECTOR,  # speeds
         VECTOR,  # trial
         VECTOR,  # new
         VECTOR,  # error
@@ -196,5 +198,13 @@ INDEX_MATRIX = int64[:, ::1]
 RECORD = types.NamedTuple((INDICES, MATRIX, INDEX_MATRIX, CUBE, MATRIX, INDEX_MATRIX, CUBE, CUBE), Record)
 
 # A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time to compile.
-ENTRY = {"nogil": True, "error_model": "numpy", "cache": True}
+# Sums may be reordered and fused, but nan and infinity keep their meaning.
+ENTRY = {
+    "nogil": True,
+    "error_model": "numpy",
+    "cache": True,
+    "fastmath": {"contract", "reassoc", "nsz"},
+}
 KERNEL = ENTRY | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# Small and called at every stage: passing the tuples would cost as much as the work.
+INLINE = KERNEL | {"forceinline": True}

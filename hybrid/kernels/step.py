@@ -4,30 +4,16 @@ import math
 
 from numba import float64, int64, njit, void
 
-from hybrid.kernels.layout import ENTRY, KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
 
 
-@njit(float64(MODEL, int64, float64, VECTOR, int64, MATRIX, VECTOR), **KERNEL)
-def rates(model, mode, t, y, tangents, jacobian, out):
-    """Time derivative of ``y (n (1 + k),)`` into ``out``: ``f`` for the state, ``D_x f v`` for each tangent.
-
-    Returns div f, or 0 without tangents.
-    """
-    n = model.dimension
-    model.flow(mode, t, y, model.parameters, out)
+@njit(void(MODEL, int64, float64, VECTOR, int64, VECTOR), **INLINE)
+def rates(model, mode, t, y, tangents, out):
+    """Time derivative of ``y (n (1 + k),)`` into ``out``, with div f in the place after it if there are tangents."""
     if tangents == 0:
-        return 0.0
-    model.flow_jacobian(mode, t, y, model.parameters, jacobian)
-    for start in range(n, n * (1 + tangents), n):
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += jacobian[i, j] * y[start + j]
-            out[start + i] = total
-    divergence = 0.0
-    for i in range(n):
-        divergence += jacobian[i, i]
-    return divergence
+        model.flow(mode, t, y, model.parameters, out)
+    else:
+        model.variational_flow(mode, t, y, model.parameters, out)
 
 
 @njit(void(MODEL, int64, float64, VECTOR, MATRIX), **ENTRY)
@@ -36,22 +22,20 @@ def flow_jacobian(model, mode, t, x, out):
     model.flow_jacobian(mode, t, x, model.parameters, out)
 
 
-@njit(void(VECTOR, float64, VECTOR, MATRIX, int64, int64, VECTOR), **KERNEL)
+@njit(void(VECTOR, float64, VECTOR, MATRIX, int64, int64, VECTOR), **INLINE)
 def combine(y, h, weights, stages, count, length, out):
     """``out = y + h * weights @ stages`` over the first ``count`` stages and ``length`` components."""
     for i in range(length):
-        out[i] = 0.0
+        out[i] = y[i]
     for j in range(count):
-        weight = weights[j]
+        weight = h * weights[j]
         if weight != 0.0:
             stage = stages[j]
             for i in range(length):
                 out[i] += weight * stage[i]
-    for i in range(length):
-        out[i] = y[i] + h * out[i]
 
 
-@njit(float64(METHOD, float64, VECTOR, int64, int64, WORK), **KERNEL)
+@njit(float64(METHOD, float64, VECTOR, int64, int64, WORK), **INLINE)
 def error_ratio(method, h, y, dimension, tangents, work):
     """Largest ratio of estimated error to tolerance over the state and each tangent vector.
 
@@ -92,7 +76,7 @@ def error_ratio(method, h, y, dimension, tangents, work):
     return worst
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **INLINE)
 def attempt(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 
@@ -102,13 +86,13 @@ def attempt(model, method, mode, t, h, y, tangents, work):
     s = method.b.shape[0]
     for i in range(1, s):
         combine(y, h, method.a[i], work.stages, i, length, work.trial)
-        work.traces[i] = rates(model, mode, t + method.c[i] * h, work.trial, tangents, work.jacobian, work.stages[i])
+        rates(model, mode, t + method.c[i] * h, work.trial, tangents, work.stages[i])
     combine(y, h, method.b, work.stages, s, length, work.new)
-    work.traces[s] = rates(model, mode, t + h, work.new, tangents, work.jacobian, work.stages[s])
+    rates(model, mode, t + h, work.new, tangents, work.stages[s])
     return error_ratio(method, h, y, model.dimension, tangents, work)
 
 
-@njit(void(MODEL, METHOD, int64, float64, float64, VECTOR, WORK), **KERNEL)
+@njit(void(MODEL, METHOD, int64, float64, float64, VECTOR, WORK), **INLINE)
 def interpolation_stages(model, method, mode, t, h, y, work):
     """Evaluate the stages that only the interpolant of the last attempted step needs, for the state alone."""
     n = model.dimension
@@ -142,7 +126,7 @@ def starting_step(model, method, mode, t, y, tangents, work):
     h = min(h, method.max_step)
     for i in range(length):
         work.trial[i] = y[i] + h * work.stages[0, i]
-    rates(model, mode, t + h, work.trial, tangents, work.jacobian, work.stages[1])
+    rates(model, mode, t + h, work.trial, tangents, work.stages[1])
     bend = 0.0
     for i in range(length):
         scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
