@@ -7,7 +7,9 @@ it the import of the compiler, waits for the first call that needs it.
 from hybrid.arc import HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
+from hybrid.orbit import PeriodicOrbit, periodic_orbit
 from hybrid.saltation import saltation_matrix
+from hybrid.section import Section, poincare_section, stroboscopic_section
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, Tsit5
 from hybrid.status import Status, StatusCode
@@ -24,12 +26,17 @@ __all__ = [
     "Jump",
     "Mode",
     "ModelError",
+    "PeriodicOrbit",
     "Reset",
+    "Section",
     "Status",
     "StatusCode",
     "Transition",
     "Tsit5",
     "compile_system",
+    "periodic_orbit",
+    "poincare_section",
     "saltation_matrix",
     "simulate",
+    "stroboscopic_section",
 ]

@@ -116,6 +116,12 @@ def check_state(system: HybridSystem, x0: Any) -> np.ndarray:
     return state
 
 
+def check_count(name: str, value: object, least: int) -> None:
+    """ArgumentError unless ``value`` is a whole number of at least ``least``."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ArgumentError(f"{name} must be a whole number of at least {least}; got {value!r}.")
+
+
 def check_solver(solver: object) -> RungeKutta:
     """The solver, or the default one; ArgumentError for anything else."""
     if solver is None:
@@ -147,6 +153,7 @@ class Trajectory:
     work: Any
     tangents: int
     max_steps: int
+    phase0: float
 
     @property
     def system(self) -> HybridSystem:
@@ -187,12 +194,28 @@ class Trajectory:
         flow_jacobian(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, self.work.jacobian)
         return self.work.jacobian[:, :n].copy()
 
+    def field(self) -> np.ndarray:
+        """``f`` of the current mode at the current point, ``(n,)``."""
+        from hybrid.kernels.step import field
+
+        run, out = self.run, np.empty(self.model.dimension)
+        field(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, out)
+        return out
+
     def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:
         """Run to time ``t`` or until something else ends it; a code of ``hybrid.kernels.codes``."""
-        return self.advance_to(*split_time(t, self.model.period), record, max_jumps)
+        return self.advance_to(*split_time(t, self.model.period), record, max_jumps=max_jumps)
 
-    def advance_to(self, cycle: int, phase: float, record: Any, max_jumps: int = UNLIMITED) -> int:
-        """Run to a number of whole periods and a phase."""
+    def advance_to(
+        self,
+        cycle: int,
+        phase: float,
+        record: Any,
+        *,
+        max_steps: int | None = None,
+        max_jumps: int = UNLIMITED,
+    ) -> int:
+        """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run."""
         return int(
             load_kernels().advance(
                 self.model,
@@ -203,7 +226,7 @@ class Trajectory:
                 False,
                 cycle,
                 phase,
-                self.max_steps,
+                self.max_steps if max_steps is None else max_steps,
                 max_jumps,
                 self.work,
             )
@@ -244,7 +267,8 @@ def start(
     run = _fresh_run(system, model, y, tangents, t0)
     work = workspace(method, system.dimension, tangents)
     run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
-    return Trajectory(compiled, model, method, run, work, tangents, solver.max_steps)
+    phase0 = split_time(t0, model.period)[1]
+    return Trajectory(compiled, model, method, run, work, tangents, solver.max_steps, phase0)
 
 
 def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t0: float) -> Any:

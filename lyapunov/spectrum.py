@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from hybrid import ArgumentError, HybridSystem, Status, StatusCode
 from hybrid.kernels import codes
 from hybrid.load import load_kernels
-from hybrid.run import Trajectory, start
+from hybrid.progress import Progress, progress_bar
+from hybrid.run import Trajectory, check_count, start
 from hybrid.solvers import RungeKutta
-from lyapunov.progress import Progress, progress_bar
 from lyapunov.statistics import (
     TaperedMean,
     closed_batch_means,
@@ -158,12 +158,6 @@ def lyapunov_spectrum(
     length = interval_length(trajectory, interval)
     with progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
         return _Estimate(trajectory, length).run(transient, intervals, history, bar)
-
-
-def check_count(name: str, value: object, least: int) -> None:
-    """ArgumentError unless ``value`` is a whole number of at least ``least``."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ArgumentError(f"{name} must be a whole number of at least {least}; got {value!r}.")
 
 
 def interval_length(trajectory: Trajectory, interval: float | None) -> float:

@@ -16,6 +16,12 @@ def rates(model, mode, t, y, tangents, out):
         model.variational_flow(mode, t, y, model.parameters, out)
 
 
+@njit(void(MODEL, int64, float64, VECTOR, VECTOR), **ENTRY)
+def field(model, mode, t, x, out):
+    """``f`` into ``out (n,)``."""
+    model.flow(mode, t, x, model.parameters, out)
+
+
 @njit(void(MODEL, int64, float64, VECTOR, MATRIX), **ENTRY)
 def flow_jacobian(model, mode, t, x, out):
     """``(D_x f, D_t f)`` into ``out (n, n + 1)``."""

@@ -20,12 +20,12 @@ class _Silent:
 
 
 @contextmanager
-def progress_bar(total: int, title: str, shown: bool) -> Iterator[Progress]:
+def progress_bar(total: int, title: str, shown: bool, unit: str = "interval") -> Iterator[Progress]:
     """A progress bar on standard error, or something as silent as it is cheap."""
     if not shown:
         yield _Silent()
         return
     from tqdm import tqdm
 
-    with tqdm(total=total, desc=title, unit="interval", leave=False) as bar:
+    with tqdm(total=total, desc=title, unit=unit, leave=False) as bar:
         yield bar
