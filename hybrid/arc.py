@@ -29,8 +29,8 @@ class Jump:
     saltation
         Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
     transversality
-        ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the saltation
-        matrix grows without bound.
+        ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the
+        saltation matrix grows without bound.
     """
 
     t: float
@@ -137,8 +137,8 @@ class Pieces:
 class HybridArc:
     """A solution over hybrid time ``(t, j)``.
 
-    Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step. With
-    ``samples`` they are the states at those times, at a jump the state after it.
+    Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step.
+    With ``samples`` they are the states at those times, at a jump the state after it.
 
     Attributes
     ----------
@@ -151,8 +151,8 @@ class HybridArc:
     status
         How the run ended; what was computed is here even where it ended early.
     fundamental
-        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices, if they
-        were asked for.
+        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices,
+        if they were asked for.
     steps, rejected
         Steps tried, and how many of them the error control rejected.
     """
@@ -186,7 +186,9 @@ class HybridArc:
         """
         times = np.asarray(t, dtype=float)
         if self._pieces is None:
-            raise ArgumentError("This arc keeps samples only. Run simulate without samples= for dense output.")
+            raise ArgumentError(
+                "This arc keeps samples only. Run simulate without samples= for dense output."
+            )
         if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
             raise ArgumentError(
                 f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
@@ -203,7 +205,7 @@ class HybridArc:
 def hybrid_points(
     system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Times, jump counts, states and mode indices of a run in order: step starts, states before jumps, the end."""
+    """Times, jump counts, states, mode indices of a run in order: step starts, states before jumps, the end."""
     sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
     t_end, x_end, mode_end = end
     t = np.concatenate([pieces.t, jumps.t, [t_end]])

@@ -40,15 +40,15 @@ def compiled_into(folder: Path) -> Iterator[None]:
     Numba stamps a compiled function with the age of its own file only. Kernels call one another across
     files, so the folder must be named after all the sources that go into them.
     """
-    import numba
+    from numba import config
 
     with _LOCK:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(folder)
+        before = vars(config)["CACHE_DIR"]
+        vars(config)["CACHE_DIR"] = str(folder)
         try:
             yield
         finally:
-            numba.config.CACHE_DIR = before
+            vars(config)["CACHE_DIR"] = before
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""From a model to machine code: a handful of small functions a model, called by kernels that all models share."""
+"""From a model to machine code: a few small functions each, called by kernels that all models share."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ class CompiledSystem:
         for name, affine in zip(system.mode_names, self.emitted.affine_mode, strict=True):
             lines.append(f"  mode {name}: {'affine' if affine else 'nonlinear'} in the state")
         for name, affine in zip(system.transition_names, self.emitted.affine_guard, strict=True):
-            lines.append(f"  transition {name}: {'affine guard' if affine else 'guard fitted along each step'}")
+            lines.append(
+                f"  transition {name}: {'affine guard' if affine else 'guard fitted along each step'}"
+            )
         return "\n".join(lines)
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
@@ -62,7 +64,7 @@ class CompiledSystem:
             first.append(len(outgoing))
         transitions = system.transitions
         return Model(
-            *self.roles,
+            **dict(zip(ROLES, self.roles, strict=True)),
             parameters=system.parameter_values(parameters),
             dimension=system.dimension,
             first_outgoing=_indices(first),

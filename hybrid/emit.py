@@ -2,8 +2,8 @@
 
 Each role is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
 fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
-columns, time last. The variational flow is the one role that reads all of ``x (n (1 + k),)``: the state and ``k`` tangent
-vectors. It writes their derivatives and, one place further, the divergence of the field.
+columns, time last. The variational flow is the one role that reads all of ``x (n (1 + k),)``: the state and
+``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class Emitted:
     ----------
     source
         Text of a module with the functions ``flow``, ``flow_jacobian``, ``variational_flow``, ``guard``,
-        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. The same model gives the
-        same text, in any process.
+        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. The same
+        model gives the same text, in any process.
     opaque
         What the text refers to by name: the model functions that tracing could not follow, to be
         compiled themselves, and the named tuples they take. Empty if all were traced.

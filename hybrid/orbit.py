@@ -35,8 +35,9 @@ class PeriodicOrbit:
     multipliers
         Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1.
     fundamental
-        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues they are; for an autonomous system
-        from the point, away from jumps, where the shooting was done (elsewhere on the orbit it is a similar matrix).
+        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues they are; for an
+        autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the orbit
+        it is a similar matrix).
     residual
         Distance between the two ends over the period, in the units of the state.
     iterations
@@ -87,8 +88,9 @@ def periodic_orbit(
 ) -> PeriodicOrbit:
     """Periodic orbit near a guess, stable or not.
 
-    A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An autonomous one closes after
-    an unknown time near the guess ``period``; the point returned is the one nearest to the guess among the solver's own.
+    A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An
+    autonomous one closes after an unknown time near the guess ``period``; the point returned is the one
+    nearest to the guess among the solver's own.
 
     Parameters
     ----------
@@ -218,7 +220,7 @@ class _Shooting:
     def newton(
         self, point: _Point, plane: np.ndarray | None, tolerance: float, max_iterations: int
     ) -> PeriodicOrbit:
-        """Newton's method from ``point``; with ``plane``, the normal of a plane through it, the period is unknown too."""
+        """Newton's method from ``point``; the period is unknown too if ``plane``, a normal there, is given."""
         anchor = point.x
         shot, iterations = self.shoot(point), 0
         while iterations < max_iterations and not self._closed(shot, tolerance):
@@ -247,7 +249,7 @@ class _Shooting:
         return step[:n], float(step[n])
 
     def _along(self, shot: _Shot, step: tuple[np.ndarray, float]) -> _Shot | None:
-        """The first shot along the step, halved as often as allowed, that closes better; None if none does."""
+        """The first shot along the step, halved as often as allowed, that closes better; else None."""
         part = 1.0
         while part >= SHORTEST_STEP:
             period = shot.point.period + part * step[1]
@@ -266,7 +268,7 @@ class _Shooting:
             return None
 
     def autonomous(self, guess: _Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
-        """Newton's method from the point of the guess's orbit that is farthest from jumps, then back to the guess's phase.
+        """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
 
         At a jump the end of the shot would depend discontinuously on the period.
         """
@@ -310,7 +312,7 @@ class _Shooting:
         return shooting, _Point(arc.x[-1], guess.t + shift, guess.period)
 
     def _nearest(self, orbit: PeriodicOrbit, guess: _Point) -> PeriodicOrbit:
-        """The same orbit from that point of its arc, both sides of jumps included, which is nearest to the guess."""
+        """The same orbit from the point of its arc, both sides of jumps included, nearest to the guess."""
         arc = orbit.arc(self.solver)
         i = int(np.argmin(np.linalg.norm(arc.x - guess.x, axis=1)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
@@ -354,5 +356,5 @@ class _Shooting:
         return Status(
             StatusCode.NOT_CONVERGED,
             f"Newton's method did not converge: {reason}.",
-            "Start nearer to the orbit (a stable one is reached by simulating first), or raise max_iterations.",
+            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations.",
         )

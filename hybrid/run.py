@@ -134,7 +134,7 @@ def check_solver(solver: object) -> RungeKutta:
 
 
 def split_time(t: float, period: float) -> tuple[int, float]:
-    """Time as a whole number of periods and a phase in ``[0, period)``; without a period (0) all of it is phase."""
+    """Time as whole periods and a phase in ``[0, period)``; without a period (0) all of it is phase."""
     if period <= 0.0:
         return 0, float(t)
     cycle = int(np.floor(t / period))
@@ -295,7 +295,7 @@ def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t
 
 
 def choose_mode(system: HybridSystem, model: Any, run: Any, work: Any, mode: str | None) -> int:
-    """Index of the mode a run starts in: the one named, the only one, or the only one whose guards allow the state.
+    """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
 
     Raises
     ------
@@ -321,8 +321,8 @@ def choose_mode(system: HybridSystem, model: Any, run: Any, work: Any, mode: str
             for name, guards in zip(system.mode_names, beyond, strict=True)
         )
         raise ArgumentError(
-            f"{where} violates every mode: {faults}. Start on the other side of a guard, or name the mode with "
-            "mode= if that side is meant."
+            f"{where} violates every mode: {faults}. Start on the other side of a guard, or name the mode "
+            "with mode= if that side is meant."
         )
     candidates = ", ".join(system.mode_names[index] for index in allowed)
     raise ArgumentError(f"{where} is allowed in more than one mode: {candidates}. Choose one with mode=.")
@@ -331,7 +331,7 @@ def choose_mode(system: HybridSystem, model: Any, run: Any, work: Any, mode: str
 def _guards_beyond(
     system: HybridSystem, model: Any, run: Any, work: Any, index: int
 ) -> list[tuple[str, bool]]:
-    """Transitions of the mode whose guard the state is beyond (or on, moving beyond), and whether it is just on it."""
+    """Transitions of the mode whose guard the state is on, moving beyond, or beyond; and whether just on."""
     from hybrid.kernels.guards import guard_values
     from hybrid.kernels.jump import enter
 
@@ -347,7 +347,8 @@ def _guards_beyond(
         if not np.isfinite(values[i]):
             raise ArgumentError(
                 f"Transition {transition.name!r}: the guard is {values[i]} at t = {phase}, "
-                f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}. A guard must be finite wherever its mode runs."
+                f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}. "
+                "A guard must be finite wherever its mode runs."
             )
         if transition.guard.direction == run.side[i] and not transition.is_marker:
             beyond.append((transition.name, bool(run.on_guard[i])))

@@ -24,8 +24,8 @@ def saltation_matrix(
 ) -> np.ndarray:
     """Saltation matrix ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``.
 
-    It carries a perturbation of the state just before the jump, at the unperturbed jump's time, to the perturbation just after.
-    The time terms serve moving guards and time-dependent resets.
+    It carries a perturbation of the state just before the jump, at the unperturbed jump's time, to the
+    perturbation just after. The time terms serve moving guards and time-dependent resets.
 
     Parameters
     ----------
@@ -44,14 +44,15 @@ def saltation_matrix(
     Raises
     ------
     ArgumentError
-        If the crossing is not transverse (``D_t g + D_x g f_minus`` is zero): the matrix does not exist there.
+        If the crossing is not transverse (``D_t g + D_x g f_minus`` is zero): the matrix does not exist
+        there.
     ModelError
         If the transition does not exist.
 
     References
     ----------
-    N. J. Kong, J. J. Payne, J. Zhu, A. M. Johnson, Saltation matrices: the essential tool for linearizing hybrid
-    dynamical systems, Proceedings of the IEEE, 2024, arXiv:2306.06862.
+    N. J. Kong, J. J. Payne, J. Zhu, A. M. Johnson, Saltation matrices: the essential tool for linearizing
+    hybrid dynamical systems, Proceedings of the IEEE, 2024, arXiv:2306.06862.
     """
     compiled = compile_system(system)
     index = system.transition_index(transition)

@@ -15,7 +15,7 @@ from hybrid.load import load_kernels
 from hybrid.progress import progress_bar
 from hybrid.run import UNLIMITED, Trajectory, check_count, empty_record, start
 from hybrid.solvers import RungeKutta
-from hybrid.status import Status, StatusCode
+from hybrid.status import Status
 from hybrid.system import Guard, HybridSystem, Transition
 
 POINTS_AT_ONCE = 500
@@ -188,7 +188,9 @@ def poincare_section(
     check_count("points", points, 1)
     check_count("transient", transient, 0)
     if not isinstance(section, Guard):
-        raise ArgumentError(f"section must be a Guard; got {section!r}. Write Guard(function, direction=...).")
+        raise ArgumentError(
+            f"section must be a Guard; got {section!r}. Write Guard(function, direction=...)."
+        )
     marked, first = with_section(system, section)
     trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
     with progress_bar(transient + points, "Section", progress, "point") as bar:

@@ -49,8 +49,8 @@ def simulate(
     solver
         Method and tolerances, by default ``DOP853(rtol=1e-10, atol=1e-12)``.
     tangent
-        True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is controlled
-        with the state's.
+        True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is
+        controlled with the state's.
     samples
         Increasing times at which to keep the state; nothing else is then kept but the jumps.
     max_jumps
@@ -78,9 +78,7 @@ def simulate(
     vectors = None if tangent is None or tangent is False else _tangent_matrix(tangent, system)
     if not max_jumps >= 0:
         raise ArgumentError(f"max_jumps must be at least 0; got {max_jumps!r}.")
-    trajectory = start(
-        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors
-    )
+    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
     return _Recorder(trajectory, times).run(t0, t1, int(max_jumps))
 
 
@@ -93,7 +91,8 @@ def _time_span(t_span: Any) -> tuple[float, float]:
         raise ArgumentError(f"t_span must be finite; got ({t0}, {t1}).")
     if t1 < t0:
         raise ArgumentError(
-            f"t_span must not run backwards; got ({t0}, {t1}). Write ({t1}, {t0}), or reverse the sign of the fields."
+            f"t_span must not run backwards; got ({t0}, {t1}). Write ({t1}, {t0}), "
+            "or reverse the sign of the fields."
         )
     return t0, t1
 

@@ -27,8 +27,8 @@ class StatusCode(IntEnum):
 class Status:
     """Code, message and remedy of a result.
 
-    ``status.ok`` is true only for a complete and valid one. What was computed before a run ended early is in the
-    result all the same.
+    ``status.ok`` is true only for a complete and valid one. What was computed before a run ended early is in
+    the result all the same.
     """
 
     code: StatusCode
@@ -64,7 +64,7 @@ def run_status(code: int, t: float, mode: str, transition: str | None) -> Status
         ),
         StatusCode.STEP_TOO_SMALL: (
             f"No step was small enough for the tolerance {where}.",
-            "Loosen rtol and atol; the field may be singular or discontinuous there, which a transition would mend.",
+            "Loosen rtol and atol; a singular or discontinuous field wants a transition there.",
         ),
         StatusCode.NON_FINITE: (
             f"The field or the state became infinite or nan {where}.",
@@ -75,7 +75,8 @@ def run_status(code: int, t: float, mode: str, transition: str | None) -> Status
             "Add a mode for the limit (rest, stick, slide) and a transition that leads to it.",
         ),
         StatusCode.STUCK: (
-            f"Jumps follow one another without end {where}, last {last}: the fields on both sides point at the guard.",
+            f"Jumps follow one another without end {where}, last {last}: "
+            "the fields on both sides point at the guard.",
             "Add a sliding mode, or derive one with hybrid.filippov.",
         ),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -122,13 +122,17 @@ class Mode:
 def _as_guard(value: Any) -> Guard:
     if isinstance(value, Guard):
         return value
-    raise ModelError(f"Transition: guard must be a Guard; got {value!r}. Write Guard(function, direction=...).")
+    raise ModelError(
+        f"Transition: guard must be a Guard; got {value!r}. Write Guard(function, direction=...)."
+    )
 
 
 def _as_reset(value: Any) -> Reset | None:
     if value is None or isinstance(value, Reset):
         return value
-    raise ModelError(f"Transition: reset must be a Reset or None (identity); got {value!r}. Write Reset(function).")
+    raise ModelError(
+        f"Transition: reset must be a Reset or None (identity); got {value!r}. Write Reset(function)."
+    )
 
 
 @attrs.frozen
@@ -183,8 +187,16 @@ def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
         raise ModelError(f"HybridSystem: {kind} names must differ; given twice: {', '.join(twice)}.")
 
 
+def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
+    return tuple(value)
+
+
+def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
+    return tuple(value)
+
+
 def _as_state(value: Any) -> tuple[str, ...] | int:
-    if isinstance(value, bool) or isinstance(value, str):
+    if isinstance(value, bool | str):
         raise ModelError(
             f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
             f"Write state=({value!r},) for one component."
@@ -249,8 +261,8 @@ class HybridSystem:
 
     state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=_as_state)
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=_as_parameters)
-    modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=tuple)
-    transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=tuple)
+    modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
+    transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: float | ModelFunction | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True)
 
@@ -321,7 +333,9 @@ class HybridSystem:
             return None
         value: Any = self.period
         if callable(value):
-            value = value(named_values("Parameters", tuple(self.parameters), self.parameter_values(overrides)))
+            value = value(
+                named_values("Parameters", tuple(self.parameters), self.parameter_values(overrides))
+            )
         period = finite_number("HybridSystem: period", value)
         if period <= 0:
             raise ArgumentError(f"HybridSystem: period must be positive; got {period}. Check the parameters.")
@@ -351,7 +365,9 @@ class HybridSystem:
 
     def _check_reachable(self) -> None:
         """A mode that no transition enters or leaves, in a system of several, is a slip of the pen."""
-        linked = {name for tr in self.transitions if tr.source != tr.target for name in (tr.source, tr.target)}
+        linked = {
+            name for tr in self.transitions if tr.source != tr.target for name in (tr.source, tr.target)
+        }
         lonely = [name for name in self.mode_names if name not in linked]
         if len(self.modes) > 1 and lonely:
             raise ModelError(

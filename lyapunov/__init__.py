@@ -1,5 +1,13 @@
 """Lyapunov and Floquet exponents of hybrid systems."""
 
+from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
+from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
 
-__all__ = ["LyapunovSpectrum", "lyapunov_spectrum"]
+__all__ = [
+    "LyapunovSpectrum",
+    "TwoOrbitExponents",
+    "floquet_exponents",
+    "lyapunov_spectrum",
+    "two_orbit_exponents",
+]

@@ -33,7 +33,7 @@ push = njit(void(MATRIX, INDICES, VECTOR), **KERNEL)(statistics.push)
 
 @njit(types.Tuple((int64, float64))(float64, int64, float64, float64), **KERNEL)
 def later(period, cycle, phase, interval):
-    """Time an interval later, in whole periods and a phase; a forcing period later is exactly the next cycle."""
+    """Time an interval later, in periods and a phase; a forcing period later is exactly the next cycle."""
     if interval == period:
         return cycle + 1, phase
     phase += interval
@@ -45,7 +45,20 @@ def later(period, cycle, phase, interval):
 
 @njit(
     types.UniTuple(int64, 2)(
-        ADVANCE, MODEL, METHOD, RUN, RECORD, WORK, int64, INDICES, VECTOR, float64, int64, MATRIX, MATRIX, INDICES
+        ADVANCE,
+        MODEL,
+        METHOD,
+        RUN,
+        RECORD,
+        WORK,
+        int64,
+        INDICES,
+        VECTOR,
+        float64,
+        int64,
+        MATRIX,
+        MATRIX,
+        INDICES,
     ),
     **ENTRY,
 )
@@ -67,9 +80,9 @@ def growth_rates(
 ):
     """Growth rates ``(M, k + 1)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
 
-    The last column is the other side of the sum rule: the integral of div f plus the log-determinants of the saltation matrices, per
-    unit time. ``cycle (1,)`` and ``phase (1,)`` hold the end of the last interval. Each row also goes to ``batches``. Returns how many intervals
-    were completed, and the driver's code.
+    The last column is the other side of the sum rule: the integral of div f plus the log-determinants of the
+    saltation matrices, per unit time. ``cycle (1,)`` and ``phase (1,)`` hold the end of the last interval.
+    Each row also goes to ``batches``. Returns how many intervals were completed, and the driver's code.
     """
     n = model.dimension
     for done in range(rates.shape[0]):
@@ -103,20 +116,36 @@ def distance(run, other, n):
 
 @njit(void(RUN, RUN, int64, float64), **KERNEL)
 def rescale(run, other, n, factor):
-    """Move ``other`` along the line to ``run`` until their distance is multiplied by ``factor``, in the mode of ``run``."""
+    """Multiply the distance of ``other`` from ``run`` by ``factor``, and put it in the mode of ``run``."""
     for i in range(n):
         other.y[i] = run.y[i] + factor * (other.y[i] - run.y[i])
-    if other.count[MODE] != run.count[MODE]:
-        other.count[MODE] = run.count[MODE]
+    # In a mode of its own it is still on the sides it was; in the other's, no side has been taken yet.
+    same = other.count[MODE] == run.count[MODE]
+    other.count[PREVIOUS_MODE] = run.count[MODE] if same else NO_TRANSITION
+    other.count[MODE] = run.count[MODE]
     other.count[PHASE_OF_RUN] = ENTERING
-    other.count[PREVIOUS_MODE] = other.count[MODE]
     other.count[LAST_FIRED] = NO_TRANSITION
     other.count[PENDING] = NO_TRANSITION
 
 
 @njit(
     types.UniTuple(int64, 2)(
-        ADVANCE, MODEL, METHOD, RUN, RUN, RUN, RECORD, WORK, WORK, WORK, INDICES, VECTOR, float64, float64, int64, MATRIX
+        ADVANCE,
+        MODEL,
+        METHOD,
+        RUN,
+        RUN,
+        RUN,
+        RECORD,
+        WORK,
+        WORK,
+        WORK,
+        INDICES,
+        VECTOR,
+        float64,
+        float64,
+        int64,
+        MATRIX,
     ),
     **ENTRY,
 )

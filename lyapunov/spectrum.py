@@ -36,13 +36,14 @@ class LyapunovSpectrum:
     ----------
     exponents
         ``(k,)``. Tapered means of the growth rates (see ``lyapunov.statistics.TaperedMean``): on periodic and
-        quasi-periodic motion their error falls like ``M^-3``, where that of the plain mean falls like ``1 / M``. Minus infinity for a
-        direction that a saltation matrix annihilates.
+        quasi-periodic motion their error falls like ``M^-3``, where that of the plain mean falls like ``1 /
+        M``. Minus infinity for a direction that a saltation matrix annihilates.
     standard_error
-        ``(k,)``. Two of them hold the true exponent of this orbit's attractor 95 times in a hundred; too wide on regular motion.
+        ``(k,)``. Two of them hold the true exponent of this orbit's attractor 95 times in a hundred; too wide
+        on regular motion.
     sum_rule
-        What the exponents must sum to if ``k = n``: the time average of div f plus the mean log-determinant of the saltation
-        matrices per unit time, along the same orbit and with the same weights.
+        What the exponents must sum to if ``k = n``: the time average of div f plus the mean log-determinant
+        of the saltation matrices per unit time, along the same orbit and with the same weights.
     growths
         ``(intervals, k)``: growth rate of each direction over each interval; empty with ``history=False``.
     interval, intervals
@@ -73,12 +74,12 @@ class LyapunovSpectrum:
 
     @property
     def benettin_history(self) -> np.ndarray:
-        """Plain running means ``(intervals, k)`` of the growth rates: formula (10) of Bazhenov et al. 2017."""
+        """Plain running means ``(intervals, k)`` of the growth rates: formula (10) of the paper."""
         return np.cumsum(self.growths, axis=0) / np.arange(1, len(self.growths) + 1)[:, None]
 
     @property
     def sum_defect(self) -> float:
-        """Sum of the exponents minus the sum rule: an error of the arithmetic, blind to most errors of the tangents."""
+        """Sum of the exponents minus the sum rule: blind to most errors of the tangents."""
         return float(self.exponents.sum() - self.sum_rule)
 
     def __repr__(self) -> str:
@@ -104,8 +105,9 @@ def lyapunov_spectrum(
 ) -> LyapunovSpectrum:
     """Lyapunov exponents by repeated orthonormalisation of tangent vectors.
 
-    The variational equation carries the vectors in a mode, the saltation matrix at a jump (Mueller 1995); their
-    error is controlled with the state's. They are orthonormalised at the end of each interval and around each jump.
+    The variational equation carries the vectors in a mode, the saltation matrix at a jump (Mueller 1995);
+    their error is controlled with the state's. They are orthonormalised at the end of each interval and
+    around each jump.
 
     Parameters
     ----------
@@ -114,8 +116,8 @@ def lyapunov_spectrum(
     k
         Number of exponents, 1 to n; all by default.
     intervals, interval
-        How many intervals to average over, and their length; by default the forcing period, and for an autonomous system
-        the reciprocal of the norm of ``D_x f`` at the start.
+        How many intervals to average over, and their length; by default the forcing period, and for an
+        autonomous system the reciprocal of the norm of ``D_x f`` at the start.
     transient
         Intervals run before, state and tangent vectors both, and not counted.
     t0
@@ -136,8 +138,8 @@ def lyapunov_spectrum(
 
     References
     ----------
-    G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9, doi:10.1007/BF02128236, part 2;
-    P. Mueller, Chaos, Solitons and Fractals 5 (1995) 1671, doi:10.1016/0960-0779(94)00170-U.
+    G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9, doi:10.1007/BF02128236, part
+    2; P. Mueller, Chaos, Solitons and Fractals 5 (1995) 1671, doi:10.1016/0960-0779(94)00170-U.
 
     Examples
     --------
@@ -161,7 +163,7 @@ def lyapunov_spectrum(
 
 
 def interval_length(trajectory: Trajectory, interval: float | None) -> float:
-    """The interval asked for, or the forcing period, or the reciprocal of the norm of the Jacobian at the start."""
+    """The interval asked for, or the forcing period, or the reciprocal norm of the Jacobian at the start."""
     if interval is not None:
         if not (np.isfinite(interval) and interval > 0):
             raise ArgumentError(f"interval must be a positive time; got {interval!r}.")

@@ -1,4 +1,4 @@
-"""How far a mean of growth rates can be trusted, and means that converge faster where they may.
+"""How far a mean of growth rates can be trusted, and a mean that converges fast on regular motion.
 
 Growth rates of successive intervals are correlated, sometimes over hundreds of intervals, and sometimes so
 that they cancel: on a torus, or for the logistic map, they are differences of a function along the orbit and
@@ -10,6 +10,7 @@ off those.
 from __future__ import annotations
 
 import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -178,10 +179,10 @@ class TaperedMean:
     .. math:: \bar y_M = \sum_{i=1}^{M} w_i y_i \Big/ \sum_{i=1}^{M} w_i, \qquad
         w_i = (i - \tfrac12)^2 (M - i + \tfrac12)^2
 
-    A weighted Birkhoff average [1]_: the weight and its slope vanish at both ends, so on periodic and quasi-periodic
-    series the error falls like ``M**-3``, where the plain mean has ``1 / M``. The bump of [1]_ does still better, but
-    needs to know ``M`` beforehand; this weight is a polynomial in ``M``, so three sums give the estimate at every
-    ``M``. On white noise its variance is 10/7 that of the plain mean.
+    A weighted Birkhoff average [1]_: the weight and its slope vanish at both ends, so on periodic and
+    quasi-periodic series the error falls like ``M**-3``, where the plain mean has ``1 / M``. The bump of [1]_
+    does still better, but needs to know ``M`` beforehand; this weight is a polynomial in ``M``, so three sums
+    give the estimate at every ``M``. On white noise its variance is 10/7 that of the plain mean.
 
     Parameters
     ----------
@@ -190,7 +191,8 @@ class TaperedMean:
 
     References
     ----------
-    .. [1] S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30 (2017) 4111,
+    .. [1] S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30 (2017)
+    4111,
        https://doi.org/10.1088/1361-6544/aa84c2.
     """
 
@@ -211,7 +213,7 @@ class TaperedMean:
         """The mean ``(columns,)`` so far; ``nan`` of nothing, minus infinity once such an entry came."""
         if self.count == 0:
             return np.full(self._moments.shape[1], np.nan)
-        mean = _tapered(self._moments[:, None], np.array([self.count]))[0]
+        mean = _tapered(self._moments[:, None], np.array([float(self.count)]))[0]
         return np.where(self._collapsed, -np.inf, mean)
 
 
@@ -221,12 +223,12 @@ def running_tapered_mean(series: Array) -> Array:
     finite = np.where(series == -np.inf, 0.0, series)
     moments = np.stack([np.cumsum(place**power * finite, axis=0) for power in (2, 3, 4)])
     collapsed = np.logical_or.accumulate(series == -np.inf, axis=0)
-    return np.where(collapsed, -np.inf, _tapered(moments, np.arange(1, len(series) + 1)))
+    return np.where(collapsed, -np.inf, _tapered(moments, np.arange(1.0, len(series) + 1.0)))
 
 
 def _tapered(moments: Array, count: Array) -> Array:
     """Tapered means ``(m, k)`` from the moments ``(3, m, k)`` of the first ``count (m,)`` rows."""
-    size = np.asarray(count, dtype=float)[:, None]
+    size = count[:, None]
     # Sum of the weights, in closed form by the sums of even powers at half-integers.
     square = size * (4 * size**2 - 1) / 12
     cube = size**2 * (2 * size**2 - 1) / 8

@@ -1,4 +1,4 @@
-"""Real roots of a polynomial in Bernstein form, isolated by Descartes' rule: none is missed, none counted twice.
+"""Real roots of a polynomial in Bernstein form by Descartes' rule: none missed, none counted twice.
 
 The number of sign variations of the Bernstein coefficients bounds the number of roots in the open interval
 and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 1 are proofs and anything
@@ -16,7 +16,7 @@ CLUSTER = 1e-14
 
 @njit(types.UniTuple(float64, 2)(VECTOR, int64, float64, VECTOR), **KERNEL)
 def value_and_slope(coefficients, degree, theta, scratch):
-    """Value and derivative at ``theta`` by de Casteljau; ``coefficients (degree + 1,)``, ``scratch`` no shorter."""
+    """Value and derivative at ``theta`` by de Casteljau; ``coefficients``, ``scratch (degree + 1,)``."""
     for i in range(degree + 1):
         scratch[i] = coefficients[i]
     slope = 0.0
@@ -59,8 +59,8 @@ def first_crossing(coefficients, degree, side, direction, stack):
 
     ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
     that differs at once is a crossing at 0; ``stack (depth, >= degree + 3)``, its last row scratch.
-    Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero at 1 exactly counts as crossed
-    if the slope there leads across.
+    Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero at 1 exactly counts
+    as crossed if the slope there leads across.
     """
     scratch = stack[stack.shape[0] - 1]
     top = 0
@@ -119,7 +119,7 @@ def first_crossing(coefficients, degree, side, direction, stack):
 @njit(boolean(VECTOR, int64, int64), **INLINE)
 def stays(coefficients, degree, side):
     """Whether all coefficients have the sign ``side``: the proof that serves nearly every step."""
-    for i in range(degree + 1):
+    for i in range(degree + 1):  # noqa: SIM110 (no generators in kernels)
         if not coefficients[i] * side > 0.0:
             return False
     return True

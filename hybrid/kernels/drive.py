@@ -1,4 +1,4 @@
-"""The driver: smooth steps, events, jumps, until a given time. All runs of the library are calls of ``advance``."""
+"""The driver: smooth steps, events, jumps, until a given time. All runs are calls of ``advance``."""
 
 import math
 
@@ -47,7 +47,7 @@ MOST_JUMPS_AT_ONCE = 100
 
 @njit(int64(MODEL, RUN, WORK), **KERNEL)
 def arrived(model, run, work):
-    """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run, not to the next."""
+    """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run."""
     mode, t = run.count[MODE], run.clock[PHASE]
     model.flow(mode, t, run.y, model.parameters, work.field)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -64,7 +64,7 @@ def arrived(model, run, work):
 
 @njit(boolean(MODEL, int64), **INLINE)
 def all_affine(model, mode):
-    """Whether every guard of the mode is affine, so that no interpolant of the state is needed to follow them."""
+    """Whether every guard of the mode is affine, so that following them needs no interpolant of the state."""
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         if model.affine_guard[model.outgoing[slot]] == 0:
             return False
@@ -122,8 +122,8 @@ def carry_rates(method, length, work):
 def growth_factor(method, run, h, ratio):
     """Factor to the next step from this error ratio, and from its trend over the last two steps.
 
-    The trend (Gustafsson 1994, doi:10.1145/198429.198437) foresees the shrinking steps towards a singularity, such as
-    the end of a Hertz contact, where each step would otherwise be tried too long.
+    The trend (Gustafsson 1994, doi:10.1145/198429.198437) foresees the shrinking steps towards a singularity,
+    such as the end of a Hertz contact, where each step would otherwise be tried too long.
     """
     factor = ratio ** (-method.exponent)
     if run.clock[LAST_STEP] > 0.0:
@@ -150,8 +150,8 @@ def advance(
 ):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 
-    The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record has been
-    emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. Nothing is allocated.
+    The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record
+    has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. Nothing is allocated.
     """
     n = model.dimension
     length = n * (1 + tangents)

@@ -6,8 +6,8 @@ from numba import float64, int64, njit, types, void
 
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
 from hybrid.kernels.codes import MODE, NO_TRANSITION
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, RUN, VECTOR, WORK
-from hybrid.kernels.step import attempt, rates
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
+from hybrid.kernels.step import attempt
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size;
 # its root is only a first guess for the landing.
@@ -44,7 +44,7 @@ def guard_speed(model, transition, t, x, field, gradient):
 
 @njit(int64(MODEL, METHOD, int64, float64, float64, VECTOR, float64, WORK), **INLINE)
 def affine_polynomial(model, method, transition, t, h, x, value, work):
-    """Bernstein coefficients of an affine guard along the step, exactly those of the interpolant; returns the degree."""
+    """Bernstein coefficients of an affine guard on the interpolant, exactly; returns their degree."""
     n = model.dimension
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     degree, count = method.interpolant.shape[0] - 1, method.a.shape[0]
@@ -78,7 +78,7 @@ def value_on_interpolant(model, transition, t, h, theta, work):
 
 @njit(float64(MODEL, int64, float64, float64, float64, float64, float64, WORK), **KERNEL)
 def fit_polynomial(model, transition, t, h, start, end, offset, work):
-    """Fit a polynomial to ``g - offset`` over the part ``[start, end]`` of the step; returns its misfit between nodes.
+    """Fit a polynomial to ``g - offset`` over ``[start, end]`` of the step; returns its misfit between nodes.
 
     The values at ``work.nodes`` determine it; it is checked half-way between each pair of nodes.
     """
@@ -108,7 +108,7 @@ def fit_polynomial(model, transition, t, h, start, end, offset, work):
 
 @njit(types.Tuple((float64, int64))(MODEL, int64, float64, float64, float64, int64, int64, WORK), **KERNEL)
 def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
-    """First crossing of a guard that is not affine: piecewise polynomial fits along the interpolant, cut until they fit.
+    """First crossing of a guard that is not affine, by polynomials fitted piecewise along the interpolant.
 
     Only where a fit neither excludes a zero nor follows the guard is the interval cut, so a kink away from
     zero costs nothing. Returns the place on [0, 1] (or ``NO_ROOT``) and the side after it.
@@ -146,8 +146,8 @@ def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
 def earliest_crossing(model, method, run, t, h, work):
     """Earliest crossing on the attempted step over all guards of the mode, and its transition.
 
-    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of the guards are brought up to date.
-    ``work.coefficients`` must hold the interpolant if any guard of the mode is not affine.
+    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of the guards are brought up
+    to date. ``work.coefficients`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode = run.count[MODE]
     earliest, fired = NO_ROOT, NO_TRANSITION
@@ -176,17 +176,15 @@ def earliest_crossing(model, method, run, t, h, work):
 
 
 @njit(
-    types.UniTuple(float64, 2)(
-        MODEL, METHOD, int64, int64, float64, float64, float64, VECTOR, int64, WORK
-    ),
+    types.UniTuple(float64, 2)(MODEL, METHOD, int64, int64, float64, float64, float64, VECTOR, int64, WORK),
     **KERNEL,
 )
 def land(model, method, transition, mode, t, h, theta, y, tangents, work):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
-    The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard, so that
-    the state and the tangents at the event carry the error of the method, not that of its interpolant.
-    Returns the length of the step last taken and the small Euler step that completed it.
+    The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
+    so that the state and the tangents at the event carry the error of the method, not that of its
+    interpolant. Returns the length of the step last taken and the small Euler step that completed it.
     """
     length = theta * h
     for _ in range(6):
@@ -220,9 +218,10 @@ def rounding_band(model, run, t, gradient):
 
 @njit(float64(MODEL, int64, int64, float64, VECTOR, WORK), **KERNEL)
 def guard_acceleration(model, transition, mode, t, x, work):
-    """Second Lie derivative of a guard along the mode's flow; ``work.field`` and ``work.gradient`` are current.
+    """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
 
-    ``D_x g (D_x f f + D_t f)`` is exact; the curvature of the guard itself is a difference of its gradient along the flow.
+    ``D_x g (D_x f f + D_t f)`` is exact; the curvature of the guard itself is a difference of its gradient
+    along the flow.
     """
     n = model.dimension
     model.flow_jacobian(mode, t, x, model.parameters, work.jacobian)

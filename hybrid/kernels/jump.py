@@ -30,9 +30,9 @@ from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalis
 def enter(model, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
-    The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, and from its acceleration
-    where the speed vanishes too. A guard that the state has come to lie on or beyond fires at once, except the
-    transition that has just fired: if the state moves on through its guard the crossing is
+    The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, and from its
+    acceleration where the speed vanishes too. A guard that the state has come to lie on or beyond fires at
+    once, except the transition that has just fired: if the state moves on through its guard the crossing is
     done, and if it rests there the second value is true: the transition would fire for ever.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
@@ -65,9 +65,12 @@ def enter(model, run, work):
             continue
         if landed and transition == run.count[LAST_FIRED]:
             stuck = stuck or (on_guard and resting)
-        elif fires == NO_TRANSITION and not was_beyond:
-            if on_guard or landed or model.boundary[transition] == 1:
-                fires = transition
+        elif (
+            fires == NO_TRANSITION
+            and not was_beyond
+            and (on_guard or landed or model.boundary[transition] == 1)
+        ):
+            fires = transition
     return fires, stuck
 
 
@@ -75,8 +78,8 @@ def enter(model, run, work):
 def saltation(model, transition, mode, t, x_minus, x_plus, work):
     """Saltation matrix into ``work.saltation (n, n)`` and the state after the jump into ``x_plus (n,)``.
 
-    ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms (Kong, Payne, Zhu
-    and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
+    ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
+    (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
     that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities.
     """
     n = model.dimension

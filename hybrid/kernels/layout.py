@@ -72,10 +72,10 @@ MODEL = types.NamedTuple(
 class Method(NamedTuple):
     """An explicit Runge-Kutta pair with its interpolant and its tolerances.
 
-    ``a (S, S)``, ``b (s,)``, ``c (S,)`` with ``s`` stages for the step; row ``s`` is the derivative at the new
-    point and rows up to ``S`` serve the interpolant alone. ``error`` and ``second_error`` ``(s + 1,)`` weigh the stages
-    into the error estimate. ``interpolant (d + 1, S)`` gives the Bernstein coefficients of the step's
-    interpolant: ``y0 + h * interpolant @ stages``.
+    ``a (S, S)``, ``b (s,)``, ``c (S,)`` with ``s`` stages for the step; row ``s`` is the derivative at the
+    new point and rows up to ``S`` serve the interpolant alone. ``error`` and ``second_error`` ``(s + 1,)``
+    weigh the stages into the error estimate. ``interpolant (d + 1, S)`` gives the Bernstein coefficients of
+    the step's interpolant: ``y0 + h * interpolant @ stages``.
     """
 
     a: np.ndarray
@@ -101,8 +101,8 @@ class Run(NamedTuple):
     ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
     the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
     vanishes at the entry of the mode; ``first_step (modes,)`` remembers the step a mode began with;
-    ``scale (n,)`` the size of the components over the last step, against which rounding is judged; ``growth (k,)`` sums the
-    logarithms of the lengths taken out of the tangent vectors by orthonormalisation.
+    ``scale (n,)`` the size of the components over the last step, against which rounding is judged; ``growth
+    (k,)`` sums the logarithms of the lengths taken out of the tangent vectors by orthonormalisation.
     """
 
     count: np.ndarray
@@ -121,10 +121,11 @@ RUN = types.NamedTuple((INDICES, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTO
 class Work(NamedTuple):
     """Scratch memory, allocated once a run.
 
-    ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``;
-    ``gradient (n + 1,)``; ``scalar (1,)``; ``field, field_after, state (n,)``; ``saltation (n, n)``; ``coefficients (d + 1, n)`` of the
-    step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``nodes (q + 1,)`` and
-    ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
+    ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
+    along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
+    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state (n,)``; ``saltation (n, n)``; ``coefficients (d +
+    1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its
+    isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
     """
 
     stages: np.ndarray
@@ -179,9 +180,9 @@ WORK = types.NamedTuple(
 class Record(NamedTuple):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
-    ``used (2,)`` counts the steps and jumps in it. A step: its start ``(phase, length)``, ``(cycle, mode, jump count)`` and the Bernstein
-    coefficients ``(d + 1, n)``. A jump: its phase and transversality, ``(cycle, transition)``, the states ``(2, n)`` before and after, and
-    the saltation matrix ``(n, n)``.
+    ``used (2,)`` counts the steps and jumps in it. A step: its start ``(phase, length)``, ``(cycle, mode,
+    jump count)`` and the Bernstein coefficients ``(d + 1, n)``. A jump: its phase and transversality,
+    ``(cycle, transition)``, the states ``(2, n)`` before and after, and the saltation matrix ``(n, n)``.
     """
 
     used: np.ndarray
@@ -197,8 +198,8 @@ class Record(NamedTuple):
 INDEX_MATRIX = int64[:, ::1]
 RECORD = types.NamedTuple((INDICES, MATRIX, INDEX_MATRIX, CUBE, MATRIX, INDEX_MATRIX, CUBE, CUBE), Record)
 
-# A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time to compile.
-# Sums may be reordered and fused, but nan and infinity keep their meaning.
+# A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time
+# to compile. Sums may be reordered and fused, but nan and infinity keep their meaning.
 ENTRY = {
     "nogil": True,
     "error_model": "numpy",

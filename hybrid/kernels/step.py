@@ -9,7 +9,7 @@ from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, 
 
 @njit(void(MODEL, int64, float64, VECTOR, int64, VECTOR), **INLINE)
 def rates(model, mode, t, y, tangents, out):
-    """Time derivative of ``y (n (1 + k),)`` into ``out``, with div f in the place after it if there are tangents."""
+    """Time derivative of ``y (n (1 + k),)`` into ``out``; div f in the place after it if there are tangents."""
     if tangents == 0:
         model.flow(mode, t, y, model.parameters, out)
     else:
@@ -46,7 +46,8 @@ def error_ratio(method, h, y, dimension, tangents, work):
     """Largest ratio of estimated error to tolerance over the state and each tangent vector.
 
     A tangent vector has no absolute size, so its components are weighed against themselves and against the
-    vector's root mean square. The two estimates are combined as in Hairer, Norsett and Wanner 1993, section II.10.
+    vector's root mean square. The two estimates are combined as in Hairer, Norsett and Wanner 1993, section
+    II.10.
     """
     n = dimension
     length = n * (1 + tangents)
@@ -77,7 +78,7 @@ def error_ratio(method, h, y, dimension, tangents, work):
             second += (second_error[i] / scale) ** 2
         if first > 0.0:
             worst = max(worst, h * first / math.sqrt((first + 0.01 * second) * n))
-        elif not first == 0.0:
+        elif first != 0.0:
             return math.nan
     return worst
 
@@ -86,7 +87,8 @@ def error_ratio(method, h, y, dimension, tangents, work):
 def attempt(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 
-    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in ``work.stages[s]``.
+    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in
+    ``work.stages[s]``.
     """
     length = model.dimension * (1 + tangents)
     s = method.b.shape[0]
@@ -109,7 +111,7 @@ def interpolation_stages(model, method, mode, t, h, y, work):
 
 @njit(void(METHOD, float64, VECTOR, int64, WORK), **KERNEL)
 def interpolate(method, h, y, dimension, work):
-    """Bernstein coefficients ``(d + 1, n)`` of the state over the last attempted step, into ``work.coefficients``."""
+    """Bernstein coefficients of the state over the last attempted step, into ``work.coefficients (d + 1, n)``."""
     for i in range(work.coefficients.shape[0]):
         combine(y, h, method.interpolant[i], work.stages, method.a.shape[0], dimension, work.coefficients[i])
 

@@ -1,4 +1,4 @@
-"""Orthonormalisation of tangent vectors and determinants: the linear algebra of a jump and of Benettin's method."""
+"""Orthonormalisation of tangent vectors, and determinants: the linear algebra of jumps and exponents."""
 
 import math
 
@@ -12,11 +12,12 @@ COLLAPSED = 1e-13
 
 @njit(int64(VECTOR, int64, int64, VECTOR, float64), **KERNEL)
 def orthonormalise(y, n, k, growth, threshold):
-    """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``; add the logarithms of their lengths to ``growth (k,)``.
+    """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``.
 
-    Modified Gram-Schmidt, twice, which is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold``
-    times the longest image has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of
-    vectors that collapsed now.
+    The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt, twice, which
+    is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold`` times the longest image
+    has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of vectors
+    that collapsed now.
     """
     collapsed = 0
     longest = 0.0
@@ -51,10 +52,10 @@ def orthonormalise(y, n, k, growth, threshold):
 
 @njit(float64(MATRIX, MATRIX, int64), **KERNEL)
 def log_abs_determinant(matrix, magnitude, n):
-    """``log |det|`` of a matrix ``(n, n)``, overwritten, by elimination; minus infinity if singular to rounding.
+    """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if singular to rounding.
 
-    ``magnitude``, scratch of at least that shape, follows the size of the terms that each entry was made of: a pivot
-    that is only their rounding is a zero, while one that is merely small (as near a grazing) is not.
+    ``magnitude``, scratch of at least that shape, follows the size of the terms that each entry was made of:
+    a pivot that is only their rounding is a zero, while one that is merely small (as near a grazing) is not.
     """
     total = 0.0
     for i in range(n):

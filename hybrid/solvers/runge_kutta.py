@@ -21,8 +21,9 @@ def _positive(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> Non
 class RungeKutta:
     """Abstract base of the explicit pairs; use one of its subclasses.
 
-    The error estimate of every component ``i`` of the state is kept below ``atol + rtol |x_i|`` in the root mean square. Tangent
-    vectors are under the same control, each by itself: their components are kept below ``rtol (|v_i| + rms(v))``.
+    The error estimate of every component ``i`` of the state is kept below ``atol + rtol |x_i|`` in the root
+    mean square. Tangent vectors are under the same control, each by itself: their components are kept below
+    ``rtol (|v_i| + rms(v))``.
 
     Parameters
     ----------

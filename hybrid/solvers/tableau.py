@@ -15,8 +15,8 @@ Row = Mapping[int, float]
 class Tableau:
     """Butcher tableau of an explicit pair with an interpolant.
 
-    With ``s`` stages for the step, ``S >= s + 1`` in all (row ``s`` is the derivative at the new point) and an
-    interpolant of degree ``d``.
+    With ``s`` stages for the step, ``S >= s + 1`` in all (row ``s`` is the derivative at the new point) and
+    an interpolant of degree ``d``.
 
     Parameters
     ----------
@@ -66,7 +66,5 @@ def times_one_minus_theta(coefficients: np.ndarray) -> np.ndarray:
 def bernstein_from_powers(powers: np.ndarray) -> np.ndarray:
     """Bernstein coefficients (rows) from those of ``1, theta, theta^2, ...`` (rows)."""
     degree = len(powers) - 1
-    change = np.array(
-        [[comb(j, k) / comb(degree, k) for k in range(degree + 1)] for j in range(degree + 1)]
-    )
+    change = np.array([[comb(j, k) / comb(degree, k) for k in range(degree + 1)] for j in range(degree + 1)])
     return change @ powers

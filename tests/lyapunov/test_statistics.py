@@ -10,14 +10,14 @@ from scipy.stats import norm, t
 
 from lyapunov import statistics
 from lyapunov.statistics import (
-    bump_weight,
+    TaperedMean,
     closed_batch_means,
-    hann_weight,
     new_batches,
     push,
+    running_tapered_mean,
     standard_error,
     standard_error_from_batches,
-    weighted_mean,
+    taper_inflation,
 )
 
 RUNS = 1000
@@ -178,24 +178,50 @@ def test_accumulator_compiles_and_agrees_with_itself_in_python():
     assert standard_error_from_batches(closed_batch_means(*compiled))[2] == 0.0
 
 
-def test_weighted_mean_of_a_quasi_periodic_series_reaches_rounding():
-    assert np.abs(weighted_mean(quasi_periodic(400, mean=0.3)) - 0.3).max() < 1e-13
+def tapered_mean(series):
+    mean = TaperedMean(series.shape[1])
+    mean.add(series)
+    return mean.value()
 
 
-def test_hann_weight_gains_two_orders_over_the_plain_mean():
+def test_tapered_mean_is_the_weighted_mean_it_says_in_one_go_and_in_bursts():
+    series = np.random.default_rng(11).standard_normal((57, 3))
+    place = np.arange(57) + 0.5
+    weight = place**2 * (57 - place) ** 2
+    expected = weight @ series / weight.sum()
+    mean = TaperedMean(3)
+    for part in np.array_split(series, [1, 20, 20, 50]):
+        mean.add(part)
+    np.testing.assert_allclose(mean.value(), expected, rtol=1e-12)
+    np.testing.assert_allclose(running_tapered_mean(series)[-1], expected, rtol=1e-12)
+    np.testing.assert_allclose(running_tapered_mean(series)[19], tapered_mean(series[:20]), rtol=1e-12)
+
+
+def test_tapered_mean_gains_two_orders_over_the_plain_mean_on_quasi_periodic_series():
     lengths = np.array([89, 233, 610, 1597, 4181]) + 30
-    errors = [np.abs(weighted_mean(quasi_periodic(m), hann_weight)).max() for m in lengths]
+    errors = [np.abs(tapered_mean(quasi_periodic(m))).max() for m in lengths]
     assert np.polyfit(np.log(lengths), np.log(errors), 1)[0] == pytest.approx(-3.0, abs=0.5)
 
 
-@pytest.mark.parametrize(("weight", "inflation"), [(bump_weight, 1.96), (hann_weight, 1.5)])
-def test_weights_cost_variance_on_white_noise(weight, inflation):
+def test_taper_costs_variance_on_white_noise():
     noise = np.random.default_rng(10).standard_normal((500, 20_000))
-    assert 500 * weighted_mean(noise, weight).var() == pytest.approx(inflation, rel=0.03)
+    assert 500 * tapered_mean(noise).var() == pytest.approx(taper_inflation() ** 2, rel=0.03)
+
+
+def test_tapered_mean_keeps_its_digits_over_a_million_rows():
+    rows = np.full((1_000_000, 1), 0.1)
+    assert tapered_mean(rows)[0] == pytest.approx(0.1, rel=1e-12)
 
 
 @pytest.mark.parametrize("row", [0, 500])
-def test_weighted_mean_of_a_collapsed_column_is_minus_infinity(row):
+def test_tapered_mean_of_a_collapsed_column_is_minus_infinity(row):
     series = np.ones((1000, 2))
     series[row, 0] = -np.inf
-    np.testing.assert_allclose(weighted_mean(series), [-np.inf, 1.0])
+    np.testing.assert_allclose(tapered_mean(series), [-np.inf, 1.0])
+    running = running_tapered_mean(series)
+    assert np.all(np.isfinite(running[:row, 0]))
+    assert np.all(running[row:, 0] == -np.inf)
+
+
+def test_tapered_mean_of_nothing_is_nan():
+    assert np.isnan(TaperedMean(1).value()[0])

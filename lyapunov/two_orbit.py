@@ -1,0 +1,273 @@
+"""Exponents from the distance of two neighbouring orbits: three formulas that saturate, and one that converges."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import ArgumentError, HybridSystem, Status
+from hybrid.kernels import codes
+from hybrid.load import load_kernels
+from hybrid.progress import Progress, progress_bar
+from hybrid.run import Trajectory, check_count, start
+from hybrid.solvers import RungeKutta
+from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
+from lyapunov.statistics import running_tapered_mean
+
+
+@attrs.frozen(eq=False, repr=False)
+class TwoOrbitExponents:
+    r"""Estimates of the largest exponent from the distance to a companion orbit, as histories over ``M``.
+
+    With :math:`d_0` the separation, :math:`d_i` the distance after the i-th interval, of length :math:`T`, formulas
+    (7) to (9) of [1]_ are
+
+    .. math::
+
+        \lambda_7 = \frac{1}{M T} \ln\frac{d_M}{d_0}, \qquad
+        \lambda_8 = \frac{1}{M T} \sum_{i=1}^{M} \ln\frac{d_i}{d_{i-1}}, \qquad
+        \lambda_9 = \frac{1}{M T} \sum_{i=1}^{M} \ln\frac{d_i}{d_0}.
+
+    None of them converges to an exponent. The sum in (8) telescopes: (8) is (7). The distance of a chaotic orbit
+    stops growing at the size of the attractor and that of a stable one stops shrinking at rounding or
+    at the solver's tolerance, so both decay like ``1 / M`` once it has. Formula (9) lacks a division by ``i`` in its
+    terms; it tends to the level at which the distance stays, over ``T``.
+
+    A companion that is brought back to the separation after each interval [2]_ has none of these faults, needs no
+    derivatives, and converges.
+
+    Attributes
+    ----------
+    distances
+        ``(M,)``: distance of the free companion at the end of each interval. The phase of the forcing, a coordinate
+        of its own in [1]_, is the same for both and adds nothing.
+    renormalised_growths
+        ``(M,)``: growth rate of the distance of the renormalised companion over each interval.
+    separation, interval
+        Distance at the start, and length of an interval in units of time.
+    status
+        How the runs ended; the histories hold the intervals completed.
+
+    References
+    ----------
+    .. [1] V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
+       nonsmooth discontinuous vibroimpact system", 2017.
+    .. [2] G. Benettin, L. Galgani, J.-M. Strelcyn, "Kolmogorov entropy and numerical experiments", Phys. Rev. A 14
+       (1976) 2338, doi:10.1103/PhysRevA.14.2338.
+    """
+
+    distances: np.ndarray
+    renormalised_growths: np.ndarray
+    separation: float
+    interval: float
+    status: Status
+
+    @property
+    def intervals(self) -> int:
+        """How many intervals were completed."""
+        return len(self.distances)
+
+    @property
+    def single_piece(self) -> np.ndarray:
+        """Formula (7), ``(M,)``; minus infinity where the orbits coincide."""
+        return _log(self.distances / self.separation) / self._elapsed
+
+    @property
+    def telescoped(self) -> np.ndarray:
+        """Formula (8), ``(M,)``, summed as it stands; minus infinity from the first coincidence of the orbits on."""
+        before = np.concatenate([[self.separation], self.distances[:-1]])
+        ratios = np.divide(self.distances, before, out=np.zeros_like(before), where=before > 0)
+        # The distance may come back from zero by rounding; the sum does not come back from minus infinity.
+        return np.cumsum(_log(ratios)) / self._elapsed
+
+    @property
+    def undivided(self) -> np.ndarray:
+        """Formula (9), ``(M,)``; minus infinity from the first coincidence of the orbits on."""
+        return np.cumsum(_log(self.distances / self.separation)) / self._elapsed
+
+    @property
+    def renormalised(self) -> np.ndarray:
+        """Plain running means ``(M,)`` of the growths of the renormalised companion."""
+        return np.cumsum(self.renormalised_growths) / np.arange(1, self.intervals + 1)
+
+    @property
+    def renormalised_exponent(self) -> float:
+        """Tapered mean of those growths (see ``lyapunov.statistics.TaperedMean``): the estimate to use."""
+        if self.intervals == 0:
+            return math.nan
+        return float(running_tapered_mean(self.renormalised_growths[:, None])[-1, 0])
+
+    @property
+    def _elapsed(self) -> np.ndarray:
+        return self.interval * np.arange(1, self.intervals + 1)
+
+    def __repr__(self) -> str:
+        value = f"{self.renormalised_exponent:.8g}"
+        return f"<TwoOrbitExponents {value} of {self.intervals} intervals, {self.status.code.name}>"
+
+
+def two_orbit_exponents(
+    system: HybridSystem,
+    x0: ArrayLike,
+    *,
+    separation: float = 1e-8,
+    direction: ArrayLike | None = None,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    intervals: int = 1000,
+    interval: float | None = None,
+    transient: int = 0,
+    t0: float = 0.0,
+    solver: RungeKutta | None = None,
+    progress: bool = False,
+) -> TwoOrbitExponents:
+    """Estimates of the largest exponent from two neighbouring orbits, without derivatives.
+
+    Parameters
+    ----------
+    system, x0, mode, parameters, solver
+        As for :func:`hybrid.simulate`.
+    separation
+        Distance of the companion at the start, in the units of the state: small against the lengths over which the model
+        bends, and well above the solver's tolerances and the rounding of the state. Distances near the tolerance measure
+        how the two runs happened to step, not how the orbits separate.
+    direction
+        ``(n,)``: where the companion lies, of any length; by default all components are equal.
+    intervals, interval
+        How many intervals to follow the orbits, and their length; by default the forcing period, and for an autonomous system
+        the reciprocal of the norm of ``D_x f`` at the start.
+    transient
+        Intervals that the reference orbit runs before the companion is placed.
+    t0
+        Time at the start.
+    progress
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    TwoOrbitExponents
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Notes
+    -----
+    The companion starts in the mode that its guards allow if there is just one, else in that of the reference orbit.
+
+    Examples
+    --------
+    >>> import models
+    >>> result = two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), intervals=400, transient=100)
+    >>> bool(np.allclose(result.telescoped, result.single_piece))
+    True
+    >>> round(result.renormalised_exponent, 3)
+    -0.086
+    """
+    check_count("intervals", intervals, 1)
+    check_count("transient", transient, 0)
+    if not (np.isfinite(separation) and separation > 0):
+        raise ArgumentError(f"separation must be a positive distance; got {separation!r}.")
+    reference = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
+    offset = separation * _unit_vector(direction, system)
+    length = interval_length(reference, interval)
+    with progress_bar(transient + intervals, "Two orbits", progress) as bar:
+        code = _skip(reference, transient, length)
+        bar.update(transient)
+        if code != codes.DONE:
+            nothing = np.empty(0)
+            return TwoOrbitExponents(nothing, nothing, separation, length, reference.status(code))
+        companions = [_companion(reference, offset, parameters, solver) for _ in range(2)]
+        distances, status = _follow(reference, companions, separation, length, intervals, bar)
+    free, renormalised = distances.T
+    growths = _log(renormalised / separation) / length
+    return TwoOrbitExponents(free.copy(), growths, float(separation), length, status)
+
+
+def _log(ratios: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore"):
+        return np.log(ratios)
+
+
+def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarray:
+    n = system.dimension
+    if direction is None:
+        return np.full(n, 1.0 / math.sqrt(n))
+    vector = np.array(direction, dtype=float)
+    norm = np.linalg.norm(vector)
+    if vector.shape != (n,) or not (np.isfinite(norm) and norm > 0):
+        raise ArgumentError(
+            f"direction must be a finite vector of shape ({n},), not zero; got {direction!r}."
+        )
+    return vector / norm
+
+
+def _skip(trajectory: Trajectory, intervals: int, interval: float) -> int:
+    """Run a number of intervals, counted exactly where they are forcing periods; returns the driver's code."""
+    record = trajectory.no_record()
+    if interval == trajectory.model.period:
+        cycle, phase = trajectory.run.count[codes.CYCLE], trajectory.run.clock[codes.PHASE]
+        return trajectory.advance_to(int(cycle) + intervals, float(phase), record)
+    return trajectory.advance(trajectory.t + intervals * interval, record)
+
+
+def _companion(
+    reference: Trajectory,
+    offset: np.ndarray,
+    parameters: Mapping[str, float] | None,
+    solver: RungeKutta | None,
+) -> Trajectory:
+    """A trajectory beside the current point of the reference, at exactly its time."""
+    place = (reference.system, reference.x + offset, reference.t)
+    try:
+        companion = start(*place, parameters=parameters, solver=solver)
+    except ArgumentError:
+        companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
+    companion.run.count[codes.CYCLE] = reference.run.count[codes.CYCLE]
+    companion.run.clock[codes.PHASE] = reference.run.clock[codes.PHASE]
+    return companion
+
+
+def _follow(
+    reference: Trajectory,
+    companions: list[Trajectory],
+    separation: float,
+    interval: float,
+    intervals: int,
+    bar: Progress,
+) -> tuple[np.ndarray, Status]:
+    """Distances ``(M, 2)`` of the free and the renormalised companion, in bursts, and how the runs ended."""
+    kernel, advance = load_kernels("lyapunov.kernels").distances, load_kernels().advance
+    runs: list[Any] = [reference, *companions]
+    cycle = reference.run.count[codes.CYCLE : codes.CYCLE + 1].copy()
+    phase = reference.run.clock[codes.PHASE : codes.PHASE + 1].copy()
+    kept, total, code = [np.empty((0, 2))], 0, codes.DONE
+    while total < intervals and code == codes.DONE:
+        out = np.empty((min(INTERVALS_AT_ONCE, intervals - total), 2))
+        done, code = kernel(
+            advance,
+            reference.model,
+            reference.method,
+            *(run.run for run in runs),
+            reference.no_record(),
+            *(run.work for run in runs),
+            cycle,
+            phase,
+            interval,
+            separation,
+            reference.max_steps,
+            out,
+        )
+        kept.append(out[:done])
+        total += done
+        bar.update(done)
+    unfinished = (
+        run for run in runs if (run.run.count[codes.CYCLE], run.run.clock[codes.PHASE]) != (*cycle, *phase)
+    )
+    return np.concatenate(kept), next(unfinished, reference).status(code)
