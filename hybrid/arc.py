@@ -205,7 +205,7 @@ class HybridArc:
 def hybrid_points(
     system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Times, jump counts, states, mode indices of a run in order: step starts, states before jumps, the end."""
+    """Times, jump counts, states, mode indices in order: step starts, states before jumps, the end."""
     sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
     t_end, x_end, mode_end = end
     t = np.concatenate([pieces.t, jumps.t, [t_end]])

@@ -220,7 +220,7 @@ class _Shooting:
     def newton(
         self, point: _Point, plane: np.ndarray | None, tolerance: float, max_iterations: int
     ) -> PeriodicOrbit:
-        """Newton's method from ``point``; the period is unknown too if ``plane``, a normal there, is given."""
+        """Newton's method from ``point``; the period is unknown too if ``plane``, a normal, is given."""
         anchor = point.x
         shot, iterations = self.shoot(point), 0
         while iterations < max_iterations and not self._closed(shot, tolerance):

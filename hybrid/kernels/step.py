@@ -9,7 +9,7 @@ from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, 
 
 @njit(void(MODEL, int64, float64, VECTOR, int64, VECTOR), **INLINE)
 def rates(model, mode, t, y, tangents, out):
-    """Time derivative of ``y (n (1 + k),)`` into ``out``; div f in the place after it if there are tangents."""
+    """Time derivative of ``y (n (1 + k),)`` into ``out``; with tangents, div f in the place after it."""
     if tangents == 0:
         model.flow(mode, t, y, model.parameters, out)
     else:
@@ -111,7 +111,7 @@ def interpolation_stages(model, method, mode, t, h, y, work):
 
 @njit(void(METHOD, float64, VECTOR, int64, WORK), **KERNEL)
 def interpolate(method, h, y, dimension, work):
-    """Bernstein coefficients of the state over the last attempted step, into ``work.coefficients (d + 1, n)``."""
+    """Bernstein coefficients of the state over the last step, into ``work.coefficients (d + 1, n)``."""
     for i in range(work.coefficients.shape[0]):
         combine(y, h, method.interpolant[i], work.stages, method.a.shape[0], dimension, work.coefficients[i])
 

@@ -1,0 +1,157 @@
+"""The computations of the study, one regime of the vibro-impact system at a time; nothing is printed or drawn here."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from hybrid import (
+    DOP853,
+    HybridArc,
+    HybridSystem,
+    PeriodicOrbit,
+    periodic_orbit,
+    simulate,
+    stroboscopic_section,
+)
+from hybrid.section import Section
+from hybrid.solvers import RungeKutta
+from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
+from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
+
+SECTION_POINTS = 2000
+PORTRAIT_PERIODS = 60
+# The companion starts at 1e-8: a solver whose steps are off by that much would be all that it sees.
+TWO_ORBIT_TIGHTER = 1e-3
+
+
+@attrs.frozen
+class Start:
+    """A state ``(x1, x2, v1, v2)`` to start from, and what to call it."""
+
+    label: str
+    text: str
+    x0: tuple[float, float, float, float]
+
+
+STARTS = (
+    Start("I", "on the periodic orbit of 7.40", (-0.00765806, -0.00411675, 0.05565196, -0.35621583)),
+    Start("II", "at rest", (0.0, 0.05, 0.0, 0.0)),
+    Start("III", "both bodies moving", (0.0, 0.05, 0.3, 0.3)),
+)
+
+
+@attrs.frozen
+class Settings:
+    """How long and how accurately: averaged and skipped forcing periods, method, and whether to show progress."""
+
+    intervals: int = 10_000
+    transient: int = 1_000
+    solver: RungeKutta = attrs.field(factory=lambda: DOP853(rtol=1e-9, atol=1e-11))
+    progress: bool = False
+
+    @property
+    def two_orbit_solver(self) -> RungeKutta:
+        """The method for two neighbouring orbits, whose small distance must stand out of the error."""
+        rtol, atol = self.solver.rtol * TWO_ORBIT_TIGHTER, self.solver.atol * TWO_ORBIT_TIGHTER
+        return attrs.evolve(self.solver, rtol=max(rtol, 1e-13), atol=max(atol, 1e-16))
+
+
+@attrs.frozen(eq=False)
+class Regime:
+    """All that is computed at one frequency.
+
+    Attributes
+    ----------
+    omega
+        Frequency of the drive, rad/s.
+    spectra
+        One for each of ``STARTS``: all exponents from the first, the largest alone from the others.
+    two_orbit
+        The two-orbit estimates from the first start.
+    orbit
+        Periodic orbit of one forcing period near where the first start led, stable or not, if Newton's method found one.
+    section, arc
+        Points once a period ``(N, 4)``, and some periods of orbit, where the first start led.
+    """
+
+    omega: float
+    spectra: tuple[LyapunovSpectrum, ...]
+    two_orbit: TwoOrbitExponents
+    orbit: PeriodicOrbit
+    section: Section
+    arc: HybridArc
+
+    @property
+    def impacts_per_period(self) -> tuple[float, ...]:
+        """For each start. An impact is two jumps, into contact and out of it."""
+        return tuple(spectrum.jumps_per_interval / 2 for spectrum in self.spectra)
+
+    @property
+    def kind(self) -> str:
+        """Periodic, quasi-periodic or chaotic, by the first exponent and its standard error."""
+        first = self.spectra[0]
+        if not len(self.section) or first.intervals < 4:
+            return "undecided"
+        value, error = first.exponents[0], max(2 * first.standard_error[0], 1e-4)
+        if np.ptp(self.section.x, axis=0).max() < 1e-6:
+            return "periodic"
+        if abs(value) <= error:
+            return "quasi-periodic"
+        return "chaotic" if value > 0 else "not settled"
+
+
+def study_regime(system: HybridSystem, omega: float, settings: Settings) -> Regime:
+    """Exponents by every method at one frequency, with the orbit to look at.
+
+    Parameters
+    ----------
+    system
+        The vibro-impact system.
+    omega
+        Frequency of the drive, rad/s.
+    settings
+        How long and how accurately.
+    """
+    parameters, solver = {"omega": omega}, settings.solver
+    spectra = tuple(
+        lyapunov_spectrum(
+            system,
+            start.x0,
+            parameters=parameters,
+            k=system.dimension if start is STARTS[0] else 1,
+            intervals=settings.intervals,
+            transient=settings.transient,
+            solver=solver,
+            progress=settings.progress,
+        )
+        for start in STARTS
+    )
+    two_orbit = two_orbit_exponents(
+        system,
+        STARTS[0].x0,
+        parameters=parameters,
+        intervals=settings.intervals,
+        transient=settings.transient,
+        solver=settings.two_orbit_solver,
+        progress=settings.progress,
+    )
+    x, mode = spectra[0].x, spectra[0].mode
+    section = stroboscopic_section(
+        system,
+        x,
+        mode=mode,
+        parameters=parameters,
+        periods=min(settings.intervals, SECTION_POINTS),
+        solver=solver,
+        progress=settings.progress,
+    )
+    span = (0.0, PORTRAIT_PERIODS * 2 * np.pi / omega)
+    return Regime(
+        omega=omega,
+        spectra=spectra,
+        two_orbit=two_orbit,
+        orbit=periodic_orbit(system, section.x.mean(axis=0), parameters=parameters),
+        section=section,
+        arc=simulate(system, x, span, mode=mode, parameters=parameters, solver=solver),
+    )

@@ -1,0 +1,191 @@
+"""What becomes of the exponents when tangent vectors are carried carelessly, and what the paper's figures may owe to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid import DOP853, HybridSystem, Mode, Tsit5, simulate
+from hybrid.solvers import RungeKutta
+from lyapunov.demo_paper import DOUBTFUL
+from lyapunov.demo_study import STARTS, Settings
+from lyapunov.spectrum import lyapunov_spectrum
+
+TOLERANCES = tuple(10.0**-digits for digits in range(4, 11))
+LOOSE = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+TRAP_OMEGA = 7.40
+
+# So small that no absolute tolerance sees it, and powers of ten away from the smallest numbers there are.
+UNSEEN = 1e-30
+# Few enough that the directions stay apart between two orthonormalisations.
+PERIODS_AT_ONCE = 10
+# Most periods of an exponent that need not have more than four digits.
+ENOUGH = 2000
+
+
+def with_tangent(system: HybridSystem) -> HybridSystem:
+    r"""Vibro-impact system with one tangent vector as a state: ``u1, u2, w1, w2`` before ``x1, x2, v1, v2``.
+
+    The vector obeys :math:`\dot u = A u` with the Jacobian as the paper writes it, :math:`A`, where the parameter
+    ``slip = 1`` leaves out the :math:`\chi` that :math:`a_{34} = 2 \xi_2 \omega_2 \chi` is printed without. Saltation
+    matrices are the identity, so nothing happens to it at a jump.
+
+    From ``u = 0`` this is a way to the exponents of the wrong Jacobian: displacements of ``u`` alone follow it, stay
+    among themselves, and their growth is what ``lyapunov_spectrum`` with ``k = 4`` measures, their error controlled.
+    """
+    fields = {mode.name: mode.field for mode in system.modes}
+    return HybridSystem(
+        name=f"{system.name} with a tangent vector",
+        state=("u1", "u2", "w1", "w2", *system.state_names),
+        parameters={**system.parameters, "slip": 0.0},
+        modes=[
+            Mode("free", _with_variation(fields["free"], lambda x, p: 0.0)),
+            Mode("contact", _with_variation(fields["contact"], _contact_stiffness)),
+        ],
+        transitions=system.transitions,
+        period=system.period,
+    )
+
+
+def _with_variation(field: Callable[..., Any], stiffness: Callable[..., Any]) -> Callable[..., Any]:
+    def extended(t, x, p):  # type: ignore[no-untyped-def]
+        chi = p.m2 / p.m1
+        chi_of_a34 = chi + p.slip * (1 - chi)
+        damping = 2 * p.xi2 * p.omega2
+        spring = p.omega2**2 * (x.u1 - x.u2)
+        contact = stiffness(x, p) * (x.u1 - x.u2)
+        main = -(p.omega1**2) * x.u1 - 2 * p.xi1 * p.omega1 * x.w1
+        dw1 = main - chi * (spring + damping * x.w1) + chi_of_a34 * damping * x.w2 - contact / p.m1
+        dw2 = spring + damping * (x.w1 - x.w2) + contact / p.m2
+        return (x.w1, x.w2, dw1, dw2, *field(t, x, p))
+
+    return extended
+
+
+def _contact_stiffness(x: Any, p: Any) -> Any:
+    """Derivative of the Hertz force, kept off the zero where it has no derivative of its own."""
+    return 1.5 * p.K * np.sqrt(np.maximum(x.x1 - x.x2, 1e-20))
+
+
+@attrs.frozen(eq=False)
+class ToleranceRow:
+    """Exponents ``(4,)`` at one tolerance, tangent vectors inside the error control and outside."""
+
+    tolerance: float
+    inside: np.ndarray
+    outside: np.ndarray
+
+
+def tolerance_study(system: HybridSystem, settings: Settings) -> list[ToleranceRow]:
+    """The trap: exponents of the periodic regime over tolerances, with and without error control of the tangents."""
+    extended, method = with_tangent(system), type(settings.solver)
+    periods = min(settings.intervals, 500)
+    rows = []
+    for tolerance in TOLERANCES:
+        solver = method(rtol=tolerance, atol=tolerance)
+        spectrum = lyapunov_spectrum(
+            system, STARTS[0].x0, parameters={"omega": TRAP_OMEGA}, intervals=periods, solver=solver
+        )
+        outside = _uncontrolled_exponents(extended, TRAP_OMEGA, solver, periods)
+        rows.append(ToleranceRow(tolerance, spectrum.exponents, outside))
+    return rows
+
+
+def _uncontrolled_exponents(
+    extended: HybridSystem, omega: float, solver: RungeKutta, periods: int
+) -> np.ndarray:
+    """Exponents ``(4,)`` by QR of tangent vectors that the error control does not see, from start I.
+
+    One column at a time: the steps follow the state alone, so they are the same for all.
+    """
+    span = PERIODS_AT_ONCE * 2 * np.pi / omega
+    bursts = max(periods // PERIODS_AT_ONCE, 1)
+    x, mode, vectors = np.array(STARTS[0].x0), "free", np.eye(4)
+    growths = np.empty((bursts, 4))
+    for burst in range(bursts):
+        columns = []
+        for vector in vectors.T:
+            arc = simulate(
+                extended,
+                np.concatenate([UNSEEN * vector, x]),
+                (0.0, span),
+                mode=mode,
+                parameters={"omega": omega},
+                solver=solver,
+                samples=[span],
+            )
+            columns.append(arc.x[-1, :4] / UNSEEN)
+        x, mode = arc.x[-1, 4:], str(arc.mode[-1])
+        vectors, r = np.linalg.qr(np.column_stack(columns))
+        growths[burst] = np.log(np.abs(np.diag(r))) / span
+    # The first fifth is the turning of the vectors into their directions.
+    return growths[bursts // 5 :].mean(axis=0)
+
+
+@attrs.frozen(eq=False)
+class Candidate:
+    """A way in which the paper's Benettin column might have come about: the ``index``-th exponent of a run."""
+
+    text: str
+    system: HybridSystem
+    x0: tuple[float, ...]
+    solver: RungeKutta
+    parameters: dict[str, float] = attrs.field(factory=dict)
+    index: int = 0
+
+    def exponent(self, omega: float, settings: Settings) -> float:
+        """What the column would then tend to at one frequency."""
+        spectrum = lyapunov_spectrum(
+            self.system,
+            self.x0,
+            parameters={"omega": omega, **self.parameters},
+            k=self.index + 1,
+            intervals=min(settings.intervals, ENOUGH),
+            transient=settings.transient,
+            solver=self.solver,
+            progress=settings.progress,
+        )
+        return float(spectrum.exponents[self.index])
+
+
+@attrs.frozen(eq=False)
+class Explanation:
+    """A candidate's text and the exponent it gives at each frequency."""
+
+    text: str
+    exponents: dict[float, float]
+
+    @property
+    def misfit(self) -> float:
+        """Largest distance from the two figures of the paper that are in doubt; nan unless both were computed."""
+        if not DOUBTFUL.keys() <= self.exponents.keys():
+            return float("nan")
+        return max(abs(self.exponents[omega] - value) for omega, value in DOUBTFUL.items())
+
+
+def candidates(system: HybridSystem, solver: RungeKutta) -> list[Candidate]:
+    """The exponent as it is, then with each of the faults that might explain the paper's."""
+    first, other = STARTS[0].x0, STARTS[2].x0
+    loose = [
+        Candidate(f"(b) loose tangents, {method.__name__} {tolerance:.0e}", system, first, method(rtol=tolerance, atol=tolerance))
+        for method in (Tsit5, DOP853)
+        for tolerance in LOOSE
+    ]
+    return [
+        Candidate("the exponent as it is", system, first, solver),
+        Candidate("(a) a34 without chi", with_tangent(system), (0.0,) * 4 + first, solver, {"slip": 1.0}),
+        *loose,
+        Candidate("(c) the attractor of start III", system, other, solver),
+        Candidate("(d) the second exponent", system, first, solver, index=1),
+    ]
+
+
+def explanations(system: HybridSystem, omegas: Sequence[float], settings: Settings) -> list[Explanation]:
+    """What each candidate gives at the frequencies."""
+    return [
+        Explanation(candidate.text, {omega: candidate.exponent(omega, settings) for omega in omegas})
+        for candidate in candidates(system, settings.solver)
+    ]

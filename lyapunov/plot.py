@@ -1,0 +1,185 @@
+"""Charts of exponents and orbits: each function draws on the axes it is given, or makes a whole figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid.arc import HybridArc
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Told apart by every kind of eye, and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
+INK = "#333333"
+STYLE: dict[str, Any] = {
+    "figure.constrained_layout.use": True,
+    "savefig.dpi": 160,
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.3,
+}
+
+POINTS_OF_A_LINE = 1500
+POINTS_OF_A_PORTRAIT = 40_000
+
+
+def style() -> AbstractContextManager[None]:
+    """Settings of Matplotlib under which these charts look as meant: ``with style(): ...``."""
+    import matplotlib
+
+    return matplotlib.rc_context(STYLE)
+
+
+def plot_convergence(
+    ax: Axes,
+    estimates: Mapping[str, ArrayLike],
+    *,
+    points: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    truth: float | None = None,
+    truth_label: str = "exact",
+) -> Axes:
+    """Estimates of an exponent against the number of intervals.
+
+    Parameters
+    ----------
+    ax
+        Where to draw.
+    estimates
+        Label to history ``(M,)`` over 1, 2, ..., M intervals.
+    points
+        Label to numbers of intervals and values there: somebody else's estimate of the same label, in its colour.
+    truth
+        Value to converge to, drawn as a line.
+    """
+    points = points or {}
+    if truth is not None:
+        ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
+    for i, label in enumerate(dict.fromkeys([*estimates, *points])):
+        colour = COLOURS[i % len(COLOURS)]
+        if label in estimates:
+            history = np.asarray(estimates[label], dtype=float)
+            at = np.unique(np.geomspace(1, max(len(history), 1), POINTS_OF_A_LINE).astype(int))
+            at = at[at <= len(history)]
+            ax.plot(at, history[at - 1], color=colour, label=label)
+        if label in points:
+            ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white", label=f"{label}, paper")
+    ax.set_xscale("log")
+    ax.set_xlabel("intervals $M$")
+    ax.set_ylabel("exponent estimate")
+    ax.grid(True, axis="y")
+    ax.legend()
+    return ax
+
+
+def plot_phase_portrait(
+    ax: Axes,
+    arc: HybridArc,
+    x: str,
+    y: str,
+    *,
+    section: ArrayLike | None = None,
+    labels: tuple[str, str] | None = None,
+) -> Axes:
+    """Orbit in the plane of two components of the state, jumps as straight lines, with points of a section.
+
+    Parameters
+    ----------
+    ax
+        Where to draw.
+    arc
+        With dense output, that is, simulated without ``samples``.
+    x, y
+        Names of the components.
+    section
+        Points ``(N, n)`` to mark.
+    labels
+        Texts at the axes; by default the names.
+    """
+    names = arc.system.state_names
+    i, j = names.index(x), names.index(y)
+    orbit = _dense(arc)
+    ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
+    if section is not None:
+        marks = np.asarray(section, dtype=float)
+        # A fixed point must be seen and a cloud must not clot.
+        size = 2.0 if np.ptp(marks, axis=0).max() > 1e-6 else 26.0
+        ax.scatter(marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True)
+    ax.set_xlabel((labels or (x, y))[0])
+    ax.set_ylabel((labels or (x, y))[1])
+    return ax
+
+
+def _dense(arc: HybridArc) -> np.ndarray:
+    """Points along an arc in order, close enough for a smooth line, with both sides of each jump."""
+    times = np.linspace(arc.t[0], arc.t[-1], POINTS_OF_A_PORTRAIT)
+    jumps = np.searchsorted(arc.jumps.t, times, side="right")
+    order = np.lexsort((np.concatenate([arc.t, times]), np.concatenate([arc.j, jumps])))
+    return np.concatenate([arc.x, arc(times)])[order]
+
+
+@attrs.frozen(eq=False)
+class Panel:
+    """One column of :func:`plot_regimes`: an orbit, its section ``(N, n)``, the history ``(M,)`` of its first exponent."""
+
+    title: str
+    arc: HybridArc
+    section: np.ndarray
+    history: np.ndarray
+    spread: float
+
+
+def plot_regimes(
+    panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, str] | None = None
+) -> Figure:
+    """Small multiples, a column a regime: phase portrait, section, and the first exponent over the intervals."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(3, len(panels), figsize=(3.2 * len(panels), 7.6), squeeze=False)
+    for column, panel in zip(axes.T, panels, strict=True):
+        plot_phase_portrait(column[0], panel.arc, x, y, section=panel.section, labels=labels)
+        _plot_section(column[1], panel, x, y, labels or (x, y))
+        plot_convergence(column[2], {"first exponent": panel.history}, truth=0.0)
+        column[2].get_legend().remove()
+        final = float(panel.history[-1]) if len(panel.history) else 0.0
+        # The start of a history is far off; what it settles to is the news.
+        column[2].set_ylim(final - panel.spread, final + panel.spread)
+        column[0].set_title(panel.title)
+    for row in axes:
+        for ax in row[1:]:
+            ax.set_ylabel("")
+    for ax, title in zip(axes[1:, 0], ("Section, once a period", "First exponent"), strict=True):
+        ax.set_title(title)
+    return figure
+
+
+def _plot_section(ax: Axes, panel: Panel, x: str, y: str, labels: tuple[str, str]) -> None:
+    names = panel.arc.system.state_names
+    points = panel.section[:, [names.index(x), names.index(y)]]
+    fixed = np.ptp(points, axis=0).max() <= 1e-6
+    ax.scatter(*points.T, s=26.0 if fixed else 2.0, color=COLOURS[1], linewidths=0, rasterized=True)
+    if fixed:
+        (a, b), radius = points.mean(axis=0), np.maximum(np.abs(points.mean(axis=0)), 1e-3) * 0.2
+        ax.set_xlim(a - radius[0], a + radius[0])
+        ax.set_ylim(b - radius[1], b + radius[1])
+    ax.set_xlabel(labels[0])
+    ax.set_ylabel(labels[1])
