@@ -4,7 +4,7 @@ A model is a graph: modes are smooth vector fields, transitions are guards and r
 it the import of the compiler, waits for the first call that needs it.
 """
 
-from hybrid.arc import HybridArc, Jump
+from hybrid.arc import Grazing, HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbit import PeriodicOrbit, periodic_orbit
@@ -19,6 +19,7 @@ __all__ = [
     "DOP853",
     "ArgumentError",
     "CompiledSystem",
+    "Grazing",
     "Guard",
     "HybridArc",
     "HybridError",

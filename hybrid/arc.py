@@ -13,6 +13,9 @@ from hybrid.errors import ArgumentError
 from hybrid.status import Status
 from hybrid.system import HybridSystem
 
+# In the order of the kernel's codes.
+KINDS = ("transverse", "grazing", "limit")
+
 
 @attrs.frozen(eq=False)
 class Jump:
@@ -42,6 +45,31 @@ class Jump:
     x_plus: np.ndarray
     saltation: np.ndarray
     transversality: float
+    kind: str
+
+
+@attrs.frozen(eq=False)
+class Grazing:
+    """A guard that comes closer to zero than the tolerances can tell, and turns back: a touch, not a jump.
+
+    Attributes
+    ----------
+    t, j
+        Time, and the number of jumps before.
+    transition
+        Name of the transition that did not fire.
+    x
+        State ``(n,)``.
+    value, acceleration
+        The guard and its second derivative along the flow there; its speed is zero.
+    """
+
+    t: float
+    j: int
+    transition: str
+    x: np.ndarray
+    value: float
+    acceleration: float
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -54,6 +82,8 @@ class Jumps(Sequence[Jump]):
         ``(jumps,)``.
     transition
         ``(jumps,)`` indices into the system's transitions.
+    kind
+        ``(jumps,)`` indices into ``KINDS``.
     x_minus, x_plus
         ``(jumps, n)``.
     saltation
@@ -64,6 +94,7 @@ class Jumps(Sequence[Jump]):
     t: np.ndarray
     transversality: np.ndarray
     transition: np.ndarray
+    kind: np.ndarray
     x_minus: np.ndarray
     x_plus: np.ndarray
     saltation: np.ndarray
@@ -90,16 +121,19 @@ class Jumps(Sequence[Jump]):
 
     def _jump(self, i: int) -> Jump:
         transition = self.system.transitions[self.transition[i]]
+        kind = KINDS[self.kind[i]]
+        target = transition.accumulates_to if kind == "limit" else transition.target
         return Jump(
             float(self.t[i]),
             i,
             transition.name,
             transition.source,
-            transition.target,
+            target or transition.target,
             self.x_minus[i],
             self.x_plus[i],
             self.saltation[i],
             float(self.transversality[i]),
+            kind,
         )
 
 
@@ -148,6 +182,8 @@ class HybridArc:
         Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``, mode names ``(N,)``.
     jumps
         Sequence of :class:`Jump`.
+    grazings
+        Each :class:`Grazing`, in order.
     status
         How the run ended; what was computed is here even where it ended early.
     fundamental
@@ -164,6 +200,7 @@ class HybridArc:
     x: np.ndarray
     mode: np.ndarray
     jumps: Jumps
+    grazings: tuple[Grazing, ...]
     status: Status
     fundamental: np.ndarray | None
     steps: int

@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 from hybrid.errors import ArgumentError
+from hybrid.kernels.codes import NO_MODE
 from hybrid.load import load_kernels
 
 if TYPE_CHECKING:
@@ -74,6 +75,10 @@ class CompiledSystem:
             affine_guard=_indices(self.emitted.affine_guard),
             boundary=_indices(transition.source != transition.target for transition in transitions),
             marker=_indices(transition.is_marker for transition in transitions),
+            accumulates_to=_indices(
+                NO_MODE if transition.accumulates_to is None else system.mode_index(transition.accumulates_to)
+                for transition in transitions
+            ),
             period=system.forcing_period(parameters) or 0.0,
         )
 

@@ -13,7 +13,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
 from hybrid.load import load_kernels
 from hybrid.solvers import DOP853, RungeKutta
-from hybrid.status import Status, run_status
+from hybrid.status import Status, StatusCode, run_status
 from hybrid.system import HybridSystem
 
 # Degree of the polynomials fitted to guards that are not affine.
@@ -64,6 +64,7 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
         field=np.zeros(n),
         field_after=np.zeros(n),
         state=np.zeros(n),
+        settled=np.zeros(n),
         saltation=np.zeros((n, n)),
         coefficients=np.zeros((degree + 1, n)),
         polynomial=np.zeros(width),
@@ -88,14 +89,17 @@ def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) ->
 
     n = dimension
     return Record(
-        used=np.zeros(2, dtype=np.int64),
+        used=np.zeros(3, dtype=np.int64),
         step_time=np.zeros((steps, 2)),
         step_place=np.zeros((steps, 3), dtype=np.int64),
         step_coefficients=np.zeros((steps, degree + 1, n)),
         jump_time=np.zeros((jumps, 2)),
-        jump_place=np.zeros((jumps, 2), dtype=np.int64),
+        jump_place=np.zeros((jumps, 3), dtype=np.int64),
         jump_states=np.zeros((jumps, 2, n)),
         jump_saltation=np.zeros((jumps, n, n)),
+        grazing_time=np.zeros((jumps, 3)),
+        grazing_place=np.zeros((jumps, 3), dtype=np.int64),
+        grazing_state=np.zeros((jumps, n)),
     )
 
 
@@ -238,6 +242,14 @@ class Trajectory:
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
+        ambiguous = int(self.run.count[codes.ORDER_MATTERED])
+        if code == codes.DONE and ambiguous:
+            return Status(
+                StatusCode.AMBIGUOUS_ORDER,
+                f"{ambiguous} times two guards were reached together and the order of their transitions mattered; "
+                "the one listed first was fired first.",
+                "Choose the order in which the transitions are listed, or add one for the corner.",
+            )
         last = self.run.count[codes.LAST_FIRED]
         name = self.system.transition_names[last] if last >= 0 else None
         return run_status(code, self.t, self.mode, name)
@@ -291,6 +303,7 @@ def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t
         first_step=np.zeros(len(system.modes)),
         scale=np.abs(y[: system.dimension]),
         growth=np.zeros(tangents),
+        trail=np.zeros((3, system.dimension + 1)),
     )
 
 

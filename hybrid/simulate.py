@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid.arc import HybridArc, Jumps, Pieces, hybrid_points, join
+from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
 from hybrid.run import Trajectory, empty_record, start
@@ -134,6 +134,7 @@ class _Recorder:
         self.record = empty_record(n, degree, STEPS_AT_ONCE, JUMPS_AT_ONCE)
         self.steps = [_step_columns(empty_record(n, degree), 0.0)]
         self.jumps = [_jump_columns(empty_record(n, degree), 0.0)]
+        self.grazings = [_grazing_columns(empty_record(n, degree), 0.0)]
         self.states = np.full((0 if times is None else len(times), n), np.nan)
         self.places = np.zeros((len(self.states), 2), dtype=np.int64)
         self.sampled = 0
@@ -164,6 +165,7 @@ class _Recorder:
             x=x,
             mode=names[mode],
             jumps=jumps,
+            grazings=_grazings(trajectory.system, *join(self.grazings)),
             status=trajectory.status(code),
             fundamental=trajectory.tangent_matrix if trajectory.tangents else None,
             steps=int(run.count[codes.STEPS]),
@@ -175,6 +177,7 @@ class _Recorder:
         period = self.trajectory.model.period
         columns = _step_columns(self.record, period)
         self.jumps.append(_jump_columns(self.record, period))
+        self.grazings.append(_grazing_columns(self.record, period))
         if self.times is None:
             self.steps.append(columns)
         else:
@@ -209,14 +212,30 @@ def _step_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
 
 def _jump_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
     used = record.used[1]
-    cycle, transition = record.jump_place[:used].T
+    cycle, transition, kind = record.jump_place[:used].T
     phase, transversality = record.jump_time[:used].T
     states = record.jump_states[:used]
     return (
         cycle * period + phase,
         transversality.copy(),
         transition.copy(),
+        kind.copy(),
         states[:, 0].copy(),
         states[:, 1].copy(),
         record.jump_saltation[:used].copy(),
+    )
+
+
+def _grazing_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
+    used = record.used[2]
+    cycle, transition, j = record.grazing_place[:used].T
+    phase, value, acceleration = record.grazing_time[:used].T
+    x = record.grazing_state[:used].copy()
+    return cycle * period + phase, value.copy(), acceleration.copy(), transition.copy(), j.copy(), x
+
+
+def _grazings(system: HybridSystem, *columns: np.ndarray) -> tuple[Grazing, ...]:
+    return tuple(
+        Grazing(float(t), int(j), system.transition_names[transition], x, float(value), float(acceleration))
+        for t, value, acceleration, transition, j, x in zip(*columns, strict=True)
     )

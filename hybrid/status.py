@@ -19,6 +19,7 @@ class StatusCode(IntEnum):
     NON_FINITE = codes.NON_FINITE
     ACCUMULATION = codes.ACCUMULATION
     STUCK = codes.STUCK
+    AMBIGUOUS_ORDER = 99
     SINGULAR_SALTATION = 100
     NOT_CONVERGED = 101
 

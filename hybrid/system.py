@@ -150,6 +150,10 @@ class Transition:
         When it fires.
     reset
         What happens to the state there; ``None`` is the identity.
+    accumulates_to
+        Mode in which the state rests on the guard after infinitely many jumps in finite time (chatter), if
+        this transition leads from a mode to itself and its jumps can accumulate. Without it a run ends at the
+        limit.
     name
         Defaults to ``"source->target"``.
 
@@ -163,7 +167,16 @@ class Transition:
     target: str = attrs.field(validator=_nonempty_name)
     guard: Guard = attrs.field(converter=_as_guard)
     reset: Reset | None = attrs.field(default=None, converter=_as_reset)
+    accumulates_to: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(kw_only=True, validator=_nonempty_name)
+
+    @accumulates_to.validator
+    def _check_limit(self, attribute: attrs.Attribute[str | None], value: object) -> None:
+        if value is not None and self.source != self.target:
+            raise ModelError(
+                f"Transition {self.source}->{self.target}: accumulates_to={value!r} is for transitions from a mode "
+                "to itself, whose jumps may accumulate. Leave it out."
+            )
 
     @name.default
     def _default_name(self) -> str:
@@ -303,6 +316,9 @@ class HybridSystem:
             graph.add_node(mode.name, mode=mode)
         for transition in self.transitions:
             graph.add_edge(transition.source, transition.target, key=transition.name, transition=transition)
+            if transition.accumulates_to is not None:
+                limit = f"limit of {transition.name}"
+                graph.add_edge(transition.source, transition.accumulates_to, key=limit, transition=transition)
         return graph
 
     def mode_index(self, name: str) -> int:
@@ -356,18 +372,19 @@ class HybridSystem:
                     f"Give each {what} a name of its own."
                 )
         for transition in self.transitions:
-            for end in ("source", "target"):
+            for end in ("source", "target", "accumulates_to"):
                 name = getattr(transition, end)
-                if name not in self.mode_names:
+                if name is not None and name not in self.mode_names:
                     what = f"Transition {transition.name!r}: {end} mode"
                     raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
         self._check_reachable()
 
     def _check_reachable(self) -> None:
         """A mode that no transition enters or leaves, in a system of several, is a slip of the pen."""
-        linked = {
-            name for tr in self.transitions if tr.source != tr.target for name in (tr.source, tr.target)
-        }
+        linked = set()
+        for transition in self.transitions:
+            ends = {transition.source, transition.target, transition.accumulates_to} - {None}
+            linked |= ends if len(ends) > 1 else set()
         lonely = [name for name in self.mode_names if name not in linked]
         if len(self.modes) > 1 and lonely:
             raise ModelError(

@@ -5,7 +5,7 @@ and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 
 else is cut in two. The coefficients' hull makes "no root" the cheap case, which nearly every step is.
 """
 
-from numba import boolean, float64, int64, njit, types
+from numba import boolean, float64, int64, njit, types, void
 
 from hybrid.kernels.layout import INLINE, KERNEL, MATRIX, VECTOR
 
@@ -116,13 +116,50 @@ def first_crossing(coefficients, degree, side, direction, stack):
     return NO_ROOT, side
 
 
-@njit(boolean(VECTOR, int64, int64), **INLINE)
-def stays(coefficients, degree, side):
-    """Whether all coefficients have the sign ``side``: the proof that serves nearly every step."""
+@njit(boolean(VECTOR, int64, int64, float64), **INLINE)
+def stays(coefficients, degree, side, band):
+    """Whether all coefficients lie beyond ``band`` on one side: the proof that serves nearly every step."""
     for i in range(degree + 1):  # noqa: SIM110 (no generators in kernels)
-        if not coefficients[i] * side > 0.0:
+        if not coefficients[i] * side > band:
             return False
     return True
+
+
+@njit(void(VECTOR, int64, float64), **KERNEL)
+def restrict(coefficients, degree, start):
+    """Replace a polynomial, in place, by its restriction to ``[start, 1]`` as a polynomial on ``[0, 1]``."""
+    for level in range(degree, 0, -1):
+        for i in range(level):
+            coefficients[i] += start * (coefficients[i + 1] - coefficients[i])
+
+
+@njit(types.UniTuple(float64, 2)(VECTOR, int64, int64, MATRIX), **KERNEL)
+def lowest(coefficients, degree, side, stack):
+    """Place and value of the deepest interior minimum of ``side * polynomial``; ``NO_ROOT`` if there is none.
+
+    Minima are where the derivative crosses zero upwards. ``stack (depth, >= degree + 3)`` is scratch.
+    """
+    slope = stack[stack.shape[0] - 2]
+    best, depth = NO_ROOT, 0.0
+    start = 0.0
+    # The derivative has fewer roots than the polynomial; what lies before ``start`` has been looked at.
+    for _ in range(2 * degree):
+        for i in range(degree):
+            slope[i] = side * (coefficients[i + 1] - coefficients[i])
+        restrict(slope, degree - 1, start)
+        rising = slope[0] > 0.0
+        theta, _ = first_crossing(slope, degree - 1, 1 if rising else -1, -1 if rising else 1, stack)
+        if theta > 1.0:
+            break
+        start += theta * (1.0 - start)
+        if not rising:
+            value, _ = value_and_slope(coefficients, degree, start, stack[stack.shape[0] - 1])
+            if best > 1.0 or side * value < side * depth:
+                best, depth = start, value
+        start += CLUSTER
+        if start >= 1.0:
+            break
+    return best, depth
 
 
 @njit(int64(VECTOR, int64), **KERNEL)

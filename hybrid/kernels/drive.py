@@ -4,22 +4,31 @@ import math
 
 from numba import boolean, float64, int64, njit, void
 
+from hybrid.kernels.bernstein import NO_ROOT
+from hybrid.kernels.chatter import chatter_matrix
 from hybrid.kernels.codes import (
     ACCUMULATION,
     CYCLE,
     DIVERGENCE,
     DONE,
     ENTERING,
+    GRAZING_GUARD,
+    GRAZING_PLACE,
+    GRAZING_VALUE,
+    GRAZINGS,
     JUMPS,
     JUMPS_HERE,
+    LAST_FIRED,
     LAST_RATIO,
     LAST_STEP,
     MAX_JUMPS,
     MAX_STEPS,
     MODE,
     NEXT_STEP,
+    NO_MODE,
     NO_TRANSITION,
     NON_FINITE,
+    ORDER_MATTERED,
     PENDING,
     PHASE,
     PHASE_OF_RUN,
@@ -27,13 +36,23 @@ from hybrid.kernels.codes import (
     READY,
     RECORD_FULL,
     REJECTED,
+    SIMULTANEOUS,
     STALE,
     STEP_TOO_SMALL,
     STEPS,
     STUCK,
 )
-from hybrid.kernels.guards import earliest_crossing, guard_speed, guard_value, land, rounding_band
-from hybrid.kernels.jump import enter, jump
+from hybrid.kernels.corner import companion, order_matters
+from hybrid.kernels.guards import (
+    earliest_crossing,
+    guard_acceleration,
+    guard_speed,
+    guard_value,
+    land,
+    rounding_band,
+    value_on_interpolant,
+)
+from hybrid.kernels.jump import carry_tangents, enter, finish_chatter, forward, jump
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
 from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rates, starting_step
 
@@ -102,12 +121,59 @@ def accept(model, method, run, tangents, h, correction, work):
     mode = run.count[MODE]
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         run.on_guard[model.outgoing[slot]] = 0
-    phase = run.clock[PHASE] + (h + correction)
-    if model.period > 0.0:
-        while phase >= model.period:
-            phase -= model.period
-            run.count[CYCLE] += 1
-    run.clock[PHASE] = phase
+    forward(run, model.period, h + correction)
+
+
+@njit(float64(MODEL, RUN, int64, float64), **INLINE)
+def time_left(model, run, stop_cycle, stop_phase):
+    """Time until the stop; periods are counted, not measured, so that none of their digits is lost."""
+    return (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - run.clock[PHASE])
+
+
+@njit(void(MODEL, METHOD, RUN, RECORD, float64, float64, WORK), **KERNEL)
+def remember_grazing(model, method, run, record, t, h, work):
+    """Count the grazing found on the attempted step, and write it into the record if that keeps any."""
+    run.count[GRAZINGS] += 1
+    slot = record.used[2]
+    if slot == record.grazing_time.shape[0]:
+        return
+    mode, transition = run.count[MODE], run.count[GRAZING_GUARD]
+    theta = run.clock[GRAZING_PLACE]
+    interpolate(method, h, run.y, model.dimension, work)
+    value_on_interpolant(model, transition, t, h, theta, work)
+    for i in range(model.dimension):
+        record.grazing_state[slot, i] = work.state[i]
+    place = record.grazing_state[slot]
+    model.flow(mode, t + theta * h, place, model.parameters, work.field)
+    guard_speed(model, transition, t + theta * h, place, work.field, work.gradient)
+    record.grazing_time[slot, 0], record.grazing_time[slot, 1] = t + theta * h, run.clock[GRAZING_VALUE]
+    record.grazing_time[slot, 2] = guard_acceleration(model, transition, mode, t + theta * h, place, work)
+    record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
+    record.grazing_place[slot, 2] = run.count[JUMPS]
+    record.used[2] = slot + 1
+
+
+@njit(int64(MODEL, RUN, int64, WORK), **KERNEL)
+def first_in_order(model, run, fired, work):
+    """Of the transitions due at the point just landed on, the one listed first; notes whether the order matters."""
+    other = companion(model, run, fired, work)
+    if other == NO_TRANSITION:
+        return fired
+    run.count[SIMULTANEOUS] += 1
+    if order_matters(model, run, fired, other, work):
+        run.count[ORDER_MATTERED] += 1
+    return min(fired, other)
+
+
+@njit(void(MODEL, RUN, int64, int64, boolean, WORK), **KERNEL)
+def rest(model, run, limit_mode, tangents, orthonormal, work):
+    """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard already."""
+    transition = run.count[LAST_FIRED]
+    if tangents > 0:
+        chatter_matrix(model, run, transition, work)
+        carry_tangents(model, run, tangents, orthonormal, work)
+    run.count[PREVIOUS_MODE] = run.count[MODE]
+    run.count[MODE] = limit_mode
 
 
 @njit(void(METHOD, int64, WORK), **INLINE)
@@ -160,12 +226,21 @@ def advance(
         if run.count[PENDING] != NO_TRANSITION:
             if run.count[JUMPS] >= max_jumps:
                 return MAX_JUMPS
-            if 0 < record.jump_time.shape[0] == record.used[1]:
+            # One more than this jump: it may turn out to be the last of a chatter, whose limit follows at
+            # once.
+            if 0 < record.jump_time.shape[0] <= record.used[1] + 1:
                 return RECORD_FULL
             if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
                 return ACCUMULATION
-            jump(model, run, record, run.count[PENDING], tangents, orthonormal, work)
+            fired = run.count[PENDING]
             run.count[PENDING] = NO_TRANSITION
+            jump(model, method, run, record, fired, tangents, orthonormal, work)
+            remaining = time_left(model, run, stop_cycle, stop_phase)
+            if (
+                finish_chatter(model, method, run, record, fired, remaining, tangents, orthonormal, work)
+                and model.accumulates_to[fired] == NO_MODE
+            ):
+                return ACCUMULATION
             continue
         mode = run.count[MODE]
         if run.count[PHASE_OF_RUN] == ENTERING:
@@ -173,7 +248,11 @@ def advance(
                 return NON_FINITE
             fires, stuck = enter(model, run, work)
             if stuck:
-                return ACCUMULATION
+                limit_mode = model.accumulates_to[run.count[LAST_FIRED]]
+                if limit_mode == NO_MODE:
+                    return ACCUMULATION
+                rest(model, run, limit_mode, tangents, orthonormal, work)
+                continue
             if fires != NO_TRANSITION:
                 if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
                     return STUCK
@@ -185,7 +264,7 @@ def advance(
             run.clock[LAST_STEP] = 0.0
             run.count[PHASE_OF_RUN] = STALE
         t = run.clock[PHASE]
-        remaining = (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - t)
+        remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
             run.count[PENDING] = arrived(model, run, work)
             if run.count[PENDING] != NO_TRANSITION:
@@ -198,7 +277,9 @@ def advance(
             if not run.clock[NEXT_STEP] > 0.0:
                 return NON_FINITE
             run.count[PHASE_OF_RUN] = READY
-        if recording and record.used[0] == record.step_time.shape[0]:
+        if recording and record.used[0] + 1 >= record.step_time.shape[0]:
+            return RECORD_FULL
+        if 0 < record.grazing_time.shape[0] == record.used[2]:
             return RECORD_FULL
         if run.count[STEPS] >= max_steps:
             return MAX_STEPS
@@ -224,6 +305,8 @@ def advance(
             if not all_affine(model, mode):
                 interpolate(method, h, run.y, n, work)
             theta, fired = earliest_crossing(model, method, run, t, h, work)
+            if run.clock[GRAZING_PLACE] < (theta if fired != NO_TRANSITION else NO_ROOT):
+                remember_grazing(model, method, run, record, t, h, work)
         correction = 0.0
         if fired != NO_TRANSITION:
             h, correction = land(model, method, fired, mode, t, h, theta, run.y, tangents, work)
@@ -233,7 +316,7 @@ def advance(
             remember_step(model, method, run, record, t, h, work)
         accept(model, method, run, tangents, h, correction, work)
         if fired != NO_TRANSITION:
-            run.count[PENDING] = fired
+            run.count[PENDING] = first_in_order(model, run, fired, work)
         else:
             if last:
                 run.count[CYCLE] = stop_cycle

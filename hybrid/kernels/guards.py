@@ -4,8 +4,8 @@ import math
 
 from numba import float64, int64, njit, types, void
 
-from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
-from hybrid.kernels.codes import MODE, NO_TRANSITION
+from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, lowest, stays
+from hybrid.kernels.codes import GRAZING_GUARD, GRAZING_PLACE, GRAZING_VALUE, MODE, NO_TRANSITION
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
 from hybrid.kernels.step import attempt
 
@@ -142,6 +142,24 @@ def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
     return NO_ROOT, side
 
 
+@njit(float64(METHOD, RUN, VECTOR, int64), **INLINE)
+def error_band(method, run, gradient, n):
+    """How far the tolerances can move a guard with this gradient: closer to zero than that is a grazing."""
+    size = 0.0
+    for i in range(n):
+        size += abs(gradient[i]) * (method.atol + method.rtol * run.scale[i])
+    return size
+
+
+@njit(void(METHOD, RUN, int64, int64, int64, float64, WORK), **KERNEL)
+def note_grazing(method, run, transition, degree, side, band, work):
+    """Keep the earliest place of the step where the polynomial of a guard comes that close to zero without crossing."""
+    theta, value = lowest(work.polynomial, degree, side, work.stack)
+    if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.clock[GRAZING_PLACE]:
+        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, value
+        run.count[GRAZING_GUARD] = transition
+
+
 @njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, WORK), **INLINE)
 def earliest_crossing(model, method, run, t, h, work):
     """Earliest crossing on the attempted step over all guards of the mode, and its transition.
@@ -151,6 +169,7 @@ def earliest_crossing(model, method, run, t, h, work):
     """
     mode = run.count[MODE]
     earliest, fired = NO_ROOT, NO_TRANSITION
+    run.clock[GRAZING_PLACE] = NO_ROOT
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
@@ -161,11 +180,14 @@ def earliest_crossing(model, method, run, t, h, work):
             degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
             for _ in range(on_guard):
                 degree = divide_by_theta(work.polynomial, degree)
-            if stays(work.polynomial, degree, side):
+            band = error_band(method, run, work.gradient, model.dimension)
+            if stays(work.polynomial, degree, side, band):
                 continue
             theta, side = first_crossing(
                 work.polynomial, degree, side, model.direction[transition], work.stack
             )
+            if theta > 1.0 and side == run.side[transition] and on_guard == 0:
+                note_grazing(method, run, transition, degree, side, band, work)
         else:
             offset = value if on_guard > 0 else 0.0
             theta, side = composed_crossing(model, transition, t, h, offset, on_guard, side, work)

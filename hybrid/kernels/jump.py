@@ -4,25 +4,35 @@ import math
 
 from numba import boolean, float64, int64, njit, types, void
 
+from hybrid.kernels.chatter import accumulation, chatter_matrix, drift, drift_is_known, remember_impulse
 from hybrid.kernels.codes import (
     CYCLE,
+    EARLIER_JUMP_CYCLE,
+    EARLIER_JUMP_PHASE,
     ENTERING,
+    GRAZING,
+    ILL_CONDITIONED,
+    ILL_CONDITIONED_GROWTH,
     JUMPS,
     JUMPS_HERE,
     LARGEST_SALTATION,
     LAST_FIRED,
     LAST_JUMP_CYCLE,
     LAST_JUMP_PHASE,
+    LAST_TRANSVERSALITY,
+    LIMIT_OF_CHATTER,
     LOG_DETERMINANT,
     MODE,
+    NO_MODE,
     NO_TRANSITION,
     PHASE,
     PHASE_OF_RUN,
     PREVIOUS_MODE,
     SINGULAR_JUMPS,
+    TRANSVERSE,
 )
-from hybrid.kernels.guards import guard_acceleration, guard_speed, guard_value, rounding_band
-from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.guards import error_band, guard_acceleration, guard_speed, guard_value, rounding_band
+from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
 
 
@@ -64,7 +74,8 @@ def enter(model, run, work):
         if direction == 0 or side != direction or model.marker[transition] == 1:
             continue
         if landed and transition == run.count[LAST_FIRED]:
-            stuck = stuck or (on_guard and resting)
+            against = run.clock[LAST_TRANSVERSALITY] * direction <= 0.0
+            stuck = stuck or (on_guard and (resting or against))
         elif (
             fires == NO_TRANSITION
             and not was_beyond
@@ -100,29 +111,63 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
     return transversality
 
 
-@njit(void(MODEL, RUN, RECORD, int64, int64, boolean, WORK), **KERNEL)
-def jump(model, run, record, transition, tangents, orthonormal, work):
-    """Make a jump at the current point of the run: state, tangent vectors, counters, record.
+@njit(void(MODEL, RUN, RECORD, int64, float64, int64, VECTOR, WORK), **KERNEL)
+def remember_jump(model, run, record, transition, transversality, kind, x_plus, work):
+    """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any."""
+    n, slot = model.dimension, record.used[1]
+    if slot == record.jump_time.shape[0]:
+        return
+    record.jump_time[slot, 0], record.jump_time[slot, 1] = run.clock[PHASE], transversality
+    record.jump_place[slot, 0], record.jump_place[slot, 1] = run.count[CYCLE], transition
+    record.jump_place[slot, 2] = kind
+    for i in range(n):
+        record.jump_states[slot, 0, i] = run.y[i]
+        record.jump_states[slot, 1, i] = x_plus[i]
+        for j in range(n):
+            record.jump_saltation[slot, i, j] = work.saltation[i, j]
+    record.used[1] = slot + 1
 
-    With ``orthonormal`` the tangent vectors are orthonormalised before and after, so that a direction the
-    saltation matrix annihilates is told from one that is merely short.
+
+@njit(void(MODEL, RUN, int64, boolean, WORK), **KERNEL)
+def carry_tangents(model, run, tangents, orthonormal, work):
+    """Multiply the tangent vectors by ``work.saltation``, and add its log-determinant to the run's.
+
+    With ``orthonormal`` they are orthonormalised before and after, so that a direction the matrix
+    annihilates is told from one that is merely short.
     """
-    n = model.dimension
-    t, y = run.clock[PHASE], run.y
-    x_plus = work.new
-    transversality = saltation(model, transition, run.count[MODE], t, y, x_plus, work)
-    slot = record.used[1]
-    if slot < record.jump_time.shape[0]:
-        record.jump_time[slot, 0] = t
-        record.jump_time[slot, 1] = transversality
-        record.jump_place[slot, 0] = run.count[CYCLE]
-        record.jump_place[slot, 1] = transition
+    n, y = model.dimension, run.y
+    if orthonormal:
+        orthonormalise(y, n, tangents, run.growth, 0.0)
+    for start in range(n, n * (1 + tangents), n):
         for i in range(n):
-            record.jump_states[slot, 0, i] = y[i]
-            record.jump_states[slot, 1, i] = x_plus[i]
+            total = 0.0
             for j in range(n):
-                record.jump_saltation[slot, i, j] = work.saltation[i, j]
-        record.used[1] = slot + 1
+                total += work.saltation[i, j] * y[start + j]
+            work.state[i] = total
+        for i in range(n):
+            y[start + i] = work.state[i]
+    if orthonormal:
+        orthonormalise(y, n, tangents, run.growth, COLLAPSED)
+    run.clock[LOG_DETERMINANT] += log_abs_determinant(work.saltation, work.reset_jacobian, n)
+
+
+@njit(boolean(MODEL, METHOD, RUN, int64, float64, WORK), **KERNEL)
+def is_grazing(model, method, run, transition, transversality, work):
+    """Whether the state dips beyond the guard by less than the tolerances can tell.
+
+    The depth of the dip, ``speed^2 / (2 acceleration)``, is what the crossing has before it turns back. Its
+    saltation matrix is then an extrapolation of a square root from beside its branch point.
+    """
+    acceleration = guard_acceleration(model, transition, run.count[MODE], run.clock[PHASE], run.y, work)
+    if transversality * acceleration >= 0.0:
+        return False
+    depth = transversality * transversality / (2.0 * abs(acceleration))
+    return depth <= error_band(method, run, work.gradient, model.dimension)
+
+
+@njit(void(RUN, int64, WORK), **KERNEL)
+def judge(run, n, work):
+    """Keep the largest entry of any saltation matrix so far, and count those that are not finite."""
     largest = 0.0
     for i in range(n):
         for j in range(n):
@@ -130,29 +175,100 @@ def jump(model, run, record, transition, tangents, orthonormal, work):
     run.clock[LARGEST_SALTATION] = max(run.clock[LARGEST_SALTATION], largest)
     if not math.isfinite(largest):
         run.count[SINGULAR_JUMPS] += 1
-    if tangents > 0:
-        if orthonormal:
-            orthonormalise(y, n, tangents, run.growth, 0.0)
-        for start in range(n, n * (1 + tangents), n):
-            for i in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += work.saltation[i, j] * y[start + j]
-                work.state[i] = total
-            for i in range(n):
-                y[start + i] = work.state[i]
-        if orthonormal:
-            orthonormalise(y, n, tangents, run.growth, COLLAPSED)
-        run.clock[LOG_DETERMINANT] += log_abs_determinant(work.saltation, work.reset_jacobian, n)
-    for i in range(n):
-        y[i] = x_plus[i]
+
+
+@njit(void(MODEL, RUN, int64, int64, VECTOR), **KERNEL)
+def move(model, run, transition, target, x_plus):
+    """Put the run behind a jump: state, mode and counters."""
+    for i in range(model.dimension):
+        run.y[i] = x_plus[i]
         run.scale[i] = max(run.scale[i], abs(x_plus[i]))
-    same_instant = run.clock[LAST_JUMP_PHASE] == t and run.clock[LAST_JUMP_CYCLE] == run.count[CYCLE]
-    run.count[JUMPS_HERE] = run.count[JUMPS_HERE] + 1 if same_instant else 1
-    run.clock[LAST_JUMP_PHASE] = t
+    here = run.clock[LAST_JUMP_PHASE] == run.clock[PHASE] and run.clock[LAST_JUMP_CYCLE] == run.count[CYCLE]
+    run.count[JUMPS_HERE] = run.count[JUMPS_HERE] + 1 if here else 1
+    run.clock[LAST_JUMP_PHASE] = run.clock[PHASE]
     run.clock[LAST_JUMP_CYCLE] = run.count[CYCLE]
     run.count[JUMPS] += 1
     run.count[LAST_FIRED] = transition
     run.count[PREVIOUS_MODE] = run.count[MODE]
-    run.count[MODE] = model.target[transition]
+    run.count[MODE] = target
     run.count[PHASE_OF_RUN] = ENTERING
+
+
+@njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **KERNEL)
+def jump(model, method, run, record, transition, tangents, orthonormal, work):
+    """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
+    mode, target = run.count[MODE], model.target[transition]
+    transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+    run.clock[LAST_TRANSVERSALITY] = transversality
+    judge(run, model.dimension, work)
+    kind = TRANSVERSE
+    if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
+        kind = GRAZING
+        run.count[ILL_CONDITIONED] += 1
+    remember_jump(model, run, record, transition, transversality, kind, work.new, work)
+    if tangents > 0:
+        before = run.growth[0]
+        carry_tangents(model, run, tangents, orthonormal, work)
+        if kind == GRAZING:
+            run.clock[ILL_CONDITIONED_GROWTH] += run.growth[0] - before
+    if mode == target and model.direction[transition] != 0:
+        remember_impulse(model, run, transition, transversality, work)
+    move(model, run, transition, target, work.new)
+
+
+@njit(void(RUN, RECORD, int64, float64, VECTOR), **KERNEL)
+def remember_flight(run, record, n, span, x_limit):
+    """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
+    slot = record.used[0]
+    if slot == record.step_time.shape[0]:
+        return
+    record.step_time[slot, 0], record.step_time[slot, 1] = run.clock[PHASE], span
+    record.step_place[slot, 0], record.step_place[slot, 1] = run.count[CYCLE], run.count[MODE]
+    record.step_place[slot, 2] = run.count[JUMPS]
+    rows = record.step_coefficients.shape[1]
+    for j in range(rows):
+        for i in range(n):
+            record.step_coefficients[slot, j, i] = run.y[i] + (x_limit[i] - run.y[i]) * j / (rows - 1)
+    record.used[0] = slot + 1
+
+
+@njit(void(RUN, float64, float64), **KERNEL)
+def forward(run, period, span):
+    """Move the clock of a run on, keeping the phase below the period."""
+    phase = run.clock[PHASE] + span
+    while period > 0.0 and phase >= period:
+        phase -= period
+        run.count[CYCLE] += 1
+    run.clock[PHASE] = phase
+
+
+@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **KERNEL)
+def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+    """After a jump: if its like accumulate before the end of the run, go to their limit. Returns whether it did.
+
+    The limit is a jump of its own, into the mode that the transition names for it, if it names one.
+    """
+    if run.count[MODE] != run.count[PREVIOUS_MODE] or model.direction[transition] == 0:
+        return False
+    since_last = run.clock[PHASE] - run.clock[EARLIER_JUMP_PHASE]
+    since_last += model.period * (run.count[CYCLE] - run.clock[EARLIER_JUMP_CYCLE])
+    run.clock[EARLIER_JUMP_PHASE], run.clock[EARLIER_JUMP_CYCLE] = run.clock[PHASE], run.count[CYCLE]
+    span = accumulation(model, method, run, transition, since_last, work)
+    if not 0.0 < span <= remaining:
+        return False
+    limit_mode = model.accumulates_to[transition]
+    target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
+    if tangents > 0 and not drift_is_known(model, run, target, span, work):
+        return False
+    x_limit = work.settled
+    remember_flight(run, record, model.dimension, span, x_limit)
+    chatter_matrix(model, run, transition, work)
+    if tangents > 0:
+        carry_tangents(model, run, tangents, orthonormal, work)
+        model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
+        drift(run.y, model.dimension, tangents, work.jacobian, span, work.state, work.field)
+    forward(run, model.period, span)
+    if limit_mode != NO_MODE:
+        remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
+    move(model, run, transition, target, x_limit)
+    return True

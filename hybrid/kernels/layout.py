@@ -23,7 +23,8 @@ class Model(NamedTuple):
 
     ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the transitions that leave mode ``m``, in the
     order they were listed. ``boundary`` is 1 for a transition that a state on the far side of its guard
-    must take at once, 0 for one that only crossings fire. ``period`` is 0 without a forcing period.
+    must take at once, 0 for one that only crossings fire; ``accumulates_to`` the mode after a complete
+    chatter, or -1. ``period`` is 0 without a forcing period.
     """
 
     flow: object
@@ -42,6 +43,7 @@ class Model(NamedTuple):
     affine_guard: np.ndarray
     boundary: np.ndarray
     marker: np.ndarray
+    accumulates_to: np.ndarray
     period: float
 
 
@@ -56,6 +58,7 @@ MODEL = types.NamedTuple(
         MATRIX_ROLE,
         VECTOR,
         int64,
+        INDICES,
         INDICES,
         INDICES,
         INDICES,
@@ -103,6 +106,7 @@ class Run(NamedTuple):
     vanishes at the entry of the mode; ``first_step (modes,)`` remembers the step a mode began with;
     ``scale (n,)`` the size of the components over the last step, against which rounding is judged; ``growth
     (k,)`` sums the logarithms of the lengths taken out of the tangent vectors by orthonormalisation.
+    ``trail (3, n + 1)`` follows the jumps of one transition to their limit.
     """
 
     count: np.ndarray
@@ -113,9 +117,10 @@ class Run(NamedTuple):
     first_step: np.ndarray
     scale: np.ndarray
     growth: np.ndarray
+    trail: np.ndarray
 
 
-RUN = types.NamedTuple((INDICES, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTOR, VECTOR), Run)
+RUN = types.NamedTuple((INDICES, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTOR, VECTOR, MATRIX), Run)
 
 
 class Work(NamedTuple):
@@ -123,9 +128,10 @@ class Work(NamedTuple):
 
     ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
     along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
-    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state (n,)``; ``saltation (n, n)``; ``coefficients (d +
-    1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its
-    isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
+    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``saltation (n, n)``;
+    ``coefficients (d + 1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and
+    ``intervals`` for its isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to
+    Bernstein coefficients.
     """
 
     stages: np.ndarray
@@ -141,6 +147,7 @@ class Work(NamedTuple):
     field: np.ndarray
     field_after: np.ndarray
     state: np.ndarray
+    settled: np.ndarray
     saltation: np.ndarray
     coefficients: np.ndarray
     polynomial: np.ndarray
@@ -165,6 +172,7 @@ WORK = types.NamedTuple(
         VECTOR,  # field
         VECTOR,  # field_after
         VECTOR,  # state
+        VECTOR,  # settled
         MATRIX,  # saltation
         MATRIX,  # coefficients
         VECTOR,  # polynomial
@@ -180,9 +188,11 @@ WORK = types.NamedTuple(
 class Record(NamedTuple):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
-    ``used (2,)`` counts the steps and jumps in it. A step: its start ``(phase, length)``, ``(cycle, mode,
-    jump count)`` and the Bernstein coefficients ``(d + 1, n)``. A jump: its phase and transversality,
-    ``(cycle, transition)``, the states ``(2, n)`` before and after, and the saltation matrix ``(n, n)``.
+    ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
+    mode, jump count)`` and the Bernstein coefficients ``(d + 1, n)``. A jump: its phase and transversality,
+    ``(cycle, transition, kind)``, the states ``(2, n)`` before and after, and the saltation matrix ``(n,
+    n)``. A grazing: ``(phase, value, acceleration)`` of the guard, ``(cycle, transition, jump count)`` and
+    the state.
     """
 
     used: np.ndarray
@@ -193,10 +203,16 @@ class Record(NamedTuple):
     jump_place: np.ndarray
     jump_states: np.ndarray
     jump_saltation: np.ndarray
+    grazing_time: np.ndarray
+    grazing_place: np.ndarray
+    grazing_state: np.ndarray
 
 
 INDEX_MATRIX = int64[:, ::1]
-RECORD = types.NamedTuple((INDICES, MATRIX, INDEX_MATRIX, CUBE, MATRIX, INDEX_MATRIX, CUBE, CUBE), Record)
+RECORD = types.NamedTuple(
+    (INDICES, MATRIX, INDEX_MATRIX, CUBE, MATRIX, INDEX_MATRIX, CUBE, CUBE, MATRIX, INDEX_MATRIX, MATRIX),
+    Record,
+)
 
 # A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time
 # to compile. Sums may be reordered and fused, but nan and infinity keep their meaning.

@@ -1,0 +1,213 @@
+"""Chatter: jumps of one transition that accumulate, their limit, and what it does to tangent vectors."""
+
+import math
+
+from numba import boolean, float64, int64, njit, void
+
+from hybrid.kernels.codes import (
+    CHATTERING,
+    CHATTER_JUMPS,
+    JUMPS,
+    MODE,
+    PHASE,
+    RESTITUTION,
+)
+from hybrid.kernels.guards import guard_acceleration, guard_speed, rounding_band
+from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, RUN, VECTOR, WORK
+
+# Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
+BEFORE = 0
+LIMIT = 1
+IMPULSE = 2
+# No limit is taken before this many jumps, so that the visible ones are there to be seen.
+FEWEST_JUMPS = 16
+# Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
+SHORT = 1e-5
+LONG = 1.0
+# Largest relative change of the limit that rounding may be blamed for.
+ROUGH = 1e-6
+EPSILON = 2.220446049250313e-16
+
+
+@njit(float64(MODEL, RUN, int64, float64, WORK), **KERNEL)
+def remaining_chatter(model, run, transition, speed, work):
+    """Time ``2 v / (a (1 - r))`` that infinitely many flights with speeds ``v, r v, r^2 v, ...`` still take.
+
+    The acceleration ``a`` towards the guard is taken here, ``r`` is the restitution of the jump just made. Zero if the flights do
+    not shrink or nothing pulls the state back.
+    """
+    ratio = run.clock[RESTITUTION]
+    pull = model.direction[transition] * guard_acceleration(
+        model, transition, run.count[MODE], run.clock[PHASE], run.y, work
+    )
+    if not (0.0 < ratio < 1.0 and pull > 0.0):
+        return 0.0
+    return 2.0 * speed / (pull * (1.0 - ratio))
+
+
+@njit(float64(MODEL, METHOD, RUN, float64, float64, float64, WORK), **KERNEL)
+def extrapolate(model, method, run, ratio, shift, span, work):
+    """Limit of the state as a geometric series, into ``work.settled (n,)``, and how far to trust it.
+
+    Returns the largest ratio to the tolerances of what the next extrapolations will still change, judged from the last
+    change: of the limit time that is ``shift``.
+    """
+    tail = ratio / (1.0 - ratio)
+    gain = ratio * ratio / (1.0 - ratio * ratio)
+    misfit = gain * abs(shift) / (method.rtol * span + 8.0 * EPSILON * abs(run.clock[PHASE]))
+    for i in range(model.dimension):
+        limit = run.y[i] + tail * (run.y[i] - run.trail[BEFORE, i])
+        scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
+        misfit = max(misfit, gain * abs(limit - run.trail[LIMIT, i]) / scale)
+        run.trail[LIMIT, i] = limit
+        work.settled[i] = limit
+    return misfit
+
+
+@njit(float64(MODEL, METHOD, RUN, int64, float64, WORK), **KERNEL)
+def accumulation(model, method, run, transition, since_last, work):
+    """Follow the jumps of one transition; once their limit is known to tolerance, return the time to it, else 0.
+
+    To be called right after a jump, ``since_last`` after the one before. Components and limit time are
+    extrapolated as geometric series, with an error of second order in the remaining speed; two successive
+    extrapolations tell how large it is. (They could take it away too, but would amplify rounding.) The limit
+    state goes to ``work.settled``.
+    """
+    n = model.dimension
+    model.flow(run.count[MODE], run.clock[PHASE], run.y, model.parameters, work.field)
+    speed = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
+    speed *= -model.direction[transition]
+    consecutive = run.count[CHATTER_JUMPS] + 1 == run.count[JUMPS] and run.count[CHATTERING] > 0
+    span, found = 0.0, False
+    if consecutive:
+        span = remaining_chatter(model, run, transition, speed, work)
+    if span > 0.0:
+        ratio = run.clock[RESTITUTION]
+        # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
+        height = 0.25 * speed * span * (1.0 - ratio)
+        drowned = height <= rounding_band(model, run, run.clock[PHASE], work.gradient)
+        misfit = extrapolate(model, method, run, ratio, span - (run.trail[LIMIT, n] - since_last), span, work)
+        # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls, takes over.
+        floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
+        found = drowned or (run.count[CHATTERING] >= FEWEST_JUMPS and (misfit <= 1.0 or floor))
+        run.trail[IMPULSE, n] = misfit
+        run.trail[LIMIT, n] = span
+        run.count[CHATTERING] += 1
+    else:
+        run.count[CHATTERING] = 1
+        run.trail[LIMIT, n], run.trail[IMPULSE, n] = math.inf, math.inf
+    for i in range(n):
+        run.trail[BEFORE, i] = run.y[i]
+    run.trail[BEFORE, n] = speed
+    run.count[CHATTER_JUMPS] = run.count[JUMPS]
+    return span if found else 0.0
+
+
+@njit(void(MODEL, RUN, int64, float64, WORK), **KERNEL)
+def remember_impulse(model, run, transition, transversality, work):
+    """Keep the restitution of the jump to ``work.new``, and the direction it moves the state in, per unit of speed."""
+    n = model.dimension
+    after = guard_speed(model, transition, run.clock[PHASE], work.new, work.field_after, work.gradient)
+    run.clock[RESTITUTION] = -after / transversality
+    for i in range(n):
+        run.trail[IMPULSE, i] = (work.new[i] - run.y[i]) / (after - transversality)
+
+
+@njit(void(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **KERNEL)
+def speed_gradient(model, transition, mode, t, x, out, work):
+    """Derivative of the guard's speed along the flow in the state, ``(n,)``.
+
+    ``D_x g D_x f`` is exact; the curvature of a guard that is not affine is a central difference of its
+    gradient.
+    """
+    n = model.dimension
+    model.flow(mode, t, x, model.parameters, work.field)
+    model.flow_jacobian(mode, t, x, model.parameters, work.jacobian)
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    for j in range(n):
+        total = 0.0
+        for i in range(n):
+            total += work.gradient[i] * work.jacobian[i, j]
+        out[j] = total
+    if model.affine_guard[transition] == 1:
+        return
+    for j in range(n):
+        step = 6e-6 * max(abs(x[j]), 1e-3)
+        for i in range(n):
+            work.state[i] = x[i]
+        work.state[j] = x[j] + step
+        up = guard_speed(model, transition, t, work.state, work.field, work.gradient)
+        work.state[j] = x[j] - step
+        down = guard_speed(model, transition, t, work.state, work.field, work.gradient)
+        out[j] += (up - down) / (2.0 * step)
+
+
+@njit(void(MODEL, RUN, int64, WORK), **KERNEL)
+def chatter_matrix(model, run, transition, work):
+    """Tangent map of a complete chatter at its beginning, into ``work.saltation (n, n)``.
+
+    It projects on the states that rest on the guard: the speed is taken out along the impulse ``p`` and the
+    height along ``D_x f p``, the motion it brings, ``Xi = I - p (D_x v - (D_x v D_x f p) D_x g) - (D_x f p)
+    D_x g`` with ``v`` the guard's speed. The drift during the chatter is that of the resting mode (compare
+    Nordmark and Piiroinen 2009, doi:10.1007/s11071-009-9463-y).
+    """
+    n = model.dimension
+    slope, carried = work.error, work.second_error
+    impulse = run.trail[IMPULSE]
+    speed_gradient(model, transition, run.count[MODE], run.clock[PHASE], run.y, slope, work)
+    model.guard_gradient(transition, run.clock[PHASE], run.y, model.parameters, work.gradient)
+    coupling = 0.0
+    for i in range(n):
+        carried[i] = 0.0
+        for j in range(n):
+            carried[i] += work.jacobian[i, j] * impulse[j]
+        coupling += slope[i] * carried[i]
+    for i in range(n):
+        for j in range(n):
+            removed = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
+            work.saltation[i, j] = (1.0 if i == j else 0.0) - removed
+
+
+@njit(float64(MATRIX, int64), **KERNEL)
+def size_of(matrix, n):
+    """Largest row sum of the first ``n`` columns."""
+    largest = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += abs(matrix[i, j])
+        largest = max(largest, total)
+    return largest
+
+
+@njit(boolean(MODEL, RUN, int64, float64, WORK), **KERNEL)
+def drift_is_known(model, run, target, span, work):
+    """Whether the tangents' drift over the rest of the chatter is an exponential of the resting mode's Jacobian.
+
+    It is where that Jacobian does not change until the limit in ``work.settled``, or changes too little to
+    matter. The Jacobian at the limit is left in ``work.jacobian``.
+    """
+    n, t = model.dimension, run.clock[PHASE]
+    model.flow_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
+    model.flow_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
+    constant = True
+    for i in range(n):
+        for j in range(n):
+            constant = constant and work.jacobian[i, j] == work.reset_jacobian[i, j]
+    return size_of(work.jacobian, n) * span <= (LONG if constant else SHORT)
+
+
+@njit(void(VECTOR, int64, int64, MATRIX, float64, VECTOR, VECTOR), **KERNEL)
+def drift(y, n, tangents, matrix, span, term, image):
+    """Multiply the tangent vectors in ``y`` by ``exp(matrix span)``, by its series; scratch ``(n,)``."""
+    for start in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            term[i] = y[start + i]
+        for order in range(1, 25):
+            for i in range(n):
+                image[i] = 0.0
+                for j in range(n):
+                    image[i] += matrix[i, j] * term[j]
+            for i in range(n):
+                term[i] = image[i] * span / order
+                y[start + i] += term[i]

@@ -1,0 +1,71 @@
+"""Guards reached together: whether the order in which they fire matters."""
+
+from numba import boolean, float64, int64, njit
+
+from hybrid.kernels.codes import MODE, NO_TRANSITION, PHASE
+from hybrid.kernels.guards import guard_speed, guard_value, rounding_band
+from hybrid.kernels.layout import KERNEL, MODEL, RUN, VECTOR, WORK
+
+MOST_JUMPS = 50
+# States that differ by less than this, relative to their sizes, came out the same.
+SAME = 1e-9
+
+
+@njit(boolean(MODEL, RUN, int64, int64, float64, VECTOR, WORK), **KERNEL)
+def is_due(model, run, transition, mode, t, x, work):
+    """Whether a guard is zero, up to rounding, and moving to where its transition fires."""
+    value = guard_value(model, transition, t, x, work.scalar)
+    model.flow(mode, t, x, model.parameters, work.field)
+    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+    if abs(value) > rounding_band(model, run, t, work.gradient) or model.marker[transition] == 1:
+        return False
+    return speed * model.direction[transition] > 0.0
+
+
+@njit(int64(MODEL, RUN, int64, WORK), **KERNEL)
+def companion(model, run, fired, work):
+    """Another transition due at the very point where ``fired`` has landed, or none."""
+    mode = run.count[MODE]
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if other != fired and is_due(model, run, other, mode, run.clock[PHASE], run.y, work):
+            return other
+    return NO_TRANSITION
+
+
+@njit(int64(MODEL, RUN, int64, VECTOR, WORK), **KERNEL)
+def settle(model, run, first, out, work):
+    """State ``(n,)`` after ``first`` and all that it sets off at the same instant; returns the mode."""
+    n, t = model.dimension, run.clock[PHASE]
+    mode, fired = run.count[MODE], first
+    for i in range(n):
+        out[i] = run.y[i]
+    for _ in range(MOST_JUMPS):
+        model.reset(fired, t, out, model.parameters, work.state)
+        for i in range(n):
+            out[i] = work.state[i]
+        mode = model.target[fired]
+        following = NO_TRANSITION
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            other = model.outgoing[slot]
+            if other != fired and is_due(model, run, other, mode, t, out, work):
+                following = other
+                break
+        if following == NO_TRANSITION:
+            break
+        fired = following
+    return mode
+
+
+@njit(boolean(MODEL, RUN, int64, int64, WORK), **KERNEL)
+def order_matters(model, run, one, other, work):
+    """Whether firing ``one`` or ``other`` first leads to different states or modes."""
+    mode_one = settle(model, run, one, work.error, work)
+    mode_other = settle(model, run, other, work.second_error, work)
+    if mode_one != mode_other:
+        return True
+    for i in range(model.dimension):
+        scale = max(run.scale[i], abs(work.error[i]))
+        if abs(work.error[i] - work.second_error[i]) > SAME * scale:
+            return True
+    return False
