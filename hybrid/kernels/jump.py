@@ -268,7 +268,6 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
         model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
         drift(run.y, model.dimension, tangents, work.jacobian, span, work.state, work.field)
     forward(run, model.period, span)
-    if limit_mode != NO_MODE:
-        remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
+    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
     move(model, run, transition, target, x_limit)
     return True
