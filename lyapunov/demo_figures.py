@@ -11,17 +11,20 @@ import numpy as np
 from lyapunov.demo_paper import ROWS
 from lyapunov.demo_report import histories, paper_columns
 from lyapunov.demo_study import Regime
-from lyapunov.demo_tangents import ToleranceRow
+from lyapunov.demo_tangents import Trap
 from lyapunov.floquet import floquet_exponents
 from lyapunov.plot import COLOURS, INK, Panel, plot_convergence, plot_phase_portrait, plot_regimes, style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BODIES = (
     ("main body", "x1", "v1", ("$x_1$, m", "$\\dot x_1$, m/s")),
     ("attached body", "x2", "v2", ("$x_2$, m", "$\\dot x_2$, m/s")),
 )
+# Up to here every estimate is a tangle.
+FIRST_SHOWN = 10
 # The first estimates of every method are far off; the scale is that of what they come to.
 LEAST_HEIGHT = 0.03
 ESTIMATES = (
@@ -43,10 +46,10 @@ def write_figures(folder: Path, regimes: Sequence[Regime]) -> list[Path]:
     return paths
 
 
-def write_tolerance_figure(folder: Path, rows: Sequence[ToleranceRow]) -> Path:
+def write_tolerance_figure(folder: Path, trap: Trap) -> Path:
     """The trap, as ``tolerances.png``."""
     with style():
-        return _save(tolerances(rows), folder / "tolerances.png")
+        return _save(tolerances(trap), folder / "tolerances.png")
 
 
 def _title(regime: Regime) -> str:
@@ -75,17 +78,19 @@ def convergence(regime: Regime) -> Figure:
     for ax, (title, names) in zip(axes.flat, ESTIMATES, strict=True):
         points = {name: _printed(theirs[name]) for name in names if name in theirs}
         points = {name: point for name, point in points.items() if len(point[0])}
-        plot_convergence(
-            ax, {name: ours[name] for name in names}, points=points, truth=truth, truth_label=label
-        )
+        shown = {name: ours[name] for name in names}
+        plot_convergence(ax, shown, points=points, points_label="paper", truth=truth, truth_label=label)
         if names != ("(9)",):
-            _fit_height(ax, [ours[name] for name in names], [point[1] for point in points.values()], truth)
+            _fit_height(ax, list(shown.values()), [point[1] for point in points.values()], truth)
         ax.set_title(title)
+    axes[0, 0].set_xlim(left=FIRST_SHOWN if len(ours["(7)"]) > 10 * FIRST_SHOWN else 1)
     for ax in axes[0]:
         ax.set_xlabel("")
     for ax in axes[:, 1]:
         ax.set_ylabel("")
-    figure.suptitle(f"{_title(regime)}: first exponent after M periods, 1/s", x=0.01, ha="left", fontsize=10.5)
+    figure.suptitle(
+        f"{_title(regime)}: first exponent after M periods, 1/s", x=0.01, ha="left", fontsize=10.5
+    )
     return figure
 
 
@@ -103,8 +108,10 @@ def _printed(column: tuple[float | None, ...]) -> tuple[list[int], list[float]]:
     return [M for M, _ in pairs], [value for _, value in pairs]
 
 
-def _fit_height(ax, estimates, printed, truth) -> None:  # type: ignore[no-untyped-def]
-    """Limits that hold the paper's points and the later nine tenths of the histories, on a scale of decades."""
+def _fit_height(
+    ax: Axes, estimates: Sequence[np.ndarray], printed: Sequence[Sequence[float]], truth: float
+) -> None:
+    """Limits that hold the paper's points, the truth, and all but the first hundredth of the histories."""
     shown = [history[len(history) // 100 :] for history in estimates]
     values = np.concatenate([*shown, *map(np.asarray, printed), [truth]])
     values = values[np.isfinite(values)]
@@ -123,24 +130,24 @@ def comparison(regimes: Sequence[Regime]) -> Figure:
     return plot_regimes(panels, x, v, labels=labels)
 
 
-def tolerances(rows: Sequence[ToleranceRow]) -> Figure:
-    """Error of the first exponent and of the sum over tolerances, tangents inside the error control and outside."""
+def tolerances(trap: Trap) -> Figure:
+    """Errors over tolerances, of the first exponent and of the sum, tangents controlled and not."""
     import matplotlib.pyplot as plt
 
-    tolerance = [row.tolerance for row in rows[:-1]]
-    truth = rows[-1].inside
     figure, ax = plt.subplots(figsize=(6.4, 4.2))
     lines = (
-        ("first exponent, tangents outside", [row.outside[0] - truth[0] for row in rows[:-1]], COLOURS[1], "o-"),
-        ("sum of all four, tangents outside", [row.outside.sum() - truth.sum() for row in rows[:-1]], COLOURS[4], "s--"),
-        ("first exponent, tangents inside", [row.inside[0] - truth[0] for row in rows[:-1]], COLOURS[0], "o-"),
+        ("first exponent, outside", trap.outside[:, 0] - trap.truth[0], COLOURS[1], "o-"),
+        ("sum of all four, outside", trap.outside.sum(axis=1) - trap.truth.sum(), COLOURS[4], "s--"),
+        ("first exponent, inside", trap.inside[:, 0] - trap.truth[0], COLOURS[0], "o-"),
     )
     for label, errors, colour, marker in lines:
-        ax.loglog(tolerance, np.abs(errors), marker, color=colour, label=label, markersize=4.5)
-    ax.axhline(abs(truth[0]), color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="size of the exponent itself")
+        ax.loglog(trap.tolerances, np.abs(errors), marker, color=colour, label=label, markersize=4.5)
+    ax.axhline(
+        abs(trap.truth[0]), color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="the exponent itself"
+    )
     ax.set_xlabel("tolerance, rtol = atol")
-    ax.set_ylabel("error of the exponent, 1/s")
-    ax.set_title("Tangent vectors belong in the error control: the sum rule does not see that they are not")
+    ax.set_ylabel("error, 1/s")
+    ax.set_title("Tangent vectors inside the error control, and outside of it")
     ax.grid(True)
     ax.invert_xaxis()
     ax.legend()

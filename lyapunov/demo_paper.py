@@ -1,7 +1,7 @@
 """The figures printed in the paper that the study repeats, as data.
 
-V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear nonsmooth
-discontinuous vibroimpact system", 2017: exponents in 1/s after M periods.
+V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
+nonsmooth discontinuous vibroimpact system", 2017: exponents in 1/s after M periods.
 """
 
 from __future__ import annotations

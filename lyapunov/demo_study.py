@@ -1,4 +1,4 @@
-"""The computations of the study, one regime of the vibro-impact system at a time; nothing is printed or drawn here."""
+"""The computations of the study, one regime at a time; nothing is printed or drawn here."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ STARTS = (
 
 @attrs.frozen
 class Settings:
-    """How long and how accurately: averaged and skipped forcing periods, method, and whether to show progress."""
+    """Forcing periods averaged over and skipped before, the method, and whether to show progress."""
 
     intervals: int = 10_000
     transient: int = 1_000
@@ -70,9 +70,10 @@ class Regime:
     two_orbit
         The two-orbit estimates from the first start.
     orbit
-        Periodic orbit of one forcing period near where the first start led, stable or not, if Newton's method found one.
+        Periodic orbit of one forcing period, stable or not, that Newton's method finds from the first start.
     section, arc
-        Points once a period ``(N, 4)``, and some periods of orbit, where the first start led.
+        Points once a period, half a period after the drive's peak, and some periods of orbit, where the
+        first start led.
     """
 
     omega: float
@@ -91,14 +92,13 @@ class Regime:
     def kind(self) -> str:
         """Periodic, quasi-periodic or chaotic, by the first exponent and its standard error."""
         first = self.spectra[0]
-        if not len(self.section) or first.intervals < 4:
+        if not len(self.section) or np.isnan(first.standard_error[0]):
             return "undecided"
+        # On regular motion the estimate is better than its standard error, which may then be next to nothing.
         value, error = first.exponents[0], max(2 * first.standard_error[0], 1e-4)
-        if np.ptp(self.section.x, axis=0).max() < 1e-6:
+        if np.ptp(self.section.x, axis=0).max() < 1e-6 or value < -error:
             return "periodic"
-        if abs(value) <= error:
-            return "quasi-periodic"
-        return "chaotic" if value > 0 else "not settled"
+        return "chaotic" if value > error else "quasi-periodic"
 
 
 def study_regime(system: HybridSystem, omega: float, settings: Settings) -> Regime:
@@ -136,22 +136,28 @@ def study_regime(system: HybridSystem, omega: float, settings: Settings) -> Regi
         solver=settings.two_orbit_solver,
         progress=settings.progress,
     )
-    x, mode = spectra[0].x, spectra[0].mode
+    # Impacts crowd around phase zero, where they would tear the section.
+    period = 2 * np.pi / omega
+    half = simulate(
+        system, spectra[0].x, (0.0, period / 2), mode=spectra[0].mode, parameters=parameters, solver=solver
+    )
+    x, mode, t0 = half.x[-1], str(half.mode[-1]), period / 2
     section = stroboscopic_section(
         system,
         x,
         mode=mode,
         parameters=parameters,
         periods=min(settings.intervals, SECTION_POINTS),
+        t0=t0,
         solver=solver,
         progress=settings.progress,
     )
-    span = (0.0, PORTRAIT_PERIODS * 2 * np.pi / omega)
+    span = (t0, t0 + PORTRAIT_PERIODS * period)
     return Regime(
         omega=omega,
         spectra=spectra,
         two_orbit=two_orbit,
-        orbit=periodic_orbit(system, section.x.mean(axis=0), parameters=parameters),
+        orbit=periodic_orbit(system, STARTS[0].x0, parameters=parameters),
         section=section,
         arc=simulate(system, x, span, mode=mode, parameters=parameters, solver=solver),
     )

@@ -1,4 +1,4 @@
-"""What becomes of the exponents when tangent vectors are carried carelessly, and what the paper's figures may owe to it."""
+"""Exponents when tangent vectors are carried carelessly, and what the paper's figures may owe to it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid import DOP853, HybridSystem, Mode, Tsit5, simulate
+from hybrid import DOP853, HybridSystem, Mode, Tsit5, periodic_orbit, simulate
 from hybrid.solvers import RungeKutta
 from lyapunov.demo_paper import DOUBTFUL
 from lyapunov.demo_study import STARTS, Settings
+from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import lyapunov_spectrum
 
 TOLERANCES = tuple(10.0**-digits for digits in range(4, 11))
@@ -22,19 +23,21 @@ TRAP_OMEGA = 7.40
 UNSEEN = 1e-30
 # Few enough that the directions stay apart between two orthonormalisations.
 PERIODS_AT_ONCE = 10
-# Most periods of an exponent that need not have more than four digits.
+# Most periods of an exponent that need not have more than four digits, and of one whose mean converges fast.
 ENOUGH = 2000
+ENOUGH_OF_REGULAR_MOTION = 500
 
 
 def with_tangent(system: HybridSystem) -> HybridSystem:
     r"""Vibro-impact system with one tangent vector as a state: ``u1, u2, w1, w2`` before ``x1, x2, v1, v2``.
 
-    The vector obeys :math:`\dot u = A u` with the Jacobian as the paper writes it, :math:`A`, where the parameter
-    ``slip = 1`` leaves out the :math:`\chi` that :math:`a_{34} = 2 \xi_2 \omega_2 \chi` is printed without. Saltation
-    matrices are the identity, so nothing happens to it at a jump.
+    The vector obeys :math:`\dot u = A u` with the Jacobian as the paper writes it, :math:`A`, where the
+    parameter ``slip = 1`` leaves out the :math:`\chi` that :math:`a_{34} = 2 \xi_2 \omega_2 \chi` is
+    printed without. Saltation matrices are the identity, so nothing happens to it at a jump.
 
-    From ``u = 0`` this is a way to the exponents of the wrong Jacobian: displacements of ``u`` alone follow it, stay
-    among themselves, and their growth is what ``lyapunov_spectrum`` with ``k = 4`` measures, their error controlled.
+    From ``u = 0`` this is a way to the exponents of the wrong Jacobian: displacements of ``u`` alone follow
+    it, stay among themselves, and their growth is what ``lyapunov_spectrum`` with ``k = 4`` measures, their
+    error controlled.
     """
     fields = {mode.name: mode.field for mode in system.modes}
     return HybridSystem(
@@ -71,27 +74,38 @@ def _contact_stiffness(x: Any, p: Any) -> Any:
 
 
 @attrs.frozen(eq=False)
-class ToleranceRow:
-    """Exponents ``(4,)`` at one tolerance, tangent vectors inside the error control and outside."""
+class Trap:
+    """Exponents of the periodic regime with tangent vectors inside the error control and outside.
 
-    tolerance: float
+    Attributes
+    ----------
+    truth
+        Floquet exponents ``(4,)``.
+    tolerances
+        ``rtol = atol``, ``(N,)``.
+    inside, outside
+        Exponents ``(N, 4)``.
+    """
+
+    truth: np.ndarray
+    tolerances: np.ndarray
     inside: np.ndarray
     outside: np.ndarray
 
 
-def tolerance_study(system: HybridSystem, settings: Settings) -> list[ToleranceRow]:
-    """The trap: exponents of the periodic regime over tolerances, with and without error control of the tangents."""
-    extended, method = with_tangent(system), type(settings.solver)
-    periods = min(settings.intervals, 500)
-    rows = []
-    for tolerance in TOLERANCES:
-        solver = method(rtol=tolerance, atol=tolerance)
-        spectrum = lyapunov_spectrum(
-            system, STARTS[0].x0, parameters={"omega": TRAP_OMEGA}, intervals=periods, solver=solver
-        )
-        outside = _uncontrolled_exponents(extended, TRAP_OMEGA, solver, periods)
-        rows.append(ToleranceRow(tolerance, spectrum.exponents, outside))
-    return rows
+def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
+    """The trap: what each tolerance gives with and without error control of the tangents, and the truth."""
+    x0, parameters = STARTS[0].x0, {"omega": TRAP_OMEGA}
+    solvers = [type(settings.solver)(rtol=tolerance, atol=tolerance) for tolerance in TOLERANCES]
+    periods = min(settings.intervals, ENOUGH_OF_REGULAR_MOTION)
+    extended = with_tangent(system)
+    inside = [
+        lyapunov_spectrum(system, x0, parameters=parameters, intervals=periods, solver=solver).exponents
+        for solver in solvers
+    ]
+    outside = [_uncontrolled_exponents(extended, TRAP_OMEGA, solver, periods) for solver in solvers]
+    truth = floquet_exponents(periodic_orbit(system, x0, parameters=parameters))
+    return Trap(truth, np.array(TOLERANCES), np.array(inside), np.array(outside))
 
 
 def _uncontrolled_exponents(
@@ -127,7 +141,7 @@ def _uncontrolled_exponents(
 
 @attrs.frozen(eq=False)
 class Candidate:
-    """A way in which the paper's Benettin column might have come about: the ``index``-th exponent of a run."""
+    """A way the paper's Benettin column might have come about: the ``index``-th exponent of a run."""
 
     text: str
     system: HybridSystem
@@ -153,14 +167,14 @@ class Candidate:
 
 @attrs.frozen(eq=False)
 class Explanation:
-    """A candidate's text and the exponent it gives at each frequency."""
+    """Text of a candidate, and the exponent it gives at each frequency."""
 
     text: str
     exponents: dict[float, float]
 
     @property
     def misfit(self) -> float:
-        """Largest distance from the two figures of the paper that are in doubt; nan unless both were computed."""
+        """Largest distance from the paper's two figures in doubt; nan unless both were computed."""
         if not DOUBTFUL.keys() <= self.exponents.keys():
             return float("nan")
         return max(abs(self.exponents[omega] - value) for omega, value in DOUBTFUL.items())
@@ -170,9 +184,14 @@ def candidates(system: HybridSystem, solver: RungeKutta) -> list[Candidate]:
     """The exponent as it is, then with each of the faults that might explain the paper's."""
     first, other = STARTS[0].x0, STARTS[2].x0
     loose = [
-        Candidate(f"(b) loose tangents, {method.__name__} {tolerance:.0e}", system, first, method(rtol=tolerance, atol=tolerance))
+        Candidate(
+            f"(b) loose tangents, {method.__name__} {value:.0e}",
+            system,
+            first,
+            method(rtol=value, atol=value),
+        )
         for method in (Tsit5, DOP853)
-        for tolerance in LOOSE
+        for value in LOOSE
     ]
     return [
         Candidate("the exponent as it is", system, first, solver),

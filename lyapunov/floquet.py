@@ -23,8 +23,8 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     Returns
     -------
     (n,) array
-        In the order of the multipliers, in inverse units of time; minus infinity for a multiplier that is zero, a direction
-        that a saltation matrix annihilates.
+        In the order of the multipliers, in inverse units of time; minus infinity for a multiplier that is
+        zero, a direction that a saltation matrix annihilates.
 
     References
     ----------

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Told apart by every kind of eye, and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
 INK = "#333333"
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "figure.constrained_layout.use": True,
     "savefig.dpi": 160,
     "font.size": 9,
@@ -34,7 +34,8 @@ STYLE: dict[str, Any] = {
     "ytick.color": INK,
     "grid.color": "#E4E4E4",
     "grid.linewidth": 0.6,
-    "legend.frameon": False,
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.85,
     "legend.fontsize": 8,
     "lines.linewidth": 1.3,
 }
@@ -55,6 +56,7 @@ def plot_convergence(
     estimates: Mapping[str, ArrayLike],
     *,
     points: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    points_label: str = "published",
     truth: float | None = None,
     truth_label: str = "exact",
 ) -> Axes:
@@ -67,22 +69,27 @@ def plot_convergence(
     estimates
         Label to history ``(M,)`` over 1, 2, ..., M intervals.
     points
-        Label to numbers of intervals and values there: somebody else's estimate of the same label, in its colour.
+        Label to numbers of intervals and values there: estimates from elsewhere, in the colour of the label.
     truth
         Value to converge to, drawn as a line.
+    points_label, truth_label
+        What the legend calls them.
     """
     points = points or {}
+    # What comes later is drawn thinner, so that of two lines that coincide both are seen.
+    widths = (2.2, 0.9) if len(estimates) > 1 else (1.3,)
     if truth is not None:
         ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
-    for i, label in enumerate(dict.fromkeys([*estimates, *points])):
-        colour = COLOURS[i % len(COLOURS)]
-        if label in estimates:
-            history = np.asarray(estimates[label], dtype=float)
-            at = np.unique(np.geomspace(1, max(len(history), 1), POINTS_OF_A_LINE).astype(int))
-            at = at[at <= len(history)]
-            ax.plot(at, history[at - 1], color=colour, label=label)
+    for i, (label, estimate) in enumerate(estimates.items()):
+        history = np.asarray(estimate, dtype=float)
+        at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
+        at = at[at <= len(history)]
+        width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
+        ax.plot(at, history[at - 1], color=colour, label=label, linewidth=width)
         if label in points:
-            ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white", label=f"{label}, paper")
+            ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white")
+    if points:
+        ax.plot([], [], "o", color=INK, markersize=4.5, markerfacecolor="white", label=points_label)
     ax.set_xscale("log")
     ax.set_xlabel("intervals $M$")
     ax.set_ylabel("exponent estimate")
@@ -123,7 +130,9 @@ def plot_phase_portrait(
         marks = np.asarray(section, dtype=float)
         # A fixed point must be seen and a cloud must not clot.
         size = 2.0 if np.ptp(marks, axis=0).max() > 1e-6 else 26.0
-        ax.scatter(marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True)
+        ax.scatter(
+            marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
+        )
     ax.set_xlabel((labels or (x, y))[0])
     ax.set_ylabel((labels or (x, y))[1])
     return ax
@@ -139,7 +148,17 @@ def _dense(arc: HybridArc) -> np.ndarray:
 
 @attrs.frozen(eq=False)
 class Panel:
-    """One column of :func:`plot_regimes`: an orbit, its section ``(N, n)``, the history ``(M,)`` of its first exponent."""
+    """One column of :func:`plot_regimes`.
+
+    Attributes
+    ----------
+    title
+        Text over the column.
+    arc, section
+        An orbit, and points ``(N, n)`` of its section.
+    history, spread
+        First exponent ``(M,)`` over the intervals, and how far above and below its end the axis reaches.
+    """
 
     title: str
     arc: HybridArc
@@ -148,10 +167,8 @@ class Panel:
     spread: float
 
 
-def plot_regimes(
-    panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, str] | None = None
-) -> Figure:
-    """Small multiples, a column a regime: phase portrait, section, and the first exponent over the intervals."""
+def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, str] | None = None) -> Figure:
+    """Small multiples, a column a regime: phase portrait, section, first exponent over the intervals."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(3, len(panels), figsize=(3.2 * len(panels), 7.6), squeeze=False)
@@ -176,7 +193,9 @@ def _plot_section(ax: Axes, panel: Panel, x: str, y: str, labels: tuple[str, str
     names = panel.arc.system.state_names
     points = panel.section[:, [names.index(x), names.index(y)]]
     fixed = np.ptp(points, axis=0).max() <= 1e-6
-    ax.scatter(*points.T, s=26.0 if fixed else 2.0, color=COLOURS[1], linewidths=0, rasterized=True)
+    ax.scatter(
+        points[:, 0], points[:, 1], s=26.0 if fixed else 2.0, color=COLOURS[1], linewidths=0, rasterized=True
+    )
     if fixed:
         (a, b), radius = points.mean(axis=0), np.maximum(np.abs(points.mean(axis=0)), 1e-3) * 0.2
         ax.set_xlim(a - radius[0], a + radius[0])

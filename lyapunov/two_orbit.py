@@ -1,4 +1,4 @@
-"""Exponents from the distance of two neighbouring orbits: three formulas that saturate, and one that converges."""
+"""Exponents from the distance of two orbits: three formulas that saturate, and one that converges."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from lyapunov.statistics import running_tapered_mean
 class TwoOrbitExponents:
     r"""Estimates of the largest exponent from the distance to a companion orbit, as histories over ``M``.
 
-    With :math:`d_0` the separation, :math:`d_i` the distance after the i-th interval, of length :math:`T`, formulas
-    (7) to (9) of [1]_ are
+    With :math:`d_0` the separation, :math:`d_i` the distance after the i-th interval, of length :math:`T`,
+    formulas (7) to (9) of [1]_ are
 
     .. math::
 
@@ -33,19 +33,19 @@ class TwoOrbitExponents:
         \lambda_8 = \frac{1}{M T} \sum_{i=1}^{M} \ln\frac{d_i}{d_{i-1}}, \qquad
         \lambda_9 = \frac{1}{M T} \sum_{i=1}^{M} \ln\frac{d_i}{d_0}.
 
-    None of them converges to an exponent. The sum in (8) telescopes: (8) is (7). The distance of a chaotic orbit
-    stops growing at the size of the attractor and that of a stable one stops shrinking at rounding or
-    at the solver's tolerance, so both decay like ``1 / M`` once it has. Formula (9) lacks a division by ``i`` in its
-    terms; it tends to the level at which the distance stays, over ``T``.
+    None of them converges to an exponent. The sum in (8) telescopes: (8) is (7). The distance of a chaotic
+    orbit stops growing at the size of the attractor and that of a stable one stops shrinking at rounding or
+    at the solver's tolerance, so both decay like ``1 / M`` once it has. Formula (9) lacks a division by
+    ``i`` in its terms; it tends to the level at which the distance stays, over ``T``.
 
-    A companion that is brought back to the separation after each interval [2]_ has none of these faults, needs no
-    derivatives, and converges.
+    A companion that is brought back to the separation after each interval [2]_ has none of these faults,
+    needs no derivatives, and converges.
 
     Attributes
     ----------
     distances
-        ``(M,)``: distance of the free companion at the end of each interval. The phase of the forcing, a coordinate
-        of its own in [1]_, is the same for both and adds nothing.
+        ``(M,)``: distance of the free companion at the end of each interval. The phase of the forcing, a
+        coordinate of its own in [1]_, is the same for both and adds nothing.
     renormalised_growths
         ``(M,)``: growth rate of the distance of the renormalised companion over each interval.
     separation, interval
@@ -55,9 +55,11 @@ class TwoOrbitExponents:
 
     References
     ----------
-    .. [1] V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
+    .. [1] V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly
+    nonlinear
        nonsmooth discontinuous vibroimpact system", 2017.
-    .. [2] G. Benettin, L. Galgani, J.-M. Strelcyn, "Kolmogorov entropy and numerical experiments", Phys. Rev. A 14
+    .. [2] G. Benettin, L. Galgani, J.-M. Strelcyn, "Kolmogorov entropy and numerical experiments", Phys.
+    Rev. A 14
        (1976) 2338, doi:10.1103/PhysRevA.14.2338.
     """
 
@@ -79,7 +81,7 @@ class TwoOrbitExponents:
 
     @property
     def telescoped(self) -> np.ndarray:
-        """Formula (8), ``(M,)``, summed as it stands; minus infinity from the first coincidence of the orbits on."""
+        """Formula (8), ``(M,)``, summed as it stands; minus infinity from the first coincidence on."""
         before = np.concatenate([[self.separation], self.distances[:-1]])
         ratios = np.divide(self.distances, before, out=np.zeros_like(before), where=before > 0)
         # The distance may come back from zero by rounding; the sum does not come back from minus infinity.
@@ -87,7 +89,7 @@ class TwoOrbitExponents:
 
     @property
     def undivided(self) -> np.ndarray:
-        """Formula (9), ``(M,)``; minus infinity from the first coincidence of the orbits on."""
+        """Formula (9), ``(M,)``; minus infinity from the first coincidence on."""
         return np.cumsum(_log(self.distances / self.separation)) / self._elapsed
 
     @property
@@ -133,14 +135,14 @@ def two_orbit_exponents(
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`.
     separation
-        Distance of the companion at the start, in the units of the state: small against the lengths over which the model
-        bends, and well above the solver's tolerances and the rounding of the state. Distances near the tolerance measure
-        how the two runs happened to step, not how the orbits separate.
+        Distance of the companion at the start, in the units of the state: small against the lengths over
+        which the model bends, and well above the solver's tolerances and the rounding of the state.
+        Distances near the tolerance measure how the two runs happened to step, not how the orbits separate.
     direction
         ``(n,)``: where the companion lies, of any length; by default all components are equal.
     intervals, interval
-        How many intervals to follow the orbits, and their length; by default the forcing period, and for an autonomous system
-        the reciprocal of the norm of ``D_x f`` at the start.
+        How many intervals to follow the orbits, and their length; by default the forcing period, and for an
+        autonomous system the reciprocal of the norm of ``D_x f`` at the start.
     transient
         Intervals that the reference orbit runs before the companion is placed.
     t0
@@ -159,7 +161,8 @@ def two_orbit_exponents(
 
     Notes
     -----
-    The companion starts in the mode that its guards allow if there is just one, else in that of the reference orbit.
+    The companion starts in the mode that its guards allow if there is just one, else in that of the
+    reference orbit.
 
     Examples
     --------
@@ -209,7 +212,7 @@ def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarra
 
 
 def _skip(trajectory: Trajectory, intervals: int, interval: float) -> int:
-    """Run a number of intervals, counted exactly where they are forcing periods; returns the driver's code."""
+    """Run a number of intervals, exactly if they are forcing periods; returns the driver's code."""
     record = trajectory.no_record()
     if interval == trajectory.model.period:
         cycle, phase = trajectory.run.count[codes.CYCLE], trajectory.run.clock[codes.PHASE]

@@ -1,0 +1,86 @@
+"""The study from its command line, short."""
+
+import csv
+
+import pytest
+
+from lyapunov import demo_report
+from lyapunov.__main__ import main
+from lyapunov.demo_tangents import Explanation
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """Folder of a short study of all three regimes."""
+    folder = tmp_path_factory.mktemp("study") / "new"
+    assert main(["--intervals", "50", "--transient", "60", "--output", str(folder)]) == 0
+    return folder
+
+
+def test_it_writes_what_it_says(short):
+    expected = {"regimes.png", "tolerances.png", "tolerances.csv", "explanations.csv"}
+    for omega in ("7.40", "7.46", "7.92"):
+        expected |= {f"exponents_{omega}.csv", f"portrait_{omega}.png", f"convergence_{omega}.png"}
+    assert {path.name for path in short.iterdir()} == expected
+    assert all(path.stat().st_size > 0 for path in short.iterdir())
+
+
+def test_histories_have_a_row_a_period(short):
+    with (short / "exponents_7.40.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["M"]) for row in rows] == list(range(1, 51))
+    assert float(rows[-1]["(8)"]) == pytest.approx(float(rows[-1]["(7)"]))
+
+
+def test_the_trap_is_in_the_table(short):
+    with (short / "tolerances.csv").open(encoding="utf-8") as file:
+        rows = {row["tolerance"]: row for row in csv.DictReader(file)}
+    loose = rows["1e-08"]
+    assert float(loose["inside 1"]) == pytest.approx(-0.0548936, abs=1e-3)
+    assert abs(float(loose["outside 1"]) + 0.0548936) > 0.01
+    total = sum(float(loose[f"outside {i}"]) for i in range(1, 5))
+    assert total == pytest.approx(-0.8995392, abs=1e-6)
+
+
+def test_it_prints_tables_and_names_the_folder(tmp_path, capsys):
+    options = [
+        "--omega",
+        "7.5",
+        "--intervals",
+        "20",
+        "--transient",
+        "10",
+        "--solver",
+        "Tsit5",
+        "--rtol",
+        "1e-7",
+    ]
+    assert main([*options, "--output", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "omega = 7.50 rad/s" in printed
+    assert "impacts per period" in printed
+    assert "A verdict needs both 7.40 and 7.46" in printed
+    assert str(tmp_path) in printed
+
+
+def test_bad_values_end_with_a_message(tmp_path, capsys):
+    assert main(["--intervals", "0", "--output", str(tmp_path)]) == 2
+    assert "intervals must be a whole number of at least 1" in capsys.readouterr().err
+    assert main(["--rtol", "-1", "--output", str(tmp_path)]) == 2
+    assert "rtol must be positive" in capsys.readouterr().err
+
+
+def test_help_explains(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    printed = capsys.readouterr().out
+    for word in ("--omega", "--intervals", "--rtol", "--solver", "--output", "Floquet", "Benettin"):
+        assert word in printed
+
+
+def test_the_verdict_may_be_that_the_question_is_open():
+    as_it_is = Explanation("as it is", {7.40: -0.055, 7.46: 0.0})
+    poor = Explanation("poor", {7.40: -0.055, 7.46: -0.009})
+    good = Explanation("good", {7.40: -0.066, 7.46: -0.010})
+    assert demo_report.verdict([as_it_is, poor]).startswith("Open: the closest candidate, poor")
+    assert demo_report.verdict([as_it_is, poor, good]).startswith("Closest: good")

@@ -1,0 +1,216 @@
+"""The spectrum against exact answers, its error bars, its memory, and its complaints."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+import lyapunov
+import models
+from tests.cases import systems
+
+ORBIT_740 = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
+EXPONENTS_740 = (-0.05489357, -0.05489357, -0.39487603, -0.39487603)
+SOLVER = hybrid.DOP853(rtol=1e-9, atol=1e-11)
+
+
+@pytest.fixture(scope="module")
+def founding():
+    """The founding system on its periodic orbit."""
+    return lyapunov.lyapunov_spectrum(models.vibroimpact(), ORBIT_740, intervals=2000, solver=SOLVER)
+
+
+def test_founding_system(founding):
+    np.testing.assert_allclose(founding.exponents, EXPONENTS_740, atol=1e-6)
+    assert founding.jumps_per_interval == 2.0
+    assert founding.status.ok
+
+
+def test_plain_means_are_slower(founding):
+    """Benettin's running mean is off by 1/M where the tapered one is done."""
+    assert founding.benettin_history.shape == (2000, 4)
+    assert 1e-5 < abs(founding.benettin_history[-1, 0] - EXPONENTS_740[0]) < 2e-3
+
+
+@pytest.mark.parametrize("omega", [7.40, 7.46, 7.92])
+def test_sum_rule(omega):
+    p = models.vibroimpact().parameters
+    chi = p["m2"] / p["m1"]
+    exact = -2 * (p["xi1"] * p["omega1"] + p["xi2"] * p["omega2"] * (1 + chi))
+    result = lyapunov.lyapunov_spectrum(
+        models.vibroimpact(), ORBIT_740, parameters={"omega": omega}, intervals=300, solver=SOLVER
+    )
+    assert result.sum_rule == pytest.approx(exact, rel=1e-9)
+    assert abs(result.sum_defect) < 1e-8
+
+
+def test_torus_has_a_zero_exponent():
+    result = lyapunov.lyapunov_spectrum(
+        models.vibroimpact(),
+        (0.0, 0.05, 0.0, 0.0),
+        parameters={"omega": 7.46},
+        k=1,
+        transient=1000,
+        intervals=2000,
+    )
+    assert abs(result.exponents[0]) < 1e-4
+
+
+def test_the_other_attractor_of_7_46():
+    result = lyapunov.lyapunov_spectrum(
+        models.vibroimpact(),
+        (0.0, 0.05, 0.3, 0.3),
+        parameters={"omega": 7.46},
+        k=1,
+        transient=500,
+        intervals=1000,
+    )
+    assert result.jumps_per_interval / 2 == pytest.approx(0.62, abs=0.01)
+    assert result.exponents[0] < -0.005
+
+
+def test_impact_oscillator_agrees_with_its_multipliers():
+    result = lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=2000)
+    exact = np.log(abs(-0.58429531 + 0.00560035j)) / (2 * np.pi)
+    np.testing.assert_allclose(result.exponents, exact, atol=1e-6)
+
+
+def test_last_row_of_the_history_is_the_result(founding):
+    assert founding.history.shape == founding.growths.shape == (2000, 4)
+    np.testing.assert_allclose(founding.history[-1], founding.exponents, rtol=1e-9)
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_fewer_vectors_give_the_first_exponents(k):
+    result = lyapunov.lyapunov_spectrum(models.vibroimpact(), ORBIT_740, k=k, intervals=500, solver=SOLVER)
+    assert result.exponents.shape == result.standard_error.shape == (k,)
+    np.testing.assert_allclose(result.exponents, EXPONENTS_740[:k], atol=2e-5)
+
+
+def test_linear_systems_have_their_eigenvalues():
+    system = hybrid.HybridSystem(
+        state=("a", "b", "c"),
+        modes=[hybrid.Mode("only", lambda t, x, p: (0.3 * x.a + x.b, -0.1 * x.b, -2 * x.c))],
+    )
+    result = lyapunov.lyapunov_spectrum(system, (0.0, 0.0, 0.0), interval=0.5, intervals=400)
+    np.testing.assert_allclose(result.exponents, [0.3, -0.1, -2.0], atol=1e-8)
+
+
+def test_a_collapsed_direction_is_minus_infinity():
+    """The catch of the belt annihilates one: whatever the speed of the slip, the block then sticks."""
+    system = systems.stick_slip()
+    result = lyapunov.lyapunov_spectrum(system, (0.0, 0.2), mode="stick", interval=12.001031295, intervals=50)
+    assert result.exponents[0] == pytest.approx(0.0, abs=1e-4)
+    assert result.exponents[1] == -np.inf
+    assert result.standard_error[1] == 0.0
+
+
+def test_without_history_memory_does_not_grow():
+    """Every array of a long run's result is as small as that of a short one."""
+
+    def size(intervals, history=False):
+        result = lyapunov.lyapunov_spectrum(
+            models.impact_oscillator(), (0.0, 0.0), intervals=intervals, transient=0, history=history
+        )
+        return sum(getattr(result, name).nbytes for name in ("exponents", "standard_error", "growths", "x"))
+
+    assert size(3000) == size(30)
+    assert size(3000, history=True) == size(3000) + 3000 * 2 * 8
+
+
+def test_without_history_the_result_is_the_same():
+    kept, dropped = (
+        lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=300, history=history)
+        for history in (True, False)
+    )
+    np.testing.assert_array_equal(kept.exponents, dropped.exponents)
+    np.testing.assert_array_equal(kept.standard_error, dropped.standard_error)
+
+
+def covered(exact, runs):
+    """In how many runs two standard errors hold the exact exponent."""
+    return sum(bool(abs(run.exponents[0] - exact) <= 2 * run.standard_error[0]) for run in runs)
+
+
+def test_error_bars_hold_the_exact_exponent_of_the_solvable_oscillator():
+    """Over whole times its growth is exactly b, with no error to estimate; over others it fluctuates."""
+    system = systems.solvable_oscillator()
+    runs = [
+        lyapunov.lyapunov_spectrum(
+            system, (u, 0.0), mode="plus", k=1, interval=0.37, intervals=400, transient=50, solver=SOLVER
+        )
+        for u in np.random.default_rng(3).uniform(0.05, 0.95, 40)
+    ]
+    assert 34 <= covered(0.5, runs) <= 40
+
+
+def test_error_bars_hold_the_exact_exponent_of_the_skew_tent_map():
+    """Slopes 1/a and 1/(1 - a) come at random, so the exponent is -a ln a - (1 - a) ln(1 - a)."""
+    system = hybrid.HybridSystem(
+        state=("x", "clock"),
+        parameters={"a": 0.3},
+        modes=[hybrid.Mode("wait", lambda t, x, p: (0.0, 1.0))],
+        transitions=[
+            hybrid.Transition(
+                "wait",
+                "wait",
+                hybrid.Guard(lambda t, x, p: x.clock - 1, direction=+1),
+                hybrid.Reset(lambda t, x, p: (np.minimum(x.x / p.a, (1 - x.x) / (1 - p.a)), 0.0)),
+            )
+        ],
+    )
+    runs = [
+        lyapunov.lyapunov_spectrum(system, (u, 0.5), k=1, interval=1.0, intervals=500, transient=10)
+        for u in np.random.default_rng(4).uniform(0.05, 0.95, 40)
+    ]
+    assert 34 <= covered(-0.3 * np.log(0.3) - 0.7 * np.log(0.7), runs) <= 40
+    assert np.mean([run.standard_error[0] for run in runs]) < 0.05
+
+
+def test_a_run_that_breaks_off_keeps_what_it_has():
+    """The field is nan beyond x = 1, which the orbit reaches at t = 1."""
+    system = hybrid.HybridSystem(
+        state=("x", "y"), modes=[hybrid.Mode("only", lambda t, x, p: (1.0 + 1e-9 * np.sqrt(1.0 - x.x), -x.y))]
+    )
+    result = lyapunov.lyapunov_spectrum(system, (0.0, 1.0), interval=0.1, intervals=50, transient=0)
+    assert result.status.code == hybrid.StatusCode.NON_FINITE
+    assert "became infinite or nan" in str(result.status)
+    assert 5 <= result.intervals < 11
+    np.testing.assert_allclose(result.exponents, [0.0, -1.0], atol=1e-6)
+
+
+def test_a_transient_that_breaks_off_leaves_nothing():
+    system = hybrid.HybridSystem(
+        state=("x",), modes=[hybrid.Mode("only", lambda t, x, p: (1.0 + 1e-9 * np.sqrt(1.0 - x.x),))]
+    )
+    result = lyapunov.lyapunov_spectrum(system, (0.0,), interval=0.1, intervals=5)
+    assert result.intervals == 0
+    assert not result.status.ok
+    assert math.isnan(result.exponents[0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"k": 0}, "k must be a whole number from 1 to 2, the dimension of the state; got 0"),
+        ({"k": 3}, "k must be a whole number from 1 to 2, the dimension of the state; got 3"),
+        ({"k": 1.5}, r"k must be a whole number from 1 to 2, the dimension of the state; got 1\.5"),
+        ({"intervals": 0}, "intervals must be a whole number of at least 1; got 0"),
+        ({"intervals": 10.0}, r"intervals must be a whole number of at least 1; got 10\.0"),
+        ({"transient": -1}, "transient must be a whole number of at least 0; got -1"),
+        ({"interval": 0.0}, r"interval must be a positive time; got 0\.0"),
+        ({"interval": np.inf}, "interval must be a positive time; got inf"),
+        ({"solver": hybrid.DOP853}, "solver must be a solver object"),
+        ({"mode": "fligth"}, "Did you mean 'flight'"),
+        ({"parameters": {"damping": 1.0}}, "damping"),
+    ],
+)
+def test_bad_arguments(arguments, message):
+    with pytest.raises(hybrid.ModelError, match=message):
+        lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), **arguments)
+
+
+def test_bad_state():
+    with pytest.raises(hybrid.ArgumentError, match="'v' must be finite; got nan"):
+        lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, np.nan))

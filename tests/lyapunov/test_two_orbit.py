@@ -1,0 +1,155 @@
+"""What the paper's two-orbit formulas do, and that the renormalised companion converges."""
+
+import numpy as np
+import pytest
+
+import hybrid
+import lyapunov
+import models
+from tests.cases import systems
+
+ORBIT_740 = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
+TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
+PERIOD = 2 * np.pi
+
+
+@pytest.fixture(scope="module")
+def stable():
+    """The impact oscillator on its stable orbit."""
+    return lyapunov.two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=1000)
+
+
+@pytest.fixture(scope="module")
+def chaotic():
+    """The founding system in chaos."""
+    return lyapunov.two_orbit_exponents(
+        models.vibroimpact(),
+        ORBIT_740,
+        parameters={"omega": 7.92},
+        transient=200,
+        intervals=2000,
+        solver=TIGHT,
+    )
+
+
+@pytest.mark.parametrize("name", ["stable", "chaotic"])
+def test_formula_8_telescopes_to_formula_7(name, request):
+    result = request.getfixturevalue(name)
+    np.testing.assert_allclose(result.telescoped, result.single_piece, rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["stable", "chaotic"])
+def test_formulas_7_and_9_as_they_are_printed(name, request):
+    result = request.getfixturevalue(name)
+    logs = np.log(result.distances / result.separation)
+    M, T = result.intervals, result.interval
+    assert result.single_piece[-1] == pytest.approx(logs[-1] / (M * T))
+    assert result.undivided[-1] == pytest.approx(logs.sum() / (M * T))
+
+
+def test_a_stable_distance_stops_at_rounding(stable):
+    """So (7) decays like 1/M from there on, though the exponent is -0.0855."""
+    late = slice(500, None)
+    levels = (stable.single_piece * np.arange(1, 1001) * PERIOD)[late]
+    assert np.log(1e-17 / 1e-8) < levels.min() <= levels.max() < np.log(1e-12 / 1e-8)
+    assert abs(stable.single_piece[-1]) < 0.004
+
+
+def test_a_chaotic_distance_stops_at_the_size_of_the_attractor(chaotic):
+    late = chaotic.distances[-500:]
+    assert 0.1 < late.mean() < 1.5
+    level = chaotic.single_piece[-1] * chaotic.intervals * chaotic.interval
+    assert level == pytest.approx(np.log(chaotic.distances[-1] / 1e-8))
+
+
+def test_formula_9_tends_to_the_level_over_the_interval(stable):
+    """No exponent at all: the level of the distance, near -16, over the period."""
+    level = np.log(stable.distances[-300:] / stable.separation).mean()
+    assert stable.undivided[-1] == pytest.approx(level / stable.interval, rel=0.15)
+
+
+def test_renormalised_companion_of_the_impact_oscillator(stable):
+    exact = np.log(abs(-0.58429531 + 0.00560035j)) / PERIOD
+    assert stable.renormalised_exponent == pytest.approx(exact, abs=1e-4)
+    assert stable.renormalised[-1] == pytest.approx(exact, abs=1e-3)
+
+
+def test_renormalised_companion_of_the_founding_system():
+    result = lyapunov.two_orbit_exponents(models.vibroimpact(), ORBIT_740, intervals=1000, solver=TIGHT)
+    assert result.renormalised_exponent == pytest.approx(-0.05489357, abs=2e-6)
+
+
+def test_renormalised_companion_of_an_autonomous_chaotic_system():
+    """Solvable chaotic oscillator, exponent b = 0.5: the two-orbit estimate follows the spectrum's."""
+    where = {"mode": "plus", "interval": 1.0, "transient": 20}
+    system, x0 = systems.solvable_oscillator(), (0.3, 0.0)
+    result = lyapunov.two_orbit_exponents(system, x0, intervals=500, solver=TIGHT, **where)
+    assert result.renormalised_exponent == pytest.approx(0.5, abs=0.02)
+
+
+def test_coinciding_orbits_give_minus_infinity():
+    """Where a distance is zero (7) is minus infinity, and (8) and (9) are so from there on."""
+    result = lyapunov.TwoOrbitExponents(
+        np.array([1e-9, 0.0, 0.0, 1e-17]),
+        np.array([-1.0, -np.inf, -1.0, -1.0]),
+        1e-8,
+        1.0,
+        hybrid.status.SUCCESS,
+    )
+    assert np.isfinite(result.single_piece).tolist() == [True, False, False, True]
+    assert np.isneginf(result.telescoped).tolist() == [False, True, True, True]
+    assert np.isneginf(result.undivided).tolist() == [False, True, True, True]
+    assert result.renormalised_exponent == -np.inf
+
+
+def test_separation_and_direction_place_the_companion():
+    """Constant fields keep the distance; across the guard it is stretched by the saltation matrix."""
+    options = {"separation": 1e-3, "direction": (3.0, 4.0), "interval": 0.1, "intervals": 5, "mode": "left"}
+    before = lyapunov.two_orbit_exponents(systems.constant_fields(), (-1.0, 0.0), **options)
+    np.testing.assert_allclose(before.distances, 1e-3, rtol=1e-9)
+    after = lyapunov.two_orbit_exponents(systems.constant_fields(), (-0.25, 0.0), **options)
+    stretched = np.linalg.norm(np.array([[1, 0], [2, 1]]) @ (0.6, 0.8))
+    np.testing.assert_allclose(after.distances[2:], 1e-3 * stretched, rtol=1e-9)
+
+
+def test_a_companion_beyond_a_guard_starts_in_the_mode_there():
+    """The reference is in mode left just before the guard, the companion behind it, in mode right."""
+    options = {"separation": 1e-2, "direction": (1.0, 0.0), "interval": 0.001, "intervals": 1}
+    result = lyapunov.two_orbit_exponents(systems.constant_fields(), (-0.005, 0.0), mode="left", **options)
+    assert result.distances[0] == pytest.approx(np.hypot(0.01, 0.002), rel=1e-9)
+
+
+def test_a_run_that_breaks_off_keeps_what_it_has():
+    """The field is nan beyond x = 1, which the orbit reaches at t = 1."""
+    system = hybrid.HybridSystem(
+        state=("x",), modes=[hybrid.Mode("only", lambda t, x, p: (1.0 + 1e-9 * np.sqrt(1.0 - x.x),))]
+    )
+    result = lyapunov.two_orbit_exponents(system, (0.0,), interval=0.1, intervals=50)
+    assert result.status.code == hybrid.StatusCode.NON_FINITE
+    assert 5 <= result.intervals < 11
+    np.testing.assert_allclose(result.distances, 1e-8, rtol=1e-6)
+    late = lyapunov.two_orbit_exponents(system, (0.0,), interval=0.1, intervals=5, transient=50)
+    assert late.intervals == 0
+    assert not late.status.ok
+    assert np.isnan(late.renormalised_exponent)
+    assert "NON_FINITE" in repr(late)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"separation": 0.0}, r"separation must be a positive distance; got 0\.0"),
+        ({"separation": np.nan}, "separation must be a positive distance; got nan"),
+        ({"direction": (1.0, 0.0, 0.0)}, r"direction must be a finite vector of shape \(2,\)"),
+        ({"direction": (0.0, 0.0)}, r"direction must be a finite vector of shape \(2,\), not zero"),
+        ({"intervals": 0}, "intervals must be a whole number of at least 1; got 0"),
+        ({"transient": -1}, "transient must be a whole number of at least 0; got -1"),
+        ({"interval": -1.0}, r"interval must be a positive time; got -1\.0"),
+        ({"solver": "DOP853"}, "solver must be a solver object; got 'DOP853'"),
+        ({"mode": "fligth"}, "Did you mean 'flight'"),
+        ({"parameters": {"omega": 1.0}}, "omega"),
+    ],
+)
+def test_bad_arguments(arguments, message):
+    with pytest.raises(hybrid.ModelError, match=message):
+        lyapunov.two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), **arguments)
