@@ -7,6 +7,7 @@ it the import of the compiler, waits for the first call that needs it.
 from hybrid.arc import Grazing, HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
+from hybrid.filippov import filippov
 from hybrid.orbit import PeriodicOrbit, periodic_orbit
 from hybrid.saltation import saltation_matrix
 from hybrid.section import Section, poincare_section, stroboscopic_section
@@ -35,6 +36,7 @@ __all__ = [
     "Transition",
     "Tsit5",
     "compile_system",
+    "filippov",
     "periodic_orbit",
     "poincare_section",
     "saltation_matrix",

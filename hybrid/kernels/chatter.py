@@ -5,8 +5,8 @@ import math
 from numba import boolean, float64, int64, njit, void
 
 from hybrid.kernels.codes import (
-    CHATTERING,
     CHATTER_JUMPS,
+    CHATTERING,
     JUMPS,
     MODE,
     PHASE,
@@ -33,8 +33,8 @@ EPSILON = 2.220446049250313e-16
 def remaining_chatter(model, run, transition, speed, work):
     """Time ``2 v / (a (1 - r))`` that infinitely many flights with speeds ``v, r v, r^2 v, ...`` still take.
 
-    The acceleration ``a`` towards the guard is taken here, ``r`` is the restitution of the jump just made. Zero if the flights do
-    not shrink or nothing pulls the state back.
+    The acceleration ``a`` towards the guard is taken here, ``r`` is the restitution of the jump just made.
+    Zero if the flights do not shrink or nothing pulls the state back.
     """
     ratio = run.clock[RESTITUTION]
     pull = model.direction[transition] * guard_acceleration(
@@ -49,8 +49,8 @@ def remaining_chatter(model, run, transition, speed, work):
 def extrapolate(model, method, run, ratio, shift, span, work):
     """Limit of the state as a geometric series, into ``work.settled (n,)``, and how far to trust it.
 
-    Returns the largest ratio to the tolerances of what the next extrapolations will still change, judged from the last
-    change: of the limit time that is ``shift``.
+    Returns the largest ratio to the tolerances of what the next extrapolations will still change, judged from
+    the last change: of the limit time that is ``shift``.
     """
     tail = ratio / (1.0 - ratio)
     gain = ratio * ratio / (1.0 - ratio * ratio)
@@ -87,7 +87,8 @@ def accumulation(model, method, run, transition, since_last, work):
         height = 0.25 * speed * span * (1.0 - ratio)
         drowned = height <= rounding_band(model, run, run.clock[PHASE], work.gradient)
         misfit = extrapolate(model, method, run, ratio, span - (run.trail[LIMIT, n] - since_last), span, work)
-        # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls, takes over.
+        # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
+        # takes over.
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
         found = drowned or (run.count[CHATTERING] >= FEWEST_JUMPS and (misfit <= 1.0 or floor))
         run.trail[IMPULSE, n] = misfit

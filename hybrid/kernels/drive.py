@@ -2,9 +2,8 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, void
+from numba import boolean, float64, int64, njit, types, void
 
-from hybrid.kernels.bernstein import NO_ROOT
 from hybrid.kernels.chatter import chatter_matrix
 from hybrid.kernels.codes import (
     ACCUMULATION,
@@ -44,6 +43,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.kernels.corner import companion, order_matters
 from hybrid.kernels.guards import (
+    NOT_THERE,
     earliest_crossing,
     guard_acceleration,
     guard_speed,
@@ -51,6 +51,7 @@ from hybrid.kernels.guards import (
     land,
     rounding_band,
     value_on_interpolant,
+    widen_scale,
 )
 from hybrid.kernels.jump import carry_tangents, enter, finish_chatter, forward, jump
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
@@ -69,6 +70,7 @@ def arrived(model, run, work):
     """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run."""
     mode, t = run.count[MODE], run.clock[PHASE]
     model.flow(mode, t, run.y, model.parameters, work.field)
+    widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
@@ -108,8 +110,13 @@ def remember_step(model, method, run, record, t, h, work):
 def accept(model, method, run, tangents, h, correction, work):
     """Move the run to the end of the attempted step in ``work.new``."""
     n = model.dimension
+    mode = run.count[MODE]
+    on_guard = 0
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        on_guard += run.on_guard[model.outgoing[slot]]
     for i in range(n):
-        run.scale[i] = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
+        before = run.scale[i] if on_guard > 0 else 0.0
+        run.scale[i] = max(before, abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
     for i in range(n * (1 + tangents)):
         run.y[i] = work.new[i]
     if tangents > 0:
@@ -118,9 +125,6 @@ def accept(model, method, run, tangents, h, correction, work):
         for j in range(s):
             total += method.b[j] * work.stages[j, place]
         run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
-    mode = run.count[MODE]
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        run.on_guard[model.outgoing[slot]] = 0
     forward(run, model.period, h + correction)
 
 
@@ -151,6 +155,37 @@ def remember_grazing(model, method, run, record, t, h, work):
     record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
     record.grazing_place[slot, 2] = run.count[JUMPS]
     record.used[2] = slot + 1
+
+
+@njit(types.Tuple((float64, float64, int64))(MODEL, METHOD, RUN, RECORD, int64, float64, WORK), **KERNEL)
+def find_event(model, method, run, record, tangents, h, work):
+    """Shorten the attempted step to its first event, if there is one.
+
+    Returns its length, the Euler step that completes it, and the transition. A crossing that the interpolant has and the
+    solution has not is a grazing; the step is then searched again without that guard.
+    """
+    mode, t = run.count[MODE], run.clock[PHASE]
+    ignored = NO_TRANSITION
+    for _ in range(2):
+        interpolation_stages(model, method, mode, t, h, run.y, work)
+        if not all_affine(model, mode):
+            interpolate(method, h, run.y, model.dimension, work)
+        theta, fired = earliest_crossing(model, method, run, t, h, ignored, work)
+        if run.clock[GRAZING_PLACE] < theta:
+            remember_grazing(model, method, run, record, t, h, work)
+        if fired == NO_TRANSITION:
+            break
+        direction = model.direction[fired]
+        side = run.side[fired] if direction == 0 else -direction
+        shortened, correction = land(model, method, fired, side, mode, t, h, theta, run.y, tangents, work)
+        if shortened != NOT_THERE:
+            return shortened, correction, fired
+        ignored = fired
+        attempt(model, method, mode, t, h, run.y, tangents, work)
+        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, 0.0
+        run.count[GRAZING_GUARD] = fired
+        remember_grazing(model, method, run, record, t, h, work)
+    return h, 0.0, NO_TRANSITION
 
 
 @njit(int64(MODEL, RUN, int64, WORK), **KERNEL)
@@ -298,27 +333,19 @@ def advance(
         grow = growth_factor(method, run, h, max(ratio, 1e-16))
         run.clock[NEXT_STEP] = max(proposed, h * grow) if last else h * grow
         run.clock[LAST_STEP], run.clock[LAST_RATIO] = h, max(ratio, 1e-16)
-        fired = NO_TRANSITION
-        theta = 0.0
+        fired, correction = NO_TRANSITION, 0.0
         if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
-            interpolation_stages(model, method, mode, t, h, run.y, work)
-            if not all_affine(model, mode):
-                interpolate(method, h, run.y, n, work)
-            theta, fired = earliest_crossing(model, method, run, t, h, work)
-            if run.clock[GRAZING_PLACE] < (theta if fired != NO_TRANSITION else NO_ROOT):
-                remember_grazing(model, method, run, record, t, h, work)
-        correction = 0.0
-        if fired != NO_TRANSITION:
-            h, correction = land(model, method, fired, mode, t, h, theta, run.y, tangents, work)
-        elif run.first_step[mode] <= 0.0:
+            h, correction, fired = find_event(model, method, run, record, tangents, h, work)
+        if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:
             run.first_step[mode] = h
-        if recording:
+        if recording and h > 0.0:
             remember_step(model, method, run, record, t, h, work)
         accept(model, method, run, tangents, h, correction, work)
+        past = time_left(model, run, stop_cycle, stop_phase) < 0.0
+        if last and (fired == NO_TRANSITION or past):
+            run.count[CYCLE] = stop_cycle
+            run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
             run.count[PENDING] = first_in_order(model, run, fired, work)
         else:
-            if last:
-                run.count[CYCLE] = stop_cycle
-                run.clock[PHASE] = stop_phase
             carry_rates(method, length, work)

@@ -11,11 +11,19 @@ from hybrid.kernels.step import attempt
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size;
 # its root is only a first guess for the landing.
-FIT_TOLERANCE = 1e-9
+FIT_TOLERANCE = 1e-12
+# A guard that has just been met is followed off zero only where it rises this far above rounding: closer in,
+# the shape of its fit is noise.
+CLEAR_OF_ROUNDING = 64.0
+# Instead of a place on [0, 1]: the step is too short to leave the guard it started on.
+STILL_ON_GUARD = 3.0
 # Guards with a kink on the step are cut around it down to this share of the step.
 SHORTEST_CUT = 1e-12
 # A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
 EULER_IS_ENOUGH = 1e-8
+# Newton's steps take half of these at most, halvings of the bracket down to rounding the rest.
+MOST_LANDINGS = 120
+NOT_THERE = -1.0
 
 
 @njit(float64(MODEL, int64, float64, VECTOR, VECTOR), **INLINE)
@@ -40,6 +48,30 @@ def guard_speed(model, transition, t, x, field, gradient):
     for i in range(model.dimension):
         speed += gradient[i] * field[i]
     return speed
+
+
+@njit(float64(MODEL, RUN, float64, VECTOR), **KERNEL)
+def rounding_band(model, run, t, gradient):
+    """How far from zero rounding alone can leave a guard whose state has the sizes in ``run.scale``."""
+    n = model.dimension
+    size = abs(gradient[n] * t)
+    for i in range(n):
+        size += abs(gradient[i]) * run.scale[i]
+    return 16 * 2.220446049250313e-16 * size
+
+
+@njit(void(MODEL, RUN, WORK), **KERNEL)
+def widen_scale(model, run, work):
+    """Judge rounding at the start and the end of a run alike, whatever steps lead there.
+
+    Each component is taken to be at least as large as it becomes while the state changes by its own size;
+    ``work.field`` is current. A run that ends on a guard and the run that starts there then agree on that.
+    """
+    size, pace = 0.0, 0.0
+    for i in range(model.dimension):
+        size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
+    for i in range(model.dimension if pace > 0.0 else 0):
+        run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
 
 
 @njit(int64(MODEL, METHOD, int64, float64, float64, VECTOR, float64, WORK), **INLINE)
@@ -106,42 +138,6 @@ def fit_polynomial(model, transition, t, h, start, end, offset, work):
     return misfit
 
 
-@njit(types.Tuple((float64, int64))(MODEL, int64, float64, float64, float64, int64, int64, WORK), **KERNEL)
-def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
-    """First crossing of a guard that is not affine, by polynomials fitted piecewise along the interpolant.
-
-    Only where a fit neither excludes a zero nor follows the guard is the interval cut, so a kink away from
-    zero costs nothing. Returns the place on [0, 1] (or ``NO_ROOT``) and the side after it.
-    """
-    direction = model.direction[transition]
-    top = 0
-    work.intervals[0, 0], work.intervals[0, 1] = 0.0, 1.0
-    while top >= 0:
-        start, end = work.intervals[top, 0], work.intervals[top, 1]
-        misfit = fit_polynomial(model, transition, t, h, start, end, offset, work)
-        degree = work.nodes.shape[0] - 1
-        largest, smallest = 0.0, math.inf
-        for i in range(degree + 1):
-            largest = max(largest, abs(work.polynomial[i]))
-            smallest = min(smallest, abs(work.polynomial[i]))
-        short = end - start <= SHORTEST_CUT
-        if misfit > FIT_TOLERANCE * largest and misfit >= smallest and not short:
-            middle = 0.5 * (start + end)
-            work.intervals[top, 0] = middle
-            top += 1
-            work.intervals[top, 0], work.intervals[top, 1] = start, middle
-            continue
-        top -= 1
-        if not math.isfinite(largest):
-            continue
-        for _ in range(on_guard if start == 0.0 else 0):
-            degree = divide_by_theta(work.polynomial, degree)
-        theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
-        if theta <= 1.0:
-            return start + (end - start) * theta, side
-    return NO_ROOT, side
-
-
 @njit(float64(METHOD, RUN, VECTOR, int64), **INLINE)
 def error_band(method, run, gradient, n):
     """How far the tolerances can move a guard with this gradient: closer to zero than that is a grazing."""
@@ -151,33 +147,97 @@ def error_band(method, run, gradient, n):
     return size
 
 
-@njit(void(METHOD, RUN, int64, int64, int64, float64, WORK), **KERNEL)
-def note_grazing(method, run, transition, degree, side, band, work):
-    """Keep the earliest place of the step where the polynomial of a guard comes that close to zero without crossing."""
+@njit(void(RUN, int64, int64, int64, float64, float64, float64, WORK), **KERNEL)
+def note_grazing(run, transition, degree, side, band, start, end, work):
+    """Keep the earliest place of the step where a guard comes within ``band`` of zero and turns back.
+
+    ``work.polynomial`` is the guard on the part ``[start, end]`` of the step.
+    """
     theta, value = lowest(work.polynomial, degree, side, work.stack)
-    if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.clock[GRAZING_PLACE]:
-        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, value
+    place = start + (end - start) * theta
+    if 0.0 < theta < 1.0 and abs(value) <= band and place < run.clock[GRAZING_PLACE]:
+        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = place, value
         run.count[GRAZING_GUARD] = transition
 
 
-@njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, WORK), **INLINE)
-def earliest_crossing(model, method, run, t, h, work):
-    """Earliest crossing on the attempted step over all guards of the mode, and its transition.
+@njit(
+    types.Tuple((float64, int64))(MODEL, METHOD, RUN, int64, float64, float64, float64, int64, int64, WORK),
+    **KERNEL,
+)
+def composed_crossing(model, method, run, transition, t, h, offset, on_guard, side, work):
+    """First crossing of a guard that is not affine, by polynomials fitted piecewise along the interpolant.
 
-    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of the guards are brought up
-    to date. ``work.coefficients`` must hold the interpolant if any guard of the mode is not affine.
+    Only where a fit neither excludes a zero nor follows the guard is the interval cut, so a kink away from
+    zero costs nothing, and below the guard's rounding no fit can follow it. Returns the place on [0, 1] (or
+    ``NO_ROOT``, or ``STILL_ON_GUARD``) and the side after it.
+    """
+    direction = model.direction[transition]
+    model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+    band = rounding_band(model, run, t, work.gradient)
+    close = error_band(method, run, work.gradient, model.dimension)
+    values = work.stack[work.stack.shape[0] - 1]
+    top = 0
+    work.intervals[0, 0], work.intervals[0, 1] = 0.0, 1.0
+    while top >= 0:
+        start, end = work.intervals[top, 0], work.intervals[top, 1]
+        misfit = fit_polynomial(model, transition, t, h, start, end, offset, work)
+        degree = work.nodes.shape[0] - 1
+        low, high, farthest = math.inf, -math.inf, 0.0
+        for i in range(degree + 1):
+            farthest = max(farthest, abs(values[i]))
+            low, high = min(low, work.polynomial[i]), max(high, work.polynomial[i])
+        if on_guard > 0 and start == 0.0 and end == 1.0 and farthest <= CLEAR_OF_ROUNDING * band:
+            return STILL_ON_GUARD, side
+        excluded = low > misfit or high < -misfit
+        rough = misfit > max(FIT_TOLERANCE * farthest, 8.0 * band)
+        if rough and not excluded and end - start > SHORTEST_CUT:
+            middle = 0.5 * (start + end)
+            work.intervals[top, 0] = middle
+            top += 1
+            work.intervals[top, 0], work.intervals[top, 1] = start, middle
+            continue
+        top -= 1
+        if not math.isfinite(high - low):
+            continue
+        for _ in range(on_guard if start == 0.0 else 0):
+            degree = divide_by_theta(work.polynomial, degree)
+        before = side
+        theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
+        if theta <= 1.0:
+            return start + (end - start) * theta, side
+        if side == before and on_guard == 0 and not stays(work.polynomial, degree, side, close):
+            note_grazing(run, transition, degree, side, close, start, end, work)
+    return NO_ROOT, side
+
+
+@njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, int64, WORK), **INLINE)
+def earliest_crossing(model, method, run, t, h, ignored, work):
+    """Earliest crossing on the attempted step over all guards of the mode but ``ignored``, and its transition.
+
+    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of guards without a crossing
+    are brought up to date, to the end of the step, and guards that were left are no longer held to be zero at
+    its start. ``work.coefficients`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode = run.count[MODE]
     earliest, fired = NO_ROOT, NO_TRANSITION
     run.clock[GRAZING_PLACE] = NO_ROOT
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
+        if transition == ignored:
+            continue
         value = guard_value(model, transition, t, run.y, work.scalar)
         on_guard = run.on_guard[transition]
         side = run.side[transition]
         if model.affine_guard[transition] == 1:
             start = 0.0 if on_guard > 0 else value
             degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
+            if on_guard > 0:
+                band, farthest = rounding_band(model, run, t, work.gradient), 0.0
+                for i in range(degree + 1):
+                    farthest = max(farthest, abs(work.polynomial[i]))
+                if farthest <= band:
+                    continue
+                run.on_guard[transition] = 0
             for _ in range(on_guard):
                 degree = divide_by_theta(work.polynomial, degree)
             band = error_band(method, run, work.gradient, model.dimension)
@@ -187,55 +247,67 @@ def earliest_crossing(model, method, run, t, h, work):
                 work.polynomial, degree, side, model.direction[transition], work.stack
             )
             if theta > 1.0 and side == run.side[transition] and on_guard == 0:
-                note_grazing(method, run, transition, degree, side, band, work)
+                note_grazing(run, transition, degree, side, band, 0.0, 1.0, work)
         else:
             offset = value if on_guard > 0 else 0.0
-            theta, side = composed_crossing(model, transition, t, h, offset, on_guard, side, work)
-        run.side[transition] = side
-        if theta < earliest:
+            theta, side = composed_crossing(
+                model, method, run, transition, t, h, offset, on_guard, side, work
+            )
+            if theta == STILL_ON_GUARD:
+                continue
+            run.on_guard[transition] = 0
+        if theta == NO_ROOT:
+            run.side[transition] = side
+        elif theta < earliest:
             earliest, fired = theta, transition
     return earliest, fired
 
 
 @njit(
-    types.UniTuple(float64, 2)(MODEL, METHOD, int64, int64, float64, float64, float64, VECTOR, int64, WORK),
+    types.UniTuple(float64, 2)(
+        MODEL, METHOD, int64, int64, int64, float64, float64, float64, VECTOR, int64, WORK
+    ),
     **KERNEL,
 )
-def land(model, method, transition, mode, t, h, theta, y, tangents, work):
+def land(model, method, transition, side, mode, t, h, theta, y, tangents, work):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
     The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
     so that the state and the tangents at the event carry the error of the method, not that of its
-    interpolant. Returns the length of the step last taken and the small Euler step that completed it.
+    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been seen.
+    Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE`` instead
+    of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
     """
+    s = method.b.shape[0]
+    low, high = 0.0, h
+    before = guard_value(model, transition, t, y, work.scalar) * side > 0.0
+    after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
     length = theta * h
-    for _ in range(6):
+    for trial in range(MOST_LANDINGS):
         attempt(model, method, mode, t, length, y, tangents, work)
-        s = method.b.shape[0]
+        if length == 0.0:
+            return 0.0, 0.0
         value = guard_value(model, transition, t + length, work.new, work.scalar)
         speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
         correction = -value / speed
-        if not math.isfinite(correction):
-            break
-        if abs(correction) <= EULER_IS_ENOUGH * length:
+        if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length:
             for i in range(model.dimension * (1 + tangents)):
                 work.new[i] += correction * work.stages[s, i]
             return length, correction
-        corrected = length + correction
-        if corrected <= 0.0 or corrected > h:
+        if value * side > 0.0:
+            low, before = length, True
+        else:
+            high, after = length, True
+        if before and after and high - low <= 4e-16 * max(high, abs(t)):
+            return length, 0.0
+        newton = length + correction
+        if low < newton < high and trial < MOST_LANDINGS // 2:
+            length = newton
+        elif before and after:
+            length = 0.5 * (low + high)
+        else:
             break
-        length = corrected
-    return length, 0.0
-
-
-@njit(float64(MODEL, RUN, float64, VECTOR), **KERNEL)
-def rounding_band(model, run, t, gradient):
-    """How far from zero rounding alone can leave a guard whose state has the sizes in ``run.scale``."""
-    n = model.dimension
-    size = abs(gradient[n] * t)
-    for i in range(n):
-        size += abs(gradient[i]) * run.scale[i]
-    return 16 * 2.220446049250313e-16 * size
+    return NOT_THERE, 0.0
 
 
 @njit(float64(MODEL, int64, int64, float64, VECTOR, WORK), **KERNEL)
