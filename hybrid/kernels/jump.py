@@ -43,6 +43,8 @@ from hybrid.kernels.guards import (
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
 
+EPSILON = 2.220446049250313e-16
+
 
 @njit(void(MODEL, RUN, WORK), **KERNEL)
 def sides_at_jump(model, run, work):
@@ -62,6 +64,20 @@ def sides_at_jump(model, run, work):
             run.side[transition] = direction if beyond else -direction
         elif direction != 0:
             run.side[transition] = -direction
+
+
+@njit(float64(MODEL, RUN, int64, float64, WORK), **KERNEL)
+def speed_rounding(model, run, mode, t, work):
+    """How far from zero rounding of the state alone can leave the speed of the guard in ``work.gradient``."""
+    n = model.dimension
+    model.flow_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    size = abs(work.gradient[n])
+    for i in range(n):
+        spread = abs(work.field[i])
+        for j in range(n):
+            spread += abs(work.jacobian[i, j]) * run.scale[j]
+        size += abs(work.gradient[i]) * spread
+    return 16 * EPSILON * size
 
 
 @njit(types.Tuple((int64, boolean))(MODEL, RUN, WORK), **ENTRY)
@@ -91,10 +107,7 @@ def enter(model, run, work):
         trend = value
         if on_guard:
             trend = speed
-            size = abs(work.gradient[n])
-            for i in range(n):
-                size += abs(work.gradient[i] * work.field[i])
-            if abs(speed) <= 1e-14 * size or speed == 0.0:
+            if abs(speed) <= speed_rounding(model, run, mode, t, work):
                 resting = True
                 trend = guard_acceleration(model, transition, mode, t, run.y, work)
         direction = model.direction[transition]
