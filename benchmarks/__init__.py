@@ -1,0 +1,1 @@
+"""Speed and accuracy, measured: one file a question, ``python -m benchmarks.<name>``."""

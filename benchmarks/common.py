@@ -1,0 +1,84 @@
+"""What the measurements share: where and when they were made, tables, peak memory, fresh processes."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("numpy", "scipy", "numba")
+
+
+def heading(question: str) -> None:
+    """Print the question, the machine, the versions and the date."""
+    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in PACKAGES)
+    print(question)
+    machine = f"{processor()}, {os.cpu_count()} cores"
+    print(f"{machine}; Python {platform.python_version()}, {versions}; {date.today()}")
+    print()
+
+
+def processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a Markdown table."""
+    widths = [max(map(len, column)) for column in zip(columns, *rows, strict=True)]
+    rule = ["-" * width for width in widths]
+    for row in (columns, rule, *rows):
+        print("| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |")
+    print()
+
+
+def least_time(work: Callable[[], object], repeats: int = 7) -> float:
+    """Least of several processor times in seconds, so that what else runs on the machine counts little."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+class Process(NamedTuple):
+    """Seconds on the clock and on the processor, and what was written to standard output and error."""
+
+    wall: float
+    processor: float
+    output: str
+    messages: str
+
+
+def fresh_process(code: str, environment: Mapping[str, str] | None = None) -> Process:
+    """Run ``code`` in a new interpreter."""
+    start, before = time.perf_counter(), os.times()
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={**os.environ, **(environment or {})},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    wall, after = time.perf_counter() - start, os.times()
+    used = after.children_user - before.children_user + after.children_system - before.children_system
+    return Process(wall, used, done.stdout.strip(), done.stderr.strip())
+
+
+def fastest_process(code: str, environment: Mapping[str, str] | None = None, repeats: int = 5) -> Process:
+    """The one of several runs that took the least time on the clock."""
+    return min(fresh_process(code, environment) for _ in range(repeats))

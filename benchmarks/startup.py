@@ -1,0 +1,57 @@
+"""How long a user waits: the import, the first run ever, and the next process."""
+
+from __future__ import annotations
+
+from tempfile import TemporaryDirectory
+
+from benchmarks.common import Process, fastest_process, fresh_process, heading, table
+
+IMPORT = "import hybrid"
+RUN = """
+import hybrid, models
+arc = hybrid.simulate(models.vibroimpact(), (0.0, 0.0, 0.0, 0.0), (0.0, 10.0), mode="free")
+assert arc.status.ok
+"""
+SPECTRUM = """
+import lyapunov, models
+start = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
+assert lyapunov.lyapunov_spectrum(models.vibroimpact(), start, intervals=10).status.ok
+"""
+OWN_MODEL = """
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate
+pendulum = HybridSystem(
+    state=("q", "v"),
+    modes=[Mode("swing", lambda t, x, p: (x.v, -x.q - 0.123 * x.q**3))],
+    transitions=[Transition("swing", "swing", Guard(lambda t, x, p: x.q, direction=-1),
+                            Reset(lambda t, x, p: (0.0, -0.9 * x.v)), name="stop")],
+)
+assert simulate(pendulum, (1.0, 0.0), (0.0, 5.0)).status.ok
+"""
+
+
+def main() -> None:
+    heading("Seconds of whole processes, the interpreter's own start among them.")
+    rows = []
+
+    def report(what: str, process: Process, target: float | None = None) -> None:
+        times = [f"{process.wall:.2f}", f"{process.processor:.2f}"]
+        rows.append([what, *times, "" if target is None else f"{target:g}"])
+
+    report("the interpreter alone", fastest_process("pass"))
+    report("import numpy", fastest_process("import numpy"))
+    report("import hybrid", fastest_process(IMPORT), 0.5)
+    with TemporaryDirectory() as folder:
+        cache = {"HYBRID_CACHE_DIR": folder}
+        first = fresh_process(RUN, cache)
+        report("first run ever, empty cache", first, 30)
+        report("the next process", fastest_process(RUN, cache), 1.5)
+        report("first spectrum after that", fresh_process(SPECTRUM, cache))
+        report("the next process with a spectrum", fastest_process(SPECTRUM, cache), 1.5)
+        report("first run of a new model", fresh_process(OWN_MODEL, cache))
+        report("the next process with it", fastest_process(OWN_MODEL, cache), 1.5)
+    table(["", "on the clock", "of a processor", "target"], rows)
+    print("Said meanwhile:", first.messages.replace("\n", " ") or "nothing")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""Make the pictures of the documentation from the model in the README: ``python docs/make_pictures.py``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+
+from hybrid import DOP853, HybridSystem, periodic_orbit, simulate, stroboscopic_section
+from hybrid.plot import COLOURS, plot_arc, plot_graph, plot_phase
+
+HERE = Path(__file__).parent
+README = HERE.parent / "README.md"
+STYLE = {"font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.dpi": 160}
+
+
+def model_of_the_readme() -> HybridSystem:
+    """Run the first Python block of the README and take its model."""
+    block = re.search(r"^```python\n(.*?)^```", README.read_text(encoding="utf-8"), re.M | re.S)
+    assert block is not None
+    namespace: dict[str, Any] = {}
+    exec(compile(block[1], str(README), "exec"), namespace)
+    return namespace["rattler"]
+
+
+def rattler_picture(system: HybridSystem) -> None:
+    """Time series, phase portrait with an unstable periodic orbit, and section of the chaotic attractor."""
+    period = system.forcing_period()
+    arc = simulate(system, (0.5, 0.0), (0.0, 16 * period))
+    later = simulate(system, arc.x[-1], (0.0, 6 * period), mode=str(arc.mode[-1]))
+    orbit = periodic_orbit(system, (1.2, 1.6))
+    section = stroboscopic_section(
+        system, (0.5, 0.0), periods=40_000, transient=100, solver=DOP853(rtol=1e-8, atol=1e-10)
+    )
+
+    figure = plt.figure(figsize=(10.0, 3.9), layout="constrained")
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.25, 1, 1))
+    series = [figure.add_subplot(grid[row, 0]) for row in range(2)]
+    plot_arc(later, ax=series)
+    series[0].tick_params(labelbottom=False)
+    for axes, label in zip(series, ("position q", "velocity v"), strict=True):
+        axes.set_ylabel(label)
+    series[-1].set_xlabel("time t")
+
+    portrait = figure.add_subplot(grid[:, 1])
+    plot_phase(later, "q", "v", ax=portrait)
+    portrait.get_legend().remove()
+    lines = list(portrait.lines)
+    for line in lines:
+        line.set_alpha(0.35 if line.get_linestyle() != "None" else 0.0)
+    plot_phase(orbit.arc(), "q", "v", ax=portrait)
+    portrait.get_legend().remove()
+    for line in portrait.lines[len(lines) :]:
+        line.set_linewidth(2.4 if line.get_color() in COLOURS else 0.9)
+    portrait.set_ylabel("velocity v")
+    portrait.set_title("an unstable orbit in the chaos")
+    portrait.set_xlabel("position q")
+
+    strobe = figure.add_subplot(grid[:, 2], sharey=portrait)
+    for index, mode in enumerate(system.mode_names):
+        inside = section.mode == mode
+        strobe.plot(*section.x[inside].T, ",", color=COLOURS[index], alpha=0.7, rasterized=True)
+    strobe.set_title("once a forcing period")
+    strobe.set_xlabel("position q")
+    strobe.tick_params(labelleft=False)
+    strobe.spines[["top", "right"]].set_visible(False)
+    save(figure, "rattler")
+
+
+def graph_picture(system: HybridSystem) -> None:
+    figure, axes = plt.subplots(figsize=(5.6, 2.3), layout="constrained")
+    plot_graph(system, ax=axes)
+    save(figure, "graph")
+
+
+def save(figure: Any, name: str) -> None:
+    path = HERE / f"{name}.png"
+    figure.savefig(path, metadata={"Software": None})
+    plt.close(figure)
+    quantise(path)
+    print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1024:.0f} kB")
+
+
+def quantise(path: Path) -> None:
+    """Two hundred and fifty-six colours are enough, and a third of the size."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        small = image.convert("RGB").quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+
+
+def main() -> None:
+    with plt.rc_context(STYLE):
+        system = model_of_the_readme()
+        rattler_picture(system)
+        graph_picture(system)
+
+
+if __name__ == "__main__":
+    main()

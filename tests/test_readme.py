@@ -1,0 +1,82 @@
+"""Every Python block of the documentation runs, in order, in one namespace a page."""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+
+import hybrid
+import lyapunov
+import models
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "README.md"]
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\((?!https?://)([^)#]+)\)")
+
+
+def run(page):
+    """Namespace after the page's blocks, and what they printed."""
+    text = page.read_text(encoding="utf-8")
+    namespace, printed = {"__name__": "page"}, io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        for block in BLOCK.finditer(text):
+            # Line numbers of the page, for tracebacks.
+            source = "\n" * text.count("\n", 0, block.start(1)) + block[1]
+            exec(compile(source, str(page), "exec"), namespace)
+    plt.close("all")
+    return namespace, printed.getvalue()
+
+
+@pytest.mark.parametrize("page", PAGES[1:], ids=lambda page: page.name)
+def test_blocks_run(page):
+    run(page)
+
+
+def test_the_readme_shows_what_it_says():
+    names, printed = run(PAGES[0])
+    assert names["spectrum"].exponents == pytest.approx([0.298, -0.578], abs=0.02)
+    assert names["spectrum"].sum_defect == pytest.approx(0.0, abs=1e-10)
+    np.testing.assert_allclose(names["touch"].saltation, np.eye(2), atol=1e-10)
+    impact = names["impact"]
+    assert (impact.x_minus[1], impact.x_plus[1]) == pytest.approx((-2.6065, 2.3458), abs=1e-4)
+    assert np.diag(impact.saltation) == pytest.approx([-0.9, -0.9])
+    orbit = names["orbit"]
+    assert orbit.status.ok
+    assert sorted(np.abs(orbit.multipliers)) == pytest.approx([0.0867, 3.401], rel=1e-3)
+    assert orbit.signature == ("buffer", "free", "free", "free", "free", "buffer")
+    assert lyapunov.floquet_exponents(orbit) == pytest.approx([0.312, -0.623], abs=1e-3)
+    assert names["strobe"].x.shape == (2000, 2)
+    assert len(names["peaks"]) == 500
+    assert names["ball"].status.code == hybrid.StatusCode.ACCUMULATION
+    assert printed.count("w = ") == 3
+    assert "accumulate" in printed
+
+
+def test_the_model_of_the_readme_is_short():
+    first = BLOCK.search(PAGES[0].read_text(encoding="utf-8"))[1]
+    assert len([line for line in first.splitlines() if line.strip()]) <= 18
+
+
+def test_the_readme_names_all_there_is():
+    text = PAGES[0].read_text(encoding="utf-8")
+    public = [*hybrid.__all__, "lyapunov_spectrum", "two_orbit_exponents", "floquet_exponents"]
+    public += [name for name in vars(models) if callable(getattr(models, name))]
+    public += [code.name for code in hybrid.StatusCode]
+    missing = [name for name in public if f"`{name}`" not in text and f"{name}`" not in text]
+    results = {"HybridArc", "Jump", "PeriodicOrbit", "Section"}
+    assert not set(missing) - results, missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
