@@ -100,22 +100,25 @@ def stroboscopic_section(
             "A stroboscopic section needs a forcing period, and the system declares none. "
             "Give HybridSystem a period=, or use poincare_section."
         )
-    chunks, code = [], codes.DONE
-    left = transient + periods
-    with progress_bar(left, "Section", progress, "period") as bar:
-        while left > 0 and code == codes.DONE:
-            states, places, code = _strobe(trajectory, min(left, POINTS_AT_ONCE))
-            chunks.append((states, places))
-            left -= POINTS_AT_ONCE
-            bar.update(len(states))
-    states, places = (np.concatenate(parts)[transient:] for parts in zip(*chunks, strict=True))
-    before = np.concatenate([part for _, part in chunks])[:transient, 2]
+    chunks = [(np.empty((0, system.dimension)), np.empty((0, 3), dtype=np.int64))]
+    code, before = codes.DONE, 0
+    with progress_bar(transient + periods, "Section", progress, "period") as bar:
+        for kept, left in ((False, transient), (True, periods)):
+            while left > 0 and code == codes.DONE:
+                states, places, code = _strobe(trajectory, min(left, POINTS_AT_ONCE))
+                if kept:
+                    chunks.append((states, places))
+                elif len(places):
+                    before = places[-1, 2]
+                left -= len(states)
+                bar.update(len(states))
+    states, places = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
     cycle, index, count = places.T
     return Section(
         t=cycle * trajectory.model.period + trajectory.phase0,
         x=states,
         mode=np.array(system.mode_names)[index],
-        jumps=np.diff(count, prepend=before[-1] if len(before) else 0),
+        jumps=np.diff(count, prepend=before),
         status=trajectory.status(code),
     )
 
@@ -191,40 +194,45 @@ def poincare_section(
         raise ArgumentError(
             f"section must be a Guard; got {section!r}. Write Guard(function, direction=...)."
         )
-    marked, first = with_section(system, section)
+    marked = with_section(system, section)
     trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
     with progress_bar(transient + points, "Section", progress, "point") as bar:
-        return _collect(trajectory, first, transient, points, bar)
+        return _collect(trajectory, len(system.modes), transient, points, bar)
 
 
-def with_section(system: HybridSystem, section: Guard) -> tuple[HybridSystem, int]:
-    """The system with a marker transition in every mode, and the index of the first of them."""
+def with_section(system: HybridSystem, section: Guard) -> HybridSystem:
+    """The system with a marker transition in every mode, in the order of the modes.
+
+    They come first: where an event lies on the section, the point before it counts.
+    """
     markers = [Transition(name, name, section, name=f"{MARKER} in {name}") for name in system.mode_names]
-    return attrs.evolve(system, transitions=(*system.transitions, *markers)), len(system.transitions)
+    return attrs.evolve(system, transitions=(*markers, *system.transitions))
 
 
-def _collect(trajectory: Trajectory, first: int, transient: int, points: int, bar: Any) -> Section:
+def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, bar: Any) -> Section:
     model = trajectory.model
     record = empty_record(model.dimension, 0, 0, POINTS_AT_ONCE)
     rows: list[tuple[np.ndarray, ...]] = []
-    found, jumps, status = 0, 0, None
+    found, jumps, steps_at_point, status = 0, 0, 0, None
     while found < transient + points:
-        limit = min(trajectory.max_steps, int(trajectory.run.count[codes.STEPS]) + STEPS_BETWEEN_POINTS)
+        limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
         code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
         used = record.used[1]
         cycle, transition = record.jump_place[:used].T
-        marked = transition >= first
+        marked = transition < markers
         counts = jumps + np.cumsum(~marked)
         rows.append(
             (
                 (cycle * model.period + record.jump_time[:used, 0])[marked],
                 record.jump_states[:used, 0][marked],
-                transition[marked] - first,
+                transition[marked],
                 counts[marked],
             )
         )
         jumps = int(counts[-1]) if used else jumps
         found += int(marked.sum())
+        if marked.any():
+            steps_at_point = int(trajectory.run.count[codes.STEPS])
         bar.update(int(marked.sum()))
         record.used[:] = 0
         if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):

@@ -32,10 +32,10 @@ def value_and_slope(coefficients, degree, theta, scratch):
 def simple_root(coefficients, degree, sign_left, scratch):
     """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
     low, high = 0.0, 1.0
-    theta = 0.5
-    ends = coefficients[0] - coefficients[degree]
-    if ends != 0.0:
-        theta = min(max(coefficients[0] / ends, 0.0), 1.0)
+    # The secant's root, unless an end is a root too: that one is not in the open interval.
+    theta = coefficients[0] / (coefficients[0] - coefficients[degree])
+    if not (low < theta < high):
+        theta = 0.5
     for _ in range(100):
         value, slope = value_and_slope(coefficients, degree, theta, scratch)
         if value == 0.0:
@@ -58,7 +58,7 @@ def first_crossing(coefficients, degree, side, direction, stack):
     """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
 
     ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
-    that differs at once is a crossing at 0; ``stack (depth, >= degree + 3)``, its last row scratch.
+    that differs at once is a crossing at 0, or 0 if there was none; ``stack (depth, >= degree + 3)``, its last row scratch.
     Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero at 1 exactly counts
     as crossed if the slope there leads across.
     """
@@ -83,6 +83,8 @@ def first_crossing(coefficients, degree, side, direction, stack):
         if first == 0:
             top -= 1
             continue
+        if side == 0:
+            side = first
         if first != side:
             side = first
             if direction == 0 or direction == first:

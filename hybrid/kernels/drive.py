@@ -32,7 +32,14 @@ from hybrid.kernels.codes import (
     STEPS,
     STUCK,
 )
-from hybrid.kernels.guards import earliest_crossing, guard_speed, guard_value, land, rounding_band
+from hybrid.kernels.guards import (
+    earliest_crossing,
+    guard_speed,
+    guard_value,
+    land,
+    rounding_band,
+    widen_scale,
+)
 from hybrid.kernels.jump import enter, jump
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
 from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rates, starting_step
@@ -40,6 +47,9 @@ from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rate
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 6.0
+# An event resets the pace: a flight that is a polynomial has no error to hold its steps back, and one step
+# across many bounces, each much shorter than it, would drown them in its rounding.
+LONGEST_AFTER_EVENT = 100.0
 EPSILON = 2.220446049250313e-16
 # More jumps than this at one instant are not going to end.
 MOST_JUMPS_AT_ONCE = 100
@@ -50,6 +60,7 @@ def arrived(model, run, work):
     """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run."""
     mode, t = run.count[MODE], run.clock[PHASE]
     model.flow(mode, t, run.y, model.parameters, work.field)
+    widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
@@ -89,8 +100,13 @@ def remember_step(model, method, run, record, t, h, work):
 def accept(model, method, run, tangents, h, correction, work):
     """Move the run to the end of the attempted step in ``work.new``."""
     n = model.dimension
+    mode = run.count[MODE]
+    on_guard = 0
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        on_guard += run.on_guard[model.outgoing[slot]]
     for i in range(n):
-        run.scale[i] = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
+        before = run.scale[i] if on_guard > 0 else 0.0
+        run.scale[i] = max(before, abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
     for i in range(n * (1 + tangents)):
         run.y[i] = work.new[i]
     if tangents > 0:
@@ -99,9 +115,6 @@ def accept(model, method, run, tangents, h, correction, work):
         for j in range(s):
             total += method.b[j] * work.stages[j, place]
         run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
-    mode = run.count[MODE]
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        run.on_guard[model.outgoing[slot]] = 0
     phase = run.clock[PHASE] + (h + correction)
     if model.period > 0.0:
         while phase >= model.period:
@@ -227,15 +240,17 @@ def advance(
         correction = 0.0
         if fired != NO_TRANSITION:
             h, correction = land(model, method, fired, mode, t, h, theta, run.y, tangents, work)
+            run.clock[NEXT_STEP] = min(run.clock[NEXT_STEP], LONGEST_AFTER_EVENT * h)
         elif run.first_step[mode] <= 0.0:
             run.first_step[mode] = h
         if recording:
             remember_step(model, method, run, record, t, h, work)
         accept(model, method, run, tangents, h, correction, work)
+        left = (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - run.clock[PHASE])
+        if last and (fired == NO_TRANSITION or left < 0.0):
+            run.count[CYCLE] = stop_cycle
+            run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
             run.count[PENDING] = fired
         else:
-            if last:
-                run.count[CYCLE] = stop_cycle
-                run.clock[PHASE] = stop_phase
             carry_rates(method, length, work)

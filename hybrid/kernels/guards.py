@@ -9,9 +9,14 @@ from hybrid.kernels.codes import MODE, NO_TRANSITION
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
 from hybrid.kernels.step import attempt
 
-# A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size;
-# its root is only a first guess for the landing.
-FIT_TOLERANCE = 1e-9
+# A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
+# crossings that reach no farther beyond zero than the misfit are lost.
+FIT_TOLERANCE = 1e-12
+# A guard that has just been met is followed off zero only where it rises this far above rounding: closer in,
+# the shape of its fit is noise.
+CLEAR_OF_ROUNDING = 64.0
+# Instead of a place on [0, 1]: the step is too short to leave the guard it started on.
+STILL_ON_GUARD = 3.0
 # Guards with a kink on the step are cut around it down to this share of the step.
 SHORTEST_CUT = 1e-12
 # A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
@@ -40,6 +45,30 @@ def guard_speed(model, transition, t, x, field, gradient):
     for i in range(model.dimension):
         speed += gradient[i] * field[i]
     return speed
+
+
+@njit(float64(MODEL, RUN, float64, VECTOR), **KERNEL)
+def rounding_band(model, run, t, gradient):
+    """How far from zero rounding alone can leave a guard whose state has the sizes in ``run.scale``."""
+    n = model.dimension
+    size = abs(gradient[n] * t)
+    for i in range(n):
+        size += abs(gradient[i]) * run.scale[i]
+    return 16 * 2.220446049250313e-16 * size
+
+
+@njit(void(MODEL, RUN, WORK), **KERNEL)
+def widen_scale(model, run, work):
+    """Judge rounding at the start and the end of a run alike, whatever steps lead there.
+
+    Each component is taken to be at least as large as it becomes while the state changes by its own size;
+    ``work.field`` is current. A run that ends on a guard and the run that starts there then agree on that.
+    """
+    size, pace = 0.0, 0.0
+    for i in range(model.dimension):
+        size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
+    for i in range(model.dimension if pace > 0.0 else 0):
+        run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
 
 
 @njit(int64(MODEL, METHOD, int64, float64, float64, VECTOR, float64, WORK), **INLINE)
@@ -106,26 +135,36 @@ def fit_polynomial(model, transition, t, h, start, end, offset, work):
     return misfit
 
 
-@njit(types.Tuple((float64, int64))(MODEL, int64, float64, float64, float64, int64, int64, WORK), **KERNEL)
-def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
+@njit(
+    types.Tuple((float64, int64))(MODEL, int64, float64, float64, float64, float64, int64, int64, WORK),
+    **KERNEL,
+)
+def composed_crossing(model, transition, t, h, offset, band, on_guard, side, work):
     """First crossing of a guard that is not affine, by polynomials fitted piecewise along the interpolant.
 
     Only where a fit neither excludes a zero nor follows the guard is the interval cut, so a kink away from
-    zero costs nothing. Returns the place on [0, 1] (or ``NO_ROOT``) and the side after it.
+    zero costs nothing; ``band`` is the rounding of the guard, below which no fit can follow it. Returns the
+    place on [0, 1] (or ``NO_ROOT``, or ``STILL_ON_GUARD``) and the side after it.
     """
     direction = model.direction[transition]
+    values = work.stack[work.stack.shape[0] - 1]
     top = 0
     work.intervals[0, 0], work.intervals[0, 1] = 0.0, 1.0
     while top >= 0:
         start, end = work.intervals[top, 0], work.intervals[top, 1]
         misfit = fit_polynomial(model, transition, t, h, start, end, offset, work)
         degree = work.nodes.shape[0] - 1
-        largest, smallest = 0.0, math.inf
+        largest, smallest, farthest = 0.0, math.inf, 0.0
         for i in range(degree + 1):
+            farthest = max(farthest, abs(values[i]))
             largest = max(largest, abs(work.polynomial[i]))
             smallest = min(smallest, abs(work.polynomial[i]))
+        if on_guard > 0 and start == 0.0 and end == 1.0 and farthest <= CLEAR_OF_ROUNDING * band:
+            return STILL_ON_GUARD, side
         short = end - start <= SHORTEST_CUT
-        if misfit > FIT_TOLERANCE * largest and misfit >= smallest and not short:
+        same_sign = stays(work.polynomial, degree, 1) or stays(work.polynomial, degree, -1)
+        excluded = same_sign and smallest > misfit
+        if misfit > max(FIT_TOLERANCE * largest, 8.0 * band) and not excluded and not short:
             middle = 0.5 * (start + end)
             work.intervals[top, 0] = middle
             top += 1
@@ -146,8 +185,9 @@ def composed_crossing(model, transition, t, h, offset, on_guard, side, work):
 def earliest_crossing(model, method, run, t, h, work):
     """Earliest crossing on the attempted step over all guards of the mode, and its transition.
 
-    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of the guards are brought up
-    to date. ``work.coefficients`` must hold the interpolant if any guard of the mode is not affine.
+    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of guards without a crossing
+    are brought up to date, to the end of the step, and guards that were left are no longer held to be zero at
+    its start. ``work.coefficients`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode = run.count[MODE]
     earliest, fired = NO_ROOT, NO_TRANSITION
@@ -159,6 +199,13 @@ def earliest_crossing(model, method, run, t, h, work):
         if model.affine_guard[transition] == 1:
             start = 0.0 if on_guard > 0 else value
             degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
+            if on_guard > 0:
+                band, farthest = rounding_band(model, run, t, work.gradient), 0.0
+                for i in range(degree + 1):
+                    farthest = max(farthest, abs(work.polynomial[i]))
+                if farthest <= band:
+                    continue
+                run.on_guard[transition] = 0
             for _ in range(on_guard):
                 degree = divide_by_theta(work.polynomial, degree)
             if stays(work.polynomial, degree, side):
@@ -168,9 +215,15 @@ def earliest_crossing(model, method, run, t, h, work):
             )
         else:
             offset = value if on_guard > 0 else 0.0
-            theta, side = composed_crossing(model, transition, t, h, offset, on_guard, side, work)
-        run.side[transition] = side
-        if theta < earliest:
+            model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+            band = rounding_band(model, run, t, work.gradient)
+            theta, side = composed_crossing(model, transition, t, h, offset, band, on_guard, side, work)
+            if theta == STILL_ON_GUARD:
+                continue
+            run.on_guard[transition] = 0
+        if theta == NO_ROOT:
+            run.side[transition] = side
+        elif theta < earliest:
             earliest, fired = theta, transition
     return earliest, fired
 
@@ -204,16 +257,6 @@ def land(model, method, transition, mode, t, h, theta, y, tangents, work):
             break
         length = corrected
     return length, 0.0
-
-
-@njit(float64(MODEL, RUN, float64, VECTOR), **KERNEL)
-def rounding_band(model, run, t, gradient):
-    """How far from zero rounding alone can leave a guard whose state has the sizes in ``run.scale``."""
-    n = model.dimension
-    size = abs(gradient[n] * t)
-    for i in range(n):
-        size += abs(gradient[i]) * run.scale[i]
-    return 16 * 2.220446049250313e-16 * size
 
 
 @njit(float64(MODEL, int64, int64, float64, VECTOR, WORK), **KERNEL)

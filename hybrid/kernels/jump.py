@@ -20,10 +20,31 @@ from hybrid.kernels.codes import (
     PHASE_OF_RUN,
     PREVIOUS_MODE,
     SINGULAR_JUMPS,
+    STEPS,
 )
-from hybrid.kernels.guards import guard_acceleration, guard_speed, guard_value, rounding_band
+from hybrid.kernels.guards import guard_acceleration, guard_speed, guard_value, rounding_band, widen_scale
 from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
+
+
+@njit(void(MODEL, RUN, WORK), **KERNEL)
+def sides_at_jump(model, run, work):
+    """Bring the sides of the guards of the mode, known at the ends of a step only, to the point of the jump.
+
+    A guard on which the jump happens has not been crossed yet: it keeps the side it had before. A guard that
+    fires both ways is followed no further than that: its side is 0 away from the guard.
+    """
+    mode, t = run.count[MODE], run.clock[PHASE]
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        direction = model.direction[transition]
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        beyond = value * direction > 0.0
+        if abs(value) > rounding_band(model, run, t, work.gradient):
+            run.side[transition] = direction if beyond else -direction
+        elif direction != 0:
+            run.side[transition] = -direction
 
 
 @njit(types.Tuple((int64, boolean))(MODEL, RUN, WORK), **ENTRY)
@@ -33,13 +54,16 @@ def enter(model, run, work):
     The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, and from its
     acceleration where the speed vanishes too. A guard that the state has come to lie on or beyond fires at
     once, except the transition that has just fired: if the state moves on through its guard the crossing is
-    done, and if it rests there the second value is true: the transition would fire for ever.
+    done, and if it rests there the second value is true: the transition would fire for ever. A guard that
+    fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     n = model.dimension
     landed = run.count[JUMPS] > 0
     fires, stuck = NO_TRANSITION, False
     model.flow(mode, t, run.y, model.parameters, work.field)
+    if run.count[STEPS] == 0:
+        widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
@@ -57,17 +81,18 @@ def enter(model, run, work):
                 resting = True
                 trend = guard_acceleration(model, transition, mode, t, run.y, work)
         direction = model.direction[transition]
-        was_beyond = run.count[PREVIOUS_MODE] == mode and run.side[transition] == direction
+        before = run.side[transition] if run.count[PREVIOUS_MODE] == mode else 0
         side = 1 if trend > 0.0 else (-1 if trend < 0.0 else -direction)
         run.side[transition] = side
         run.on_guard[transition] = (2 if resting else 1) if on_guard else 0
-        if direction == 0 or side != direction or model.marker[transition] == 1:
+        inbound = side == direction or (direction == 0 and on_guard and side * before < 0)
+        if not inbound or model.marker[transition] == 1:
             continue
         if landed and transition == run.count[LAST_FIRED]:
             stuck = stuck or (on_guard and resting)
         elif (
             fires == NO_TRANSITION
-            and not was_beyond
+            and before != side
             and (on_guard or landed or model.boundary[transition] == 1)
         ):
             fires = transition
@@ -111,6 +136,7 @@ def jump(model, run, record, transition, tangents, orthonormal, work):
     t, y = run.clock[PHASE], run.y
     x_plus = work.new
     transversality = saltation(model, transition, run.count[MODE], t, y, x_plus, work)
+    sides_at_jump(model, run, work)
     slot = record.used[1]
     if slot < record.jump_time.shape[0]:
         record.jump_time[slot, 0] = t
