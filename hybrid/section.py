@@ -213,9 +213,9 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
     model = trajectory.model
     record = empty_record(model.dimension, 0, 0, POINTS_AT_ONCE)
     rows: list[tuple[np.ndarray, ...]] = []
-    found, jumps, status = 0, 0, None
+    found, jumps, steps_at_point, status = 0, 0, 0, None
     while found < transient + points:
-        limit = min(trajectory.max_steps, int(trajectory.run.count[codes.STEPS]) + STEPS_BETWEEN_POINTS)
+        limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
         code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
         used = record.used[1]
         cycle, transition, _ = record.jump_place[:used].T
@@ -231,6 +231,8 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
         )
         jumps = int(counts[-1]) if used else jumps
         found += int(marked.sum())
+        if marked.any():
+            steps_at_point = int(trajectory.run.count[codes.STEPS])
         bar.update(int(marked.sum()))
         record.used[:] = 0
         if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):

@@ -60,6 +60,9 @@ from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rate
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 6.0
+# An event resets the pace: a flight that is a polynomial has no error to hold its steps back, and one step
+# across many bounces, each much shorter than it, would drown them in its rounding.
+LONGEST_AFTER_EVENT = 100.0
 EPSILON = 2.220446049250313e-16
 # More jumps than this at one instant are not going to end.
 MOST_JUMPS_AT_ONCE = 100
@@ -336,6 +339,8 @@ def advance(
         fired, correction = NO_TRANSITION, 0.0
         if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
             h, correction, fired = find_event(model, method, run, record, tangents, h, work)
+        if fired != NO_TRANSITION:
+            run.clock[NEXT_STEP] = min(run.clock[NEXT_STEP], LONGEST_AFTER_EVENT * h)
         if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:
             run.first_step[mode] = h
         if recording and h > 0.0:

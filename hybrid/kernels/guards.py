@@ -9,8 +9,8 @@ from hybrid.kernels.codes import GRAZING_GUARD, GRAZING_PLACE, GRAZING_VALUE, MO
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
 from hybrid.kernels.step import attempt
 
-# A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size;
-# its root is only a first guess for the landing.
+# A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
+# crossings that reach no farther beyond zero than the misfit are lost.
 FIT_TOLERANCE = 1e-12
 # A guard that has just been met is followed off zero only where it rises this far above rounding: closer in,
 # the shape of its fit is noise.

@@ -91,7 +91,6 @@ def enter(model, run, work):
     fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
-    n = model.dimension
     landed = run.count[JUMPS] > 0
     fires, stuck = NO_TRANSITION, False
     model.flow(mode, t, run.y, model.parameters, work.field)

@@ -337,11 +337,11 @@ class TestCrossings:
     def test_landing_at_the_very_end_of_a_step(self):
         """Crossings anywhere near the joint of two coarse steps fire once each."""
         for solver in (hybrid.Tsit5(rtol=1.0, atol=1.0, max_step=1.0), hybrid.DOP853(rtol=1.0, max_step=2.5)):
-            free = simulate(PENDULUM, (-1.5, 0.0), (0.0, 3.0), mode="left",
+            free = simulate(PENDULUM, (-1.5, 0.0), (0.0, 3.6), mode="left",
                             parameters={"c": 50.0}, solver=solver)  # fmt: skip
-            joint = free.x[np.searchsorted(free.x[:, 0], -1.3), 0]
+            joint = free.x[np.searchsorted(free.t, 3.0) - 1, 0]
             for shift in [0.0, *(s * 10.0**e for e in range(-16, -2, 2) for s in (1, -1))]:
-                arc = simulate(PENDULUM, (-1.5, 0.0), (0.0, 3.0), mode="left",
+                arc = simulate(PENDULUM, (-1.5, 0.0), (0.0, 3.6), mode="left",
                                parameters={"c": joint + shift}, solver=solver)  # fmt: skip
                 assert len(arc.jumps) == 1
                 assert arc.jumps[0].x_minus[0] == pytest.approx(joint + shift, abs=1e-12)
@@ -443,6 +443,12 @@ class TestEnds:
         assert "bounce" in arc.status.message
         assert "Add a mode for the limit" in arc.status.remedy
         assert arc.t[-1] == pytest.approx(BALL["accumulation"], abs=1e-7)
+
+    @pytest.mark.parametrize("end", [5.0, 1e3, 1e6, 1e9, 1e12])
+    def test_accumulation_is_found_however_far_the_end(self, ball, end):
+        arc = simulate(ball, (1.0, 0.0), (0.0, end))
+        assert arc.status.code == StatusCode.ACCUMULATION
+        assert arc.t[-1] == pytest.approx(BALL["accumulation"], abs=1e-9)
 
     @pytest.mark.parametrize("direction", [-1, 0])
     def test_an_inelastic_ball_comes_to_rest_at_once(self, ball, direction):

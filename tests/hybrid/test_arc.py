@@ -1,0 +1,194 @@
+"""What an arc holds: both sides of jumps, dense output, samples, the sequence of jumps."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import hybrid
+from hybrid import simulate
+from models import bouncing_ball, impact_oscillator
+
+TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
+BALL, OSCILLATOR = bouncing_ball(), impact_oscillator()
+
+
+def ball_exact(t):
+    """From rest at 1: state after the jump, if there is one at ``t``."""
+    g, e, start = 9.81, 0.8, -math.sqrt(2 / 9.81)
+    v = math.sqrt(2 * g)
+    while t - start >= 2 * v / g:
+        start += 2 * v / g
+        v *= e
+    s = t - start
+    return np.array([v * s - g * s**2 / 2, v - g * s])
+
+
+@pytest.fixture(scope="module")
+def arc():
+    return simulate(BALL, (1.0, 0.0), (0.0, 3.0), solver=TIGHT)
+
+
+@pytest.fixture(scope="module")
+def ride():
+    return simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), solver=TIGHT)
+
+
+class TestPoints:
+    def test_hybrid_time_is_ordered(self, arc, ride):
+        for run in (arc, ride):
+            assert np.all(np.diff(run.t) >= 0)
+            assert np.all(np.isin(np.diff(run.j), (0, 1)))
+            assert np.all(np.diff(run.t)[np.diff(run.j) == 1] == 0)
+
+    def test_ends(self, arc):
+        assert (arc.t[0], arc.t[-1]) == (0.0, 3.0)
+        np.testing.assert_array_equal(arc.x[0], [1.0, 0.0])
+        np.testing.assert_allclose(arc.x[-1], ball_exact(3.0), atol=1e-12)
+
+    def test_both_sides_of_a_jump_are_points(self, arc):
+        for jump in arc.jumps:
+            before = np.flatnonzero((arc.t == jump.t) & (arc.j == jump.j))
+            after = np.flatnonzero((arc.t == jump.t) & (arc.j == jump.j + 1))
+            np.testing.assert_array_equal(arc.x[before[-1]], jump.x_minus)
+            np.testing.assert_allclose(arc.x[after[0]], jump.x_plus, atol=1e-15)
+
+    def test_shapes(self, arc):
+        n = len(arc.t)
+        assert arc.j.shape == arc.mode.shape == (n,)
+        assert arc.x.shape == (n, 2)
+        assert set(arc.mode) == {"flight"}
+
+    def test_repr(self, arc):
+        assert repr(arc) == "<HybridArc t = 0 to 3, 6 jumps, SUCCESS>"
+        assert repr(arc.jumps) == "<6 jumps>"
+        assert repr(simulate(BALL, (1.0, 0.0), (0.0, 1.0), samples=[])) == (
+            "<HybridArc no points, 1 jumps, SUCCESS>"
+        )
+
+
+class TestDense:
+    @given(st.floats(0.0, 3.0))
+    def test_against_the_exact_answer(self, t):
+        arc = simulate(BALL, (1.0, 0.0), (0.0, 3.0), solver=TIGHT)
+        if np.abs(arc.jumps.t - t).min() > 1e-12:
+            np.testing.assert_allclose(arc(t), ball_exact(t), atol=1e-11)
+
+    def test_of_a_curved_flight(self, ride):
+        t = np.linspace(0.0, 60.0, 777)
+        sampled = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), solver=TIGHT, samples=t)
+        np.testing.assert_allclose(ride(t), sampled.x, atol=1e-14)
+        for k in (100, 400, 776):
+            direct = simulate(OSCILLATOR, (0.0, 0.0), (0.0, t[k]), solver=TIGHT)
+            np.testing.assert_allclose(ride(t[k]), direct.x[-1], atol=1e-10)
+
+    def test_at_a_jump_it_is_the_state_after(self, arc, ride):
+        for run in (arc, ride):
+            for jump in run.jumps:
+                np.testing.assert_allclose(run(jump.t), jump.x_plus, atol=1e-15)
+                before = np.nextafter(jump.t, 0)
+                np.testing.assert_allclose(run(before), jump.x_minus, atol=1e-11)
+
+    def test_shapes(self, arc):
+        assert arc(0.3).shape == (2,)
+        assert arc([0.3]).shape == (1, 2)
+        assert arc(np.zeros((3, 4))).shape == (3, 4, 2)
+        assert arc([]).shape == (0, 2)
+
+    def test_at_the_ends(self, arc):
+        np.testing.assert_array_equal(arc(0.0), [1.0, 0.0])
+        np.testing.assert_allclose(arc(3.0), arc.x[-1], atol=1e-14)
+
+    @pytest.mark.parametrize("t", [-1e-9, 3.1, math.nan, [0.0, 4.0]])
+    def test_outside_the_run(self, arc, t):
+        with pytest.raises(hybrid.ArgumentError, match=r"t must lie in the run, \[0.0, 3.0\]; got"):
+            arc(t)
+
+    def test_of_a_run_that_ends_at_a_jump(self):
+        whole = simulate(BALL, (1.0, 0.0), (0.0, 3.0), solver=TIGHT)
+        t = whole.jumps[1].t
+        arc = simulate(BALL, (1.0, 0.0), (0.0, t), solver=TIGHT)
+        assert len(arc.jumps) == 2
+        np.testing.assert_allclose(arc(t), whole.jumps[1].x_plus, atol=1e-12)
+
+    def test_of_a_run_that_jumps_at_its_start(self):
+        arc = simulate(BALL, (0.0, -4.0), (0.0, 0.1), mode="flight")
+        np.testing.assert_allclose(arc(0.0), [0.0, 3.2])
+        np.testing.assert_array_equal(arc.x[0], [0.0, -4.0])
+
+
+class TestSamples:
+    def test_nothing_else_is_kept(self):
+        arc = simulate(BALL, (1.0, 0.0), (0.0, 3.0), samples=[0.1, 0.5, 2.0], solver=TIGHT)
+        np.testing.assert_array_equal(arc.t, [0.1, 0.5, 2.0])
+        np.testing.assert_array_equal(arc.j, [0, 1, 3])
+        np.testing.assert_allclose(arc.x, [ball_exact(t) for t in arc.t], atol=1e-12)
+        assert len(arc.jumps) == 6
+        with pytest.raises(hybrid.ArgumentError, match="keeps samples only. Run simulate without samples="):
+            arc(0.5)
+
+    def test_none(self):
+        arc = simulate(BALL, (1.0, 0.0), (0.0, 3.0), samples=[])
+        assert arc.x.shape == (0, 2)
+        assert len(arc.jumps) == 6
+
+    def test_at_the_ends_and_twice(self):
+        arc = simulate(BALL, (1.0, 0.0), (0.0, 3.0), samples=[0.0, 0.0, 3.0, 3.0], solver=TIGHT)
+        np.testing.assert_allclose(arc.x, [ball_exact(t) for t in arc.t], atol=1e-12)
+
+    def test_exactly_at_events(self, ride):
+        times = ride.jumps.t
+        arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), samples=times, solver=TIGHT)
+        np.testing.assert_allclose(arc.x, ride.jumps.x_plus, atol=1e-14)
+        np.testing.assert_array_equal(arc.j, np.arange(1, len(times) + 1))
+        np.testing.assert_array_equal(arc.jumps.t, times)
+
+    def test_at_an_event_that_ends_the_run(self, ride):
+        for jump in ride.jumps[:4]:
+            arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, jump.t), samples=[jump.t], solver=TIGHT)
+            np.testing.assert_allclose(arc.x[-1], jump.x_plus, atol=1e-12)
+            assert arc.j[-1] == jump.j + 1
+
+    def test_do_not_change_the_run(self, ride):
+        arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), samples=np.linspace(0, 60, 999), solver=TIGHT)
+        np.testing.assert_array_equal(arc.jumps.t, ride.jumps.t)
+        assert arc.steps == ride.steps
+
+    def test_beyond_an_early_end_are_left_out(self):
+        arc = simulate(BALL, (1.0, 0.0), (0.0, 9.0), samples=[1.0, 8.0])
+        assert not arc.status.ok
+        np.testing.assert_array_equal(arc.t, [1.0])
+
+    def test_of_a_zero_length_run(self):
+        arc = simulate(BALL, (1.0, 0.0), (2.0, 2.0), samples=[2.0])
+        np.testing.assert_array_equal(arc.x, [[1.0, 0.0]])
+
+    def test_across_the_record_s_capacity(self):
+        """More steps and jumps than are kept between two visits of Python."""
+        t = np.linspace(0.0, 900.0, 5001)
+        fine = hybrid.DOP853(rtol=1e-13, atol=1e-14, max_step=0.05)
+        sampled = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 900.0), samples=t, solver=fine)
+        whole = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 900.0), solver=fine)
+        assert whole.steps > 2 * 2048
+        np.testing.assert_allclose(sampled.x, whole(t), atol=1e-12)
+        assert np.all(np.diff(whole.t) >= 0)
+
+
+class TestJumps:
+    def test_is_a_sequence(self, arc):
+        assert len(arc.jumps) == len(list(arc.jumps)) == 6
+        assert arc.jumps[-1].t == arc.jumps[5].t == arc.jumps.t[-1]
+        assert [jump.j for jump in arc.jumps[1:3]] == [1, 2]
+        with pytest.raises(IndexError, match="jump 6 of an arc with 6 jumps"):
+            arc.jumps[6]
+        with pytest.raises(IndexError):
+            arc.jumps[-7]
+
+    def test_fields(self, arc):
+        jump = arc.jumps[0]
+        assert (jump.transition, jump.source, jump.target) == ("bounce", "flight", "flight")
+        assert jump.transversality == jump.x_minus[1] < 0
+        assert jump.saltation.shape == (2, 2)
+        assert type(jump.t) is float

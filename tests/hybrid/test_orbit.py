@@ -1,0 +1,147 @@
+"""Periodic orbits, stable and unstable, against closed forms; and what is said where there is none."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid import HybridSystem, Mode, StatusCode, periodic_orbit, simulate
+from models import bouncing_ball, impact_oscillator, vibroimpact
+from models.impact_oscillator import one_impact_orbits
+from tests.cases import systems
+from tests.reference.load import complex_pairs, reference
+
+OSCILLATOR = impact_oscillator()
+
+
+def in_order(multipliers):
+    return sorted(map(complex, multipliers), key=lambda m: (round(m.real, 7), m.imag))
+
+
+class TestForced:
+    def test_founding_system(self):
+        exact = reference("founding_system")["D=0.05"]
+        orbit = periodic_orbit(vibroimpact(), np.array(exact["x0"]) * 1.001, mode="free")
+        assert orbit.status.ok
+        np.testing.assert_allclose(orbit.x0, exact["x0"], atol=1e-8)
+        np.testing.assert_allclose(in_order(orbit.multipliers), complex_pairs(exact["multipliers"]), atol=1e-6)
+        assert orbit.signature == ("free", "contact", "free")
+        assert orbit.residual < 1e-10
+
+    @pytest.mark.parametrize("t0", [0.0, 0.3, 2.0, -1.0, 50.0])
+    def test_from_any_phase(self, t0):
+        exact = complex_pairs(reference("impact_oscillator")["orbits"][0]["multipliers"])
+        guess = simulate(OSCILLATOR, (0.0, 0.0), (t0 - 60.0, t0)).x[-1]
+        orbit = periodic_orbit(OSCILLATOR, guess, t0=t0)
+        assert orbit.status.ok
+        np.testing.assert_allclose(in_order(orbit.multipliers), exact, atol=1e-8)
+        assert orbit.period == 2 * math.pi
+        assert orbit.t0 == t0
+
+    def test_unstable_orbit(self):
+        """The one-impact orbit beyond its flip, found though no run ever stays near it."""
+        parameters = {"k": 1.0, "c": 0.1, "A": 1.0, "w": 2.8, "d": 0.0, "r": 0.8}
+        (closed,) = one_impact_orbits(**parameters, n=1)
+        assert abs(closed.multipliers).max() > 1.05
+        impact = closed.theta / 2.8
+        t0 = impact + 0.5
+        start = simulate(OSCILLATOR, (0.0, -0.8 * closed.V), (impact, t0), parameters=parameters).x[-1]
+        orbit = periodic_orbit(OSCILLATOR, start + [1e-3, -1e-3], t0=t0, parameters=parameters)
+        assert orbit.status.ok
+        np.testing.assert_allclose(orbit.x0, start, atol=1e-8)
+        np.testing.assert_allclose(in_order(orbit.multipliers), in_order(closed.multipliers), atol=1e-8)
+
+    def test_several_periods_square_the_multipliers(self):
+        once = periodic_orbit(OSCILLATOR, (0.9, 1.0))
+        twice = periodic_orbit(OSCILLATOR, once.x0, periods=2)
+        np.testing.assert_allclose(in_order(twice.multipliers), in_order(once.multipliers**2), atol=1e-9)
+        assert twice.signature == ("flight",) * 3
+
+    def test_arc_closes(self):
+        orbit = periodic_orbit(OSCILLATOR, (0.9, 1.0), t0=0.4)
+        arc = orbit.arc()
+        assert (arc.t[0], arc.t[-1]) == (0.4, 0.4 + orbit.period)
+        np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-8)
+
+
+class TestAutonomous:
+    def test_rimless_wheel_from_the_state_after_a_step(self):
+        exact = reference("rimless_wheel")
+        guess = (exact["theta"], exact["omega"] + 0.02)
+        orbit = periodic_orbit(systems.rimless_wheel(), guess, period=1.0)
+        assert orbit.status.ok
+        assert orbit.period == pytest.approx(exact["period"], rel=1e-9)
+        np.testing.assert_allclose(in_order(orbit.multipliers), sorted(exact["multipliers"]), atol=1e-7)
+        np.testing.assert_allclose(orbit.x0, [exact["theta"], exact["omega"]], atol=1e-7)
+
+    def test_stick_slip(self):
+        exact = reference("stick_slip")
+        orbit = periodic_orbit(systems.stick_slip(), (0.5, 0.2), mode="stick", period=11.0)
+        assert orbit.status.ok
+        assert orbit.period == pytest.approx(exact["period"], rel=1e-9)
+        np.testing.assert_allclose(in_order(orbit.multipliers), [0.0, 1.0], atol=1e-8)
+        assert set(orbit.signature) == {"stick", "slip"}
+
+    @pytest.mark.parametrize("converter", reference("buck_converter"), ids=lambda c: f"{c['E']:g} V")
+    def test_buck_converter(self, converter):
+        """Unstable at 25 V. The start is the clock's own event, with the ramp just begun."""
+        parameters = {"E": converter["E"]}
+        orbit = periodic_orbit(
+            systems.buck_converter(), (*converter["x0"], 0.0), mode="off", parameters=parameters, period=4e-4
+        )
+        assert orbit.status.ok
+        expected = in_order([*complex_pairs(converter["multipliers"]), 1.0])
+        np.testing.assert_allclose(in_order(orbit.multipliers), expected, atol=1e-6)
+
+    def test_a_smooth_limit_cycle(self):
+        """``r' = r (1 - r^2)``: multipliers 1 and ``exp(-4 pi)``."""
+
+        def field(t, x, p):
+            r2 = x.x**2 + x.y**2
+            return x.x * (1 - r2) - x.y, x.y * (1 - r2) + x.x
+
+        system = HybridSystem(state=("x", "y"), modes=[Mode("turn", field)])
+        orbit = periodic_orbit(system, (1.2, 0.1), period=6.0)
+        assert orbit.status.ok
+        assert orbit.period == pytest.approx(2 * math.pi, rel=1e-9)
+        np.testing.assert_allclose(in_order(orbit.multipliers), [math.exp(-4 * math.pi), 1.0], atol=1e-9)
+        assert np.hypot(*orbit.x0) == pytest.approx(1.0, rel=1e-9)
+        assert orbit.signature == ("turn",)
+
+
+class TestNoOrbit:
+    def test_says_how_far_it_got(self):
+        orbit = periodic_orbit(OSCILLATOR, (0.0, 0.0), max_iterations=1)
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+        assert "Newton's method did not converge: the residual is" in orbit.status.message
+        assert "after 1 iterations" in orbit.status.message
+        assert "raise max_iterations" in orbit.status.remedy
+        assert orbit.residual > 1e-6
+
+    def test_a_run_that_ends_early_says_why(self):
+        orbit = periodic_orbit(OSCILLATOR, (0.0, 0.0), solver=hybrid.DOP853(max_steps=5))
+        assert orbit.status.code == StatusCode.MAX_STEPS
+        assert not orbit.status.ok
+
+    def test_a_ball_that_loses_energy_has_none(self):
+        orbit = periodic_orbit(bouncing_ball(), (1.0, 0.0), period=1.0)
+        assert not orbit.status.ok
+
+    @pytest.mark.parametrize(
+        ("system", "arguments", "text"),
+        [
+            (OSCILLATOR, {"period": 1.0}, "period is for autonomous systems; this one has the forcing period"),
+            (OSCILLATOR, {"periods": 0}, "periods must be a whole number of at least 1; got 0"),
+            (OSCILLATOR, {"tolerance": 0.0}, "tolerance must be positive; got 0.0"),
+            (OSCILLATOR, {"max_iterations": -1}, "max_iterations must be a whole number of at least 0"),
+            (OSCILLATOR, {"t0": math.inf}, "t0 must be finite"),
+            (OSCILLATOR, {"x0": (0.0,)}, r"x0 has shape \(1,\)"),
+            (OSCILLATOR, {"x0": (7.0, 0.0)}, "violates every mode"),
+            (bouncing_ball(), {}, "An autonomous system needs a guess of its period: give period="),
+            (bouncing_ball(), {"period": -1.0}, "period must be positive; got -1.0"),
+        ],
+    )
+    def test_bad_arguments(self, system, arguments, text):
+        with pytest.raises(hybrid.ArgumentError, match=text):
+            periodic_orbit(system, **({"x0": (0.5, 0.0)} | arguments))
