@@ -4,6 +4,7 @@ import math
 
 from numba import boolean, float64, int64, njit, void
 
+from hybrid.kernels.attempt import attempt
 from hybrid.kernels.codes import (
     ACCUMULATION,
     CYCLE,
@@ -35,7 +36,7 @@ from hybrid.kernels.codes import (
 from hybrid.kernels.guards import earliest_crossing, guard_speed, guard_value, land, rounding_band
 from hybrid.kernels.jump import enter, jump
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
-from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rates, starting_step
+from hybrid.kernels.step import interpolate, interpolation_stages, rates, starting_step
 
 SAFETY = 0.9
 SHRINK = 0.2
@@ -96,8 +97,8 @@ def accept(model, method, run, tangents, h, correction, work):
     if tangents > 0:
         s, place = method.b.shape[0], n * (1 + tangents)
         total = 0.0
-        for j in range(s):
-            total += method.b[j] * work.stages[j, place]
+        for j in range(s + 1):
+            total += method.quadrature[j] * work.stages[j, place]
         run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
     mode = run.count[MODE]
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):

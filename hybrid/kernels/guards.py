@@ -4,10 +4,10 @@ import math
 
 from numba import float64, int64, njit, types, void
 
+from hybrid.kernels.attempt import attempt
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
 from hybrid.kernels.codes import MODE, NO_TRANSITION
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
-from hybrid.kernels.step import attempt
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size;
 # its root is only a first guess for the landing.

@@ -70,12 +70,14 @@ MODEL = types.NamedTuple(
 
 
 class Method(NamedTuple):
-    """An explicit Runge-Kutta pair with its interpolant and its tolerances.
+    """A Runge-Kutta method with its interpolant and its tolerances.
 
     ``a (S, S)``, ``b (s,)``, ``c (S,)`` with ``s`` stages for the step; row ``s`` is the derivative at the
     new point and rows up to ``S`` serve the interpolant alone. ``error`` and ``second_error`` ``(s + 1,)``
-    weigh the stages into the error estimate. ``interpolant (d + 1, S)`` gives the Bernstein coefficients of
-    the step's interpolant: ``y0 + h * interpolant @ stages``.
+    weigh the stages into the error estimate, ``quadrature (s + 1,)`` into an integral over the step.
+    ``interpolant (d + 1, S)`` gives the Bernstein coefficients of the step's interpolant: ``y0 + h *
+    interpolant @ stages``. With ``implicit`` 1, row 0 is the derivative at the start, rows 1 to ``s`` are
+    coupled and have the weights ``b``, and ``error[0]`` is also the coefficient of the estimate's filter.
     """
 
     a: np.ndarray
@@ -83,7 +85,9 @@ class Method(NamedTuple):
     c: np.ndarray
     error: np.ndarray
     second_error: np.ndarray
+    quadrature: np.ndarray
     interpolant: np.ndarray
+    implicit: int
     exponent: float
     rtol: float
     atol: float
@@ -91,7 +95,8 @@ class Method(NamedTuple):
 
 
 METHOD = types.NamedTuple(
-    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, float64, float64, float64, float64), Method
+    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, int64, float64, float64, float64, float64),
+    Method,
 )
 
 
@@ -126,6 +131,11 @@ class Work(NamedTuple):
     (n + 1,)``; ``scalar (1,)``; ``field, field_after, state (n,)``; ``saltation (n, n)``; ``coefficients (d +
     1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its
     isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
+
+    For implicit methods, else empty: the factored matrix of the ``iteration (s n, s n)`` with its ``pivots``
+    and right-hand side ``residual (s n,)``; the estimate's ``filter (n, n)`` with its ``filter_pivots``; and
+    the polynomial of the last step, ``last_stages (s + 2, n)`` being its stages, start and end, and
+    ``last_step (2,)`` its length and its mode, -1 for none.
     """
 
     stages: np.ndarray
@@ -148,6 +158,13 @@ class Work(NamedTuple):
     intervals: np.ndarray
     nodes: np.ndarray
     fit: np.ndarray
+    iteration: np.ndarray
+    pivots: np.ndarray
+    residual: np.ndarray
+    filter: np.ndarray
+    filter_pivots: np.ndarray
+    last_stages: np.ndarray
+    last_step: np.ndarray
 
 
 WORK = types.NamedTuple(
@@ -172,6 +189,13 @@ WORK = types.NamedTuple(
         MATRIX,  # intervals
         VECTOR,  # nodes
         MATRIX,  # fit
+        MATRIX,  # iteration
+        INDICES,  # pivots
+        VECTOR,  # residual
+        MATRIX,  # filter
+        INDICES,  # filter_pivots
+        MATRIX,  # last_stages
+        VECTOR,  # last_step
     ),
     Work,
 )
