@@ -49,9 +49,9 @@ class RadauIIA(RungeKutta):
     tangent vectors by one more linear solve, exactly. The interpolant is the collocation polynomial, of order
     3 between the steps; events are landed on with the order of the step.
 
-    The error estimate is of order 3 only, so the error is far below the tolerances: ``rtol = 1e-7`` here is
-    about as accurate as 1e-10 of an explicit pair. A fast transient is resolved, not stepped over, since
-    events may lie in it.
+    The tolerances bound the error of the interpolant too, so that no event is missed between two steps; the
+    steps' ends are far more accurate: ``rtol = 1e-7`` here is there about as good as 1e-10 of an explicit
+    pair. A fast transient is resolved, not stepped over.
 
     References
     ----------
