@@ -50,8 +50,9 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
 
     n, length = dimension, dimension * (1 + tangents)
     stages, degree = len(method.a), len(method.interpolant) - 1
-    implicit = n if method.implicit else 0
-    coupled = len(method.b) * implicit
+    coupled = len(method.b) if method.implicit else 0
+    systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
+    systems[-1:] = -1.0
     nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
     width = max(degree, FIT_DEGREE) + 4
     return Work(
@@ -75,13 +76,8 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
         intervals=np.zeros((ISOLATION_DEPTH, 2)),
         nodes=nodes,
         fit=np.linalg.inv(_bernstein_basis(nodes)),
-        iteration=np.zeros((coupled, coupled)),
-        pivots=np.zeros(coupled, dtype=np.int64),
-        residual=np.zeros(coupled),
-        filter=np.zeros((implicit, implicit)),
-        filter_pivots=np.zeros(implicit, dtype=np.int64),
-        last_stages=np.zeros((len(method.b) + 2, implicit)),
-        last_step=np.array([0.0, -1.0]),
+        systems=systems,
+        pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
     )
 
 

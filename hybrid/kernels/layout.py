@@ -132,10 +132,10 @@ class Work(NamedTuple):
     1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its
     isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to Bernstein coefficients.
 
-    For implicit methods, else empty: the factored matrix of the ``iteration (s n, s n)`` with its ``pivots``
-    and right-hand side ``residual (s n,)``; the estimate's ``filter (n, n)`` with its ``filter_pivots``; and
-    the polynomial of the last step, ``last_stages (s + 2, n)`` being its stages, start and end, and
-    ``last_step (2,)`` its length and its mode, -1 for none.
+    For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
+    are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
+    the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
+    One array for all, since each one more is paid for wherever this tuple is passed.
     """
 
     stages: np.ndarray
@@ -158,13 +158,8 @@ class Work(NamedTuple):
     intervals: np.ndarray
     nodes: np.ndarray
     fit: np.ndarray
-    iteration: np.ndarray
+    systems: np.ndarray
     pivots: np.ndarray
-    residual: np.ndarray
-    filter: np.ndarray
-    filter_pivots: np.ndarray
-    last_stages: np.ndarray
-    last_step: np.ndarray
 
 
 WORK = types.NamedTuple(
@@ -189,13 +184,8 @@ WORK = types.NamedTuple(
         MATRIX,  # intervals
         VECTOR,  # nodes
         MATRIX,  # fit
-        MATRIX,  # iteration
+        MATRIX,  # systems
         INDICES,  # pivots
-        VECTOR,  # residual
-        MATRIX,  # filter
-        INDICES,  # filter_pivots
-        MATRIX,  # last_stages
-        VECTOR,  # last_step
     ),
     Work,
 )

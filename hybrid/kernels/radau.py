@@ -18,7 +18,7 @@ MOST_ITERATIONS = 10
 STALLED = 1e-2
 # Error ratio of a step whose equations could not be solved: the driver will try about half of it.
 NOT_SOLVED = 10.0
-# Slots of Work.last_step.
+# Slots of the last row of Work.systems.
 LAST_LENGTH, LAST_MODE = 0, 1
 
 
@@ -44,60 +44,64 @@ def predict(method, mode, h, y, n, work):
     taken again shorter); elsewhere a jump lies between them.
     """
     s = method.b.shape[0]
-    again, onwards = work.last_step[LAST_MODE] == mode, work.last_step[LAST_MODE] == mode
+    last = work.systems[(s + 1) * n + 1 :]
+    again = last[s + 2, LAST_MODE] == mode
+    onwards = again
     for i in range(n):
-        again = again and y[i] == work.last_stages[s, i]
-        onwards = onwards and y[i] == work.last_stages[s + 1, i]
+        again = again and y[i] == last[s, i]
+        onwards = onwards and y[i] == last[s + 1, i]
     for stage in range(1, s + 1):
         for i in range(n):
             work.stages[stage, i] = 0.0
         if again or onwards:
-            theta = method.c[stage] * h / work.last_step[LAST_LENGTH] + (0.0 if again else 1.0)
+            theta = method.c[stage] * h / last[s + 2, LAST_LENGTH] + (0.0 if again else 1.0)
             for j in range(1, s + 1):
                 weight = 1.0
                 for other in range(1, s + 1):
                     if other != j:
                         weight *= (theta - method.c[other]) / (method.c[j] - method.c[other])
                 for i in range(n):
-                    work.stages[stage, i] += weight * work.last_stages[j - 1, i]
+                    work.stages[stage, i] += weight * last[j - 1, i]
 
 
 @njit(void(METHOD, int64, float64, VECTOR, int64, WORK), **KERNEL)
 def remember(method, mode, h, y, n, work):
     """Keep the polynomial of this step for the next guess."""
     s = method.b.shape[0]
+    last = work.systems[(s + 1) * n + 1 :]
     for i in range(n):
         for stage in range(1, s + 1):
-            work.last_stages[stage - 1, i] = work.stages[stage, i]
-        work.last_stages[s, i] = y[i]
-        work.last_stages[s + 1, i] = work.new[i]
-    work.last_step[LAST_LENGTH] = h
-    work.last_step[LAST_MODE] = mode if h > 0.0 else -1.0
+            last[stage - 1, i] = work.stages[stage, i]
+        last[s, i] = y[i]
+        last[s + 1, i] = work.new[i]
+    last[s + 2, LAST_LENGTH] = h
+    last[s + 2, LAST_MODE] = mode if h > 0.0 else -1.0
 
 
 @njit(boolean(MODEL, METHOD, int64, float64, float64, VECTOR, WORK), **KERNEL)
 def solve_stages(model, method, mode, t, h, y, work):
-    """Simplified Newton iteration for the state's stages; ``work.iteration`` is factored. False if it fails.
+    """Simplified Newton iteration for the state's stages; their system is factored. False if it fails.
 
     With the contraction ``theta`` of the last two changes, the error left is ``theta / (1 - theta)`` times
     the last change; that is kept far below the tolerance of the step (Hairer and Wanner 1996, eqs. IV.8.10
     and IV.8.11).
     """
     n, s = model.dimension, method.b.shape[0]
+    change_of_stages = work.systems[(s + 1) * n]
     enough = max(10.0 * 2.220446049250313e-16 / method.rtol, min(0.03, math.sqrt(method.rtol)))
     stalled = max(enough, STALLED)
     change, before = 0.0, 0.0
     for iteration in range(MOST_ITERATIONS):
         for stage in range(1, s + 1):
             combine(y, h, method.a[stage], work.stages, s + 1, n, work.trial)
-            residual = work.residual[(stage - 1) * n : stage * n]
+            residual = change_of_stages[(stage - 1) * n : stage * n]
             model.flow(mode, t + method.c[stage] * h, work.trial, model.parameters, residual)
             for i in range(n):
                 residual[i] -= work.stages[stage, i]
-        substitute(work.iteration, work.pivots, s * n, work.residual)
+        substitute(work.systems, work.pivots, s * n, change_of_stages)
         for stage in range(1, s + 1):
             for i in range(n):
-                work.stages[stage, i] += work.residual[(stage - 1) * n + i]
+                work.stages[stage, i] += change_of_stages[(stage - 1) * n + i]
         combine(y, h, method.a[s], work.stages, s + 1, n, work.new)
         square = 0.0
         for i in range(n):
@@ -105,7 +109,7 @@ def solve_stages(model, method, mode, t, h, y, work):
             for stage in range(1, s + 1):
                 shift = 0.0
                 for j in range(1, s + 1):
-                    shift += method.a[stage, j] * work.residual[(j - 1) * n + i]
+                    shift += method.a[stage, j] * change_of_stages[(j - 1) * n + i]
                 square += (h * shift / scale) ** 2
         change = math.sqrt(square / (n * s))
         if not math.isfinite(change):
@@ -134,10 +138,11 @@ def solve_tangents(model, method, mode, t, h, y, tangents, work):
     """
     n, s = model.dimension, method.b.shape[0]
     length = n * (1 + tangents)
+    vector = work.systems[(s + 1) * n]
     for stage in range(1, s + 1):
         combine(y, h, method.a[stage], work.stages, s + 1, n, work.trial)
         model.flow_jacobian(mode, t + method.c[stage] * h, work.trial, model.parameters, work.jacobian)
-        fill_rows(method, h, work.jacobian, n, stage, work.iteration)
+        fill_rows(method, h, work.jacobian, n, stage, work.systems)
         trace = 0.0
         for i in range(n):
             trace += work.jacobian[i, i]
@@ -148,16 +153,16 @@ def solve_tangents(model, method, mode, t, h, y, tangents, work):
                 for j in range(n):
                     total += work.jacobian[i, j] * y[start + j]
                 work.stages[stage, start + i] = total
-    if not factorise(work.iteration, work.pivots, s * n):
+    if not factorise(work.systems, work.pivots, s * n):
         return False
     for start in range(n, length, n):
         for stage in range(1, s + 1):
             for i in range(n):
-                work.residual[(stage - 1) * n + i] = work.stages[stage, start + i]
-        substitute(work.iteration, work.pivots, s * n, work.residual)
+                vector[(stage - 1) * n + i] = work.stages[stage, start + i]
+        substitute(work.systems, work.pivots, s * n, vector)
         for stage in range(1, s + 1):
             for i in range(n):
-                work.stages[stage, start + i] = work.residual[(stage - 1) * n + i]
+                work.stages[stage, start + i] = vector[(stage - 1) * n + i]
     return True
 
 
@@ -175,17 +180,18 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
     length = n * (1 + tangents)
     model.flow_jacobian(mode, t, y, model.parameters, work.jacobian)
     for stage in range(1, s + 1):
-        fill_rows(method, h, work.jacobian, n, stage, work.iteration)
+        fill_rows(method, h, work.jacobian, n, stage, work.systems)
     gamma = method.error[0]
+    estimate_filter, filter_pivots = work.systems[s * n :], work.pivots[s * n :]
     for i in range(n):
         for j in range(n):
-            work.filter[i, j] = -h * gamma * work.jacobian[i, j]
-        work.filter[i, i] += 1.0
-    if not (factorise(work.iteration, work.pivots, s * n) and factorise(work.filter, work.filter_pivots, n)):
+            estimate_filter[i, j] = -h * gamma * work.jacobian[i, j]
+        estimate_filter[i, i] += 1.0
+    if not (factorise(work.systems, work.pivots, s * n) and factorise(estimate_filter, filter_pivots, n)):
         return math.nan
     predict(method, mode, h, y, n, work)
     if not solve_stages(model, method, mode, t, h, y, work):
-        work.last_step[LAST_MODE] = -1.0
+        work.systems[work.systems.shape[0] - 1, LAST_MODE] = -1.0
         return NOT_SOLVED
     remember(method, mode, h, y, n, work)
     if tangents > 0 and not solve_tangents(model, method, mode, t, h, y, tangents, work):
@@ -194,6 +200,6 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
     estimate_error(method, length, work)
     between = error_ratio(method, h, y, n, 0, work)
     for start in range(0, length, n):
-        substitute(work.filter, work.filter_pivots, n, work.error[start : start + n])
+        substitute(estimate_filter, filter_pivots, n, work.error[start : start + n])
     ratio = error_ratio(method, h, y, n, tangents, work)
     return between if between > ratio else ratio
