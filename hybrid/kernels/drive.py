@@ -82,7 +82,10 @@ def remember_step(model, method, run, record, t, h, work):
     record.step_place[slot, 2] = run.count[JUMPS]
     interpolation_stages(model, method, mode, t, h, run.y, work)
     interpolate(method, h, run.y, model.dimension, work)
-    record.step_coefficients[slot] = work.coefficients
+    # Element by element: an array assignment brings its error message along, seconds of compilation.
+    for i in range(work.coefficients.shape[0]):
+        for j in range(model.dimension):
+            record.step_coefficients[slot, i, j] = work.coefficients[i, j]
     record.used[0] = slot + 1
 
 
