@@ -12,7 +12,7 @@ from hybrid.orbit import PeriodicOrbit, periodic_orbit
 from hybrid.saltation import saltation_matrix
 from hybrid.section import Section, poincare_section, stroboscopic_section
 from hybrid.simulate import simulate
-from hybrid.solvers import DOP853, Tsit5
+from hybrid.solvers import DOP853, RadauIIA, Tsit5
 from hybrid.status import Status, StatusCode
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
 
@@ -29,6 +29,7 @@ __all__ = [
     "Mode",
     "ModelError",
     "PeriodicOrbit",
+    "RadauIIA",
     "Reset",
     "Section",
     "Status",

@@ -34,7 +34,9 @@ def method_tuple(solver: RungeKutta) -> Any:
         tableau.c,
         tableau.error,
         tableau.second_error,
+        tableau.quadrature,
         tableau.interpolant,
+        int(tableau.implicit),
         1.0 / tableau.error_order,
         solver.rtol,
         solver.atol,
@@ -48,6 +50,9 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
 
     n, length = dimension, dimension * (1 + tangents)
     stages, degree = len(method.a), len(method.interpolant) - 1
+    coupled = len(method.b) if method.implicit else 0
+    systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
+    systems[-1:] = -1.0
     nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
     width = max(degree, FIT_DEGREE) + 4
     return Work(
@@ -72,6 +77,8 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
         intervals=np.zeros((ISOLATION_DEPTH, 2)),
         nodes=nodes,
         fit=np.linalg.inv(_bernstein_basis(nodes)),
+        systems=systems,
+        pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
     )
 
 

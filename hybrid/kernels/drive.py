@@ -4,6 +4,7 @@ import math
 
 from numba import boolean, float64, int64, njit, types, void
 
+from hybrid.kernels.attempt import attempt
 from hybrid.kernels.chatter import chatter_matrix
 from hybrid.kernels.codes import (
     ACCUMULATION,
@@ -55,7 +56,7 @@ from hybrid.kernels.guards import (
 )
 from hybrid.kernels.jump import carry_tangents, enter, finish_chatter, forward, jump
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
-from hybrid.kernels.step import attempt, interpolate, interpolation_stages, rates, starting_step
+from hybrid.kernels.step import interpolate, interpolation_stages, rates, starting_step
 
 SAFETY = 0.9
 SHRINK = 0.2
@@ -105,7 +106,10 @@ def remember_step(model, method, run, record, t, h, work):
     record.step_place[slot, 2] = run.count[JUMPS]
     interpolation_stages(model, method, mode, t, h, run.y, work)
     interpolate(method, h, run.y, model.dimension, work)
-    record.step_coefficients[slot] = work.coefficients
+    # Element by element: an array assignment brings its error message along, seconds of compilation.
+    for i in range(work.coefficients.shape[0]):
+        for j in range(model.dimension):
+            record.step_coefficients[slot, i, j] = work.coefficients[i, j]
     record.used[0] = slot + 1
 
 
@@ -125,8 +129,8 @@ def accept(model, method, run, tangents, h, correction, work):
     if tangents > 0:
         s, place = method.b.shape[0], n * (1 + tangents)
         total = 0.0
-        for j in range(s):
-            total += method.b[j] * work.stages[j, place]
+        for j in range(s + 1):
+            total += method.quadrature[j] * work.stages[j, place]
         run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
     forward(run, model.period, h + correction)
 
@@ -164,8 +168,8 @@ def remember_grazing(model, method, run, record, t, h, work):
 def find_event(model, method, run, record, tangents, h, work):
     """Shorten the attempted step to its first event, if there is one.
 
-    Returns its length, the Euler step that completes it, and the transition. A crossing that the interpolant has and the
-    solution has not is a grazing; the step is then searched again without that guard.
+    Returns its length, the Euler step that completes it, and the transition. A crossing that the interpolant
+    has and the solution has not is a grazing; the step is then searched again without that guard.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     ignored = NO_TRANSITION

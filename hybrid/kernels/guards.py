@@ -4,10 +4,10 @@ import math
 
 from numba import float64, int64, njit, types, void
 
+from hybrid.kernels.attempt import attempt
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, lowest, stays
 from hybrid.kernels.codes import GRAZING_GUARD, GRAZING_PLACE, GRAZING_VALUE, MODE, NO_TRANSITION
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
-from hybrid.kernels.step import attempt
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
 # crossings that reach no farther beyond zero than the misfit are lost.
@@ -274,9 +274,9 @@ def land(model, method, transition, side, mode, t, h, theta, y, tangents, work):
 
     The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
     so that the state and the tangents at the event carry the error of the method, not that of its
-    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been seen.
-    Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE`` instead
-    of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
+    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
+    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
+    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
     """
     s = method.b.shape[0]
     low, high = 0.0, h

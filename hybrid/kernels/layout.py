@@ -73,12 +73,14 @@ MODEL = types.NamedTuple(
 
 
 class Method(NamedTuple):
-    """An explicit Runge-Kutta pair with its interpolant and its tolerances.
+    """A Runge-Kutta method with its interpolant and its tolerances.
 
     ``a (S, S)``, ``b (s,)``, ``c (S,)`` with ``s`` stages for the step; row ``s`` is the derivative at the
     new point and rows up to ``S`` serve the interpolant alone. ``error`` and ``second_error`` ``(s + 1,)``
-    weigh the stages into the error estimate. ``interpolant (d + 1, S)`` gives the Bernstein coefficients of
-    the step's interpolant: ``y0 + h * interpolant @ stages``.
+    weigh the stages into the error estimate, ``quadrature (s + 1,)`` into an integral over the step.
+    ``interpolant (d + 1, S)`` gives the Bernstein coefficients of the step's interpolant: ``y0 + h *
+    interpolant @ stages``. With ``implicit`` 1, row 0 is the derivative at the start, rows 1 to ``s`` are
+    coupled and have the weights ``b``, and ``error[0]`` is also the coefficient of the estimate's filter.
     """
 
     a: np.ndarray
@@ -86,7 +88,9 @@ class Method(NamedTuple):
     c: np.ndarray
     error: np.ndarray
     second_error: np.ndarray
+    quadrature: np.ndarray
     interpolant: np.ndarray
+    implicit: int
     exponent: float
     rtol: float
     atol: float
@@ -94,7 +98,8 @@ class Method(NamedTuple):
 
 
 METHOD = types.NamedTuple(
-    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, float64, float64, float64, float64), Method
+    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, int64, float64, float64, float64, float64),
+    Method,
 )
 
 
@@ -132,6 +137,11 @@ class Work(NamedTuple):
     ``coefficients (d + 1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and
     ``intervals`` for its isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to
     Bernstein coefficients.
+
+    For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
+    are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
+    the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
+    One array for all, since each one more is paid for wherever this tuple is passed.
     """
 
     stages: np.ndarray
@@ -155,6 +165,8 @@ class Work(NamedTuple):
     intervals: np.ndarray
     nodes: np.ndarray
     fit: np.ndarray
+    systems: np.ndarray
+    pivots: np.ndarray
 
 
 WORK = types.NamedTuple(
@@ -180,6 +192,8 @@ WORK = types.NamedTuple(
         MATRIX,  # intervals
         VECTOR,  # nodes
         MATRIX,  # fit
+        MATRIX,  # systems
+        INDICES,  # pivots
     ),
     Work,
 )

@@ -1,4 +1,4 @@
-"""One step of an explicit Runge-Kutta pair for the state and its tangent vectors, and its interpolant."""
+"""One step of an explicit Runge-Kutta pair, and what all methods share: rates, error ratio, interpolant."""
 
 import math
 
@@ -41,6 +41,22 @@ def combine(y, h, weights, stages, count, length, out):
                 out[i] += weight * stage[i]
 
 
+@njit(void(METHOD, int64, WORK), **INLINE)
+def estimate_error(method, length, work):
+    """The two embedded error estimates over the step's length, from its stages."""
+    error, second_error = work.error, work.second_error
+    for i in range(length):
+        error[i] = 0.0
+        second_error[i] = 0.0
+    for j in range(method.error.shape[0]):
+        weight, second_weight = method.error[j], method.second_error[j]
+        stage = work.stages[j]
+        if weight != 0.0 or second_weight != 0.0:
+            for i in range(length):
+                error[i] += weight * stage[i]
+                second_error[i] += second_weight * stage[i]
+
+
 @njit(float64(METHOD, float64, VECTOR, int64, int64, WORK), **INLINE)
 def error_ratio(method, h, y, dimension, tangents, work):
     """Largest ratio of estimated error to tolerance over the state and each tangent vector.
@@ -51,18 +67,7 @@ def error_ratio(method, h, y, dimension, tangents, work):
     """
     n = dimension
     length = n * (1 + tangents)
-    count = method.error.shape[0]
     error, second_error, new = work.error, work.second_error, work.new
-    for i in range(length):
-        error[i] = 0.0
-        second_error[i] = 0.0
-    for j in range(count):
-        weight, second_weight = method.error[j], method.second_error[j]
-        stage = work.stages[j]
-        if weight != 0.0 or second_weight != 0.0:
-            for i in range(length):
-                error[i] += weight * stage[i]
-                second_error[i] += second_weight * stage[i]
     worst = 0.0
     for start in range(0, length, n):
         floor = method.atol
@@ -84,7 +89,7 @@ def error_ratio(method, h, y, dimension, tangents, work):
 
 
 @njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **INLINE)
-def attempt(model, method, mode, t, h, y, tangents, work):
+def attempt_explicit(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 
     ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in
@@ -97,6 +102,7 @@ def attempt(model, method, mode, t, h, y, tangents, work):
         rates(model, mode, t + method.c[i] * h, work.trial, tangents, work.stages[i])
     combine(y, h, method.b, work.stages, s, length, work.new)
     rates(model, mode, t + h, work.new, tangents, work.stages[s])
+    estimate_error(method, length, work)
     return error_ratio(method, h, y, model.dimension, tangents, work)
 
 

@@ -1,4 +1,4 @@
-"""What all explicit Runge-Kutta pairs share: tolerances, and the kernel's view of the tableau."""
+"""What all Runge-Kutta methods share: tolerances, and the kernel's view of the tableau."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _positive(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> Non
 
 @attrs.frozen
 class RungeKutta:
-    """Abstract base of the explicit pairs; use one of its subclasses.
+    """Abstract base of the methods; use one of its subclasses.
 
     The error estimate of every component ``i`` of the state is kept below ``atol + rtol |x_i|`` in the root
     mean square. Tangent vectors are under the same control, each by itself: their components are kept below

@@ -1,4 +1,4 @@
-"""The numbers that make an explicit Runge-Kutta pair, in the arrangement its kernel wants."""
+"""The numbers that make a Runge-Kutta method, in the arrangement its kernel wants."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ Row = Mapping[int, float]
 
 @attrs.frozen(eq=False)
 class Tableau:
-    """Butcher tableau of an explicit pair with an interpolant.
+    """Butcher tableau of a method with an error estimate and an interpolant.
 
     With ``s`` stages for the step, ``S >= s + 1`` in all (row ``s`` is the derivative at the new point) and
-    an interpolant of degree ``d``.
+    an interpolant of degree ``d``. The step's stages are 0 to ``s - 1`` for an explicit pair; 1 to ``s`` for
+    an implicit method, whose row 0 is the derivative at the start.
 
     Parameters
     ----------
@@ -30,6 +31,9 @@ class Tableau:
         ``(s + 1,)`` each; the second is zero for pairs with one estimate.
     interpolant
         ``(d + 1, S)``: Bernstein coefficients over the step are ``y0 + h interpolant @ stages``.
+    implicit
+        Whether the stages are coupled; then ``error[0]`` is also the coefficient ``gamma_0`` of the filter
+        ``(I - h gamma_0 J)^-1`` of the estimate.
     """
 
     order: int
@@ -40,6 +44,12 @@ class Tableau:
     error: np.ndarray
     second_error: np.ndarray
     interpolant: np.ndarray
+    implicit: bool = False
+
+    @property
+    def quadrature(self) -> np.ndarray:
+        """``(s + 1,)`` weights of all stages in an integral over the step."""
+        return np.concatenate([[0.0], self.b] if self.implicit else [self.b, [0.0]])
 
 
 def dense(rows: Sequence[Row], width: int) -> np.ndarray:
