@@ -44,6 +44,25 @@ def method_tuple(solver: RungeKutta) -> Any:
     )
 
 
+def driver_parts(solver: RungeKutta) -> Any:
+    """The pieces that the driver calls now and then; the implicit step is loaded only for a solver that needs it."""
+    from hybrid.kernels.layout import Parts
+
+    jumps, corners = load_kernels("hybrid.kernels.jump"), load_kernels("hybrid.kernels.corner")
+    if solver.tableau.implicit:
+        attempt = load_kernels("hybrid.kernels.radau").attempt_radau
+    else:
+        attempt = load_kernels("hybrid.kernels.step").no_attempt
+    return Parts(
+        attempt_implicit=attempt,
+        enter=jumps.enter,
+        jump=jumps.jump,
+        finish_chatter=jumps.finish_chatter,
+        rest=jumps.rest,
+        first_in_order=corners.first_in_order,
+    )
+
+
 def workspace(method: Any, dimension: int, tangents: int) -> Any:
     """Scratch memory for one run."""
     from hybrid.kernels.layout import Work
@@ -163,6 +182,7 @@ class Trajectory:
     run: Any
     work: Any
     tangents: int
+    parts: Any
     max_steps: int
     phase0: float
 
@@ -229,6 +249,7 @@ class Trajectory:
         """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run."""
         return int(
             load_kernels().advance(
+                self.parts,
                 self.model,
                 self.method,
                 self.run,
@@ -287,7 +308,9 @@ def start(
     work = workspace(method, system.dimension, tangents)
     run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
     phase0 = split_time(t0, model.period)[1]
-    return Trajectory(compiled, model, method, run, work, tangents, solver.max_steps, phase0)
+    return Trajectory(
+        compiled, model, method, run, work, tangents, driver_parts(solver), solver.max_steps, phase0
+    )
 
 
 def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t0: float) -> Any:

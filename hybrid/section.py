@@ -128,6 +128,7 @@ def _strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray,
     places = np.empty((count, 3), dtype=np.int64)
     done, code = load_kernels("hybrid.kernels.sections").strobe(
         load_kernels().advance,
+        trajectory.parts,
         trajectory.model,
         trajectory.method,
         trajectory.run,

@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, types, void
+from numba import float64, int64, njit, types, void
 
 from hybrid.kernels.codes import (
     DIVERGENCE,
@@ -18,14 +18,23 @@ from hybrid.kernels.codes import (
     READY,
     STALE,
 )
-from hybrid.kernels.layout import ENTRY, INDICES, KERNEL, MATRIX, METHOD, MODEL, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.layout import (
+    ADVANCE,
+    ENTRY,
+    INDICES,
+    KERNEL,
+    MATRIX,
+    METHOD,
+    MODEL,
+    PARTS,
+    RECORD,
+    RUN,
+    VECTOR,
+    WORK,
+)
 from hybrid.kernels.tangent import orthonormalise
 from lyapunov import statistics
 
-# The driver comes as an argument, so that it is compiled once and not into each of its callers.
-ADVANCE = types.FunctionType(
-    int64(MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
-)
 UNLIMITED = 9223372036854775807
 
 push = njit(void(MATRIX, INDICES, VECTOR), **KERNEL)(statistics.push)
@@ -46,6 +55,7 @@ def later(period, cycle, phase, interval):
 @njit(
     types.UniTuple(int64, 2)(
         ADVANCE,
+        PARTS,
         MODEL,
         METHOD,
         RUN,
@@ -64,6 +74,7 @@ def later(period, cycle, phase, interval):
 )
 def growth_rates(
     advance,
+    parts,
     model,
     method,
     run,
@@ -91,7 +102,7 @@ def growth_rates(
         run.clock[DIVERGENCE], run.clock[LOG_DETERMINANT] = 0.0, 0.0
         cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
         code = advance(
-            model, method, run, record, tangents, True, cycle[0], phase[0], max_steps, UNLIMITED, work
+            parts, model, method, run, record, tangents, True, cycle[0], phase[0], max_steps, UNLIMITED, work
         )
         if code != DONE:
             return done, code
@@ -131,6 +142,7 @@ def rescale(run, other, n, factor):
 @njit(
     types.UniTuple(int64, 2)(
         ADVANCE,
+        PARTS,
         MODEL,
         METHOD,
         RUN,
@@ -151,6 +163,7 @@ def rescale(run, other, n, factor):
 )
 def distances(
     advance,
+    parts,
     model,
     method,
     run,
@@ -175,13 +188,27 @@ def distances(
     n = model.dimension
     for done in range(out.shape[0]):
         cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
-        code = advance(model, method, run, record, 0, False, cycle[0], phase[0], max_steps, UNLIMITED, work)
+        code = advance(
+            parts, model, method, run, record, 0, False, cycle[0], phase[0], max_steps, UNLIMITED, work
+        )
         if code == DONE:
             code = advance(
-                model, method, free, record, 0, False, cycle[0], phase[0], max_steps, UNLIMITED, free_work
+                parts,
+                model,
+                method,
+                free,
+                record,
+                0,
+                False,
+                cycle[0],
+                phase[0],
+                max_steps,
+                UNLIMITED,
+                free_work,
             )
         if code == DONE:
             code = advance(
+                parts,
                 model,
                 method,
                 renormalised,

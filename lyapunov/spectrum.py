@@ -222,6 +222,7 @@ class _Estimate:
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), trajectory.tangents + 1))
             done, code = kernel(
                 advance,
+                trajectory.parts,
                 trajectory.model,
                 trajectory.method,
                 trajectory.run,

@@ -255,6 +255,7 @@ def _follow(
         out = np.empty((min(INTERVALS_AT_ONCE, intervals - total), 2))
         done, code = kernel(
             advance,
+            reference.parts,
             reference.model,
             reference.method,
             *(run.run for run in runs),

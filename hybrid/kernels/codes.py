@@ -15,6 +15,8 @@ READY = 0
 STALE = 1
 ENTERING = 2
 NO_TRANSITION = -1
+# Instead of a transition: the state rests on the guard that has just fired.
+RESTING = -2
 
 # Slots of Run.count.
 MODE = 0

@@ -2,9 +2,15 @@
 
 from numba import boolean, float64, int64, njit
 
-from hybrid.kernels.codes import MODE, NO_TRANSITION, PHASE
+from hybrid.kernels.codes import (
+    MODE,
+    NO_TRANSITION,
+    ORDER_MATTERED,
+    PHASE,
+    SIMULTANEOUS,
+)
 from hybrid.kernels.guards import guard_speed, guard_value, rounding_band
-from hybrid.kernels.layout import KERNEL, MODEL, RUN, VECTOR, WORK
+from hybrid.kernels.layout import KERNEL, MODEL, PART, RUN, VECTOR, WORK
 
 MOST_JUMPS = 50
 # States that differ by less than this, relative to their sizes, came out the same.
@@ -69,3 +75,15 @@ def order_matters(model, run, one, other, work):
         if abs(work.error[i] - work.second_error[i]) > SAME * scale:
             return True
     return False
+
+
+@njit(int64(MODEL, RUN, int64, WORK), **PART)
+def first_in_order(model, run, fired, work):
+    """Of the transitions due at the point just landed on, the one listed first; notes whether the order matters."""
+    other = companion(model, run, fired, work)
+    if other == NO_TRANSITION:
+        return fired
+    run.count[SIMULTANEOUS] += 1
+    if order_matters(model, run, fired, other, work):
+        run.count[ORDER_MATTERED] += 1
+    return min(fired, other)

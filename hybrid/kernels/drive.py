@@ -5,7 +5,6 @@ import math
 from numba import boolean, float64, int64, njit, types, void
 
 from hybrid.kernels.attempt import attempt
-from hybrid.kernels.chatter import chatter_matrix
 from hybrid.kernels.codes import (
     ACCUMULATION,
     CYCLE,
@@ -28,7 +27,6 @@ from hybrid.kernels.codes import (
     NO_MODE,
     NO_TRANSITION,
     NON_FINITE,
-    ORDER_MATTERED,
     PENDING,
     PHASE,
     PHASE_OF_RUN,
@@ -36,13 +34,12 @@ from hybrid.kernels.codes import (
     READY,
     RECORD_FULL,
     REJECTED,
-    SIMULTANEOUS,
+    RESTING,
     STALE,
     STEP_TOO_SMALL,
     STEPS,
     STUCK,
 )
-from hybrid.kernels.corner import companion, order_matters
 from hybrid.kernels.guards import (
     NOT_THERE,
     earliest_crossing,
@@ -54,8 +51,8 @@ from hybrid.kernels.guards import (
     value_on_interpolant,
     widen_scale,
 )
-from hybrid.kernels.jump import carry_tangents, enter, finish_chatter, forward, jump
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RECORD, RUN, WORK
+from hybrid.kernels.jump import forward
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.step import interpolate, interpolation_stages, rates, starting_step
 
 SAFETY = 0.9
@@ -164,8 +161,10 @@ def remember_grazing(model, method, run, record, t, h, work):
     record.used[2] = slot + 1
 
 
-@njit(types.Tuple((float64, float64, int64))(MODEL, METHOD, RUN, RECORD, int64, float64, WORK), **KERNEL)
-def find_event(model, method, run, record, tangents, h, work):
+@njit(
+    types.Tuple((float64, float64, int64))(PARTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK), **KERNEL
+)
+def find_event(parts, model, method, run, record, tangents, h, work):
     """Shorten the attempted step to its first event, if there is one.
 
     Returns its length, the Euler step that completes it, and the transition. A crossing that the interpolant
@@ -184,38 +183,17 @@ def find_event(model, method, run, record, tangents, h, work):
             break
         direction = model.direction[fired]
         side = run.side[fired] if direction == 0 else -direction
-        shortened, correction = land(model, method, fired, side, mode, t, h, theta, run.y, tangents, work)
+        shortened, correction = land(
+            parts, model, method, fired, side, mode, t, h, theta, run.y, tangents, work
+        )
         if shortened != NOT_THERE:
             return shortened, correction, fired
         ignored = fired
-        attempt(model, method, mode, t, h, run.y, tangents, work)
+        attempt(parts, model, method, mode, t, h, run.y, tangents, work)
         run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, 0.0
         run.count[GRAZING_GUARD] = fired
         remember_grazing(model, method, run, record, t, h, work)
     return h, 0.0, NO_TRANSITION
-
-
-@njit(int64(MODEL, RUN, int64, WORK), **KERNEL)
-def first_in_order(model, run, fired, work):
-    """Of the transitions due at the point just landed on, the one listed first; notes whether the order matters."""
-    other = companion(model, run, fired, work)
-    if other == NO_TRANSITION:
-        return fired
-    run.count[SIMULTANEOUS] += 1
-    if order_matters(model, run, fired, other, work):
-        run.count[ORDER_MATTERED] += 1
-    return min(fired, other)
-
-
-@njit(void(MODEL, RUN, int64, int64, boolean, WORK), **KERNEL)
-def rest(model, run, limit_mode, tangents, orthonormal, work):
-    """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard already."""
-    transition = run.count[LAST_FIRED]
-    if tangents > 0:
-        chatter_matrix(model, run, transition, work)
-        carry_tangents(model, run, tangents, orthonormal, work)
-    run.count[PREVIOUS_MODE] = run.count[MODE]
-    run.count[MODE] = limit_mode
 
 
 @njit(void(METHOD, int64, WORK), **INLINE)
@@ -250,11 +228,22 @@ def finite(run, length):
 
 
 @njit(
-    int64(MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK),
+    int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK),
     **ENTRY,
 )
 def advance(
-    model, method, run, record, tangents, orthonormal, stop_cycle, stop_phase, max_steps, max_jumps, work
+    parts,
+    model,
+    method,
+    run,
+    record,
+    tangents,
+    orthonormal,
+    stop_cycle,
+    stop_phase,
+    max_steps,
+    max_jumps,
+    work,
 ):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 
@@ -276,10 +265,12 @@ def advance(
                 return ACCUMULATION
             fired = run.count[PENDING]
             run.count[PENDING] = NO_TRANSITION
-            jump(model, method, run, record, fired, tangents, orthonormal, work)
+            parts.jump(model, method, run, record, fired, tangents, orthonormal, work)
             remaining = time_left(model, run, stop_cycle, stop_phase)
             if (
-                finish_chatter(model, method, run, record, fired, remaining, tangents, orthonormal, work)
+                parts.finish_chatter(
+                    model, method, run, record, fired, remaining, tangents, orthonormal, work
+                )
                 and model.accumulates_to[fired] == NO_MODE
             ):
                 return ACCUMULATION
@@ -288,12 +279,12 @@ def advance(
         if run.count[PHASE_OF_RUN] == ENTERING:
             if not finite(run, length):
                 return NON_FINITE
-            fires, stuck = enter(model, run, work)
-            if stuck:
+            fires = parts.enter(model, run, work)
+            if fires == RESTING:
                 limit_mode = model.accumulates_to[run.count[LAST_FIRED]]
                 if limit_mode == NO_MODE:
                     return ACCUMULATION
-                rest(model, run, limit_mode, tangents, orthonormal, work)
+                parts.rest(model, run, limit_mode, tangents, orthonormal, work)
                 continue
             if fires != NO_TRANSITION:
                 if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
@@ -328,7 +319,7 @@ def advance(
         proposed = min(run.clock[NEXT_STEP], method.max_step)
         last = proposed >= remaining
         h = remaining if last else proposed
-        ratio = attempt(model, method, mode, t, h, run.y, tangents, work)
+        ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
         run.count[STEPS] += 1
         if not ratio <= 1.0:
             run.count[REJECTED] += 1
@@ -342,7 +333,7 @@ def advance(
         run.clock[LAST_STEP], run.clock[LAST_RATIO] = h, max(ratio, 1e-16)
         fired, correction = NO_TRANSITION, 0.0
         if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
-            h, correction, fired = find_event(model, method, run, record, tangents, h, work)
+            h, correction, fired = find_event(parts, model, method, run, record, tangents, h, work)
         if fired != NO_TRANSITION:
             run.clock[NEXT_STEP] = min(run.clock[NEXT_STEP], LONGEST_AFTER_EVENT * h)
         if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:
@@ -355,6 +346,6 @@ def advance(
             run.count[CYCLE] = stop_cycle
             run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
-            run.count[PENDING] = first_in_order(model, run, fired, work)
+            run.count[PENDING] = parts.first_in_order(model, run, fired, work)
         else:
             carry_rates(method, length, work)

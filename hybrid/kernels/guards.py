@@ -6,8 +6,14 @@ from numba import float64, int64, njit, types, void
 
 from hybrid.kernels.attempt import attempt
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, lowest, stays
-from hybrid.kernels.codes import GRAZING_GUARD, GRAZING_PLACE, GRAZING_VALUE, MODE, NO_TRANSITION
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, RUN, VECTOR, WORK
+from hybrid.kernels.codes import (
+    GRAZING_GUARD,
+    GRAZING_PLACE,
+    GRAZING_VALUE,
+    MODE,
+    NO_TRANSITION,
+)
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, PARTS, RUN, VECTOR, WORK
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
 # crossings that reach no farther beyond zero than the misfit are lost.
@@ -265,11 +271,11 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
 
 @njit(
     types.UniTuple(float64, 2)(
-        MODEL, METHOD, int64, int64, int64, float64, float64, float64, VECTOR, int64, WORK
+        PARTS, MODEL, METHOD, int64, int64, int64, float64, float64, float64, VECTOR, int64, WORK
     ),
     **KERNEL,
 )
-def land(model, method, transition, side, mode, t, h, theta, y, tangents, work):
+def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents, work):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
     The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
@@ -284,7 +290,7 @@ def land(model, method, transition, side, mode, t, h, theta, y, tangents, work):
     after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
     length = theta * h
     for trial in range(MOST_LANDINGS):
-        attempt(model, method, mode, t, length, y, tangents, work)
+        attempt(parts, model, method, mode, t, length, y, tangents, work)
         if length == 0.0:
             return 0.0, 0.0
         value = guard_value(model, transition, t + length, work.new, work.scalar)

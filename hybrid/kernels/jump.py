@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, types, void
+from numba import boolean, float64, int64, njit, void
 
 from hybrid.kernels.chatter import accumulation, chatter_matrix, drift, drift_is_known, remember_impulse
 from hybrid.kernels.codes import (
@@ -28,6 +28,7 @@ from hybrid.kernels.codes import (
     PHASE,
     PHASE_OF_RUN,
     PREVIOUS_MODE,
+    RESTING,
     SINGULAR_JUMPS,
     STEPS,
     TRANSVERSE,
@@ -40,7 +41,7 @@ from hybrid.kernels.guards import (
     rounding_band,
     widen_scale,
 )
-from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
 
 EPSILON = 2.220446049250313e-16
@@ -80,14 +81,14 @@ def speed_rounding(model, run, mode, t, work):
     return 16 * EPSILON * size
 
 
-@njit(types.Tuple((int64, boolean))(MODEL, RUN, WORK), **ENTRY)
+@njit(int64(MODEL, RUN, WORK), **ENTRY)
 def enter(model, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
     The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, and from its
     acceleration where the speed vanishes too. A guard that the state has come to lie on or beyond fires at
     once, except the transition that has just fired: if the state moves on through its guard the crossing is
-    done, and if it rests there the second value is true: the transition would fire for ever. A guard that
+    done, and if it rests there the answer is ``RESTING``: the transition would fire for ever. A guard that
     fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
@@ -126,7 +127,7 @@ def enter(model, run, work):
             and (on_guard or landed or model.boundary[transition] == 1)
         ):
             fires = transition
-    return fires, stuck
+    return RESTING if stuck else fires
 
 
 @njit(float64(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **ENTRY)
@@ -238,7 +239,7 @@ def move(model, run, transition, target, x_plus):
     run.count[PHASE_OF_RUN] = ENTERING
 
 
-@njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **KERNEL)
+@njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **PART)
 def jump(model, method, run, record, transition, tangents, orthonormal, work):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
     mode, target = run.count[MODE], model.target[transition]
@@ -287,7 +288,7 @@ def forward(run, period, span):
     run.clock[PHASE] = phase
 
 
-@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **KERNEL)
+@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)
 def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
     """After a jump: if its like accumulate before the end of the run, go to their limit. Returns whether it did.
 
@@ -316,3 +317,14 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
     move(model, run, transition, target, x_limit)
     return True
+
+
+@njit(void(MODEL, RUN, int64, int64, boolean, WORK), **PART)
+def rest(model, run, limit_mode, tangents, orthonormal, work):
+    """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard already."""
+    transition = run.count[LAST_FIRED]
+    if tangents > 0:
+        chatter_matrix(model, run, transition, work)
+        carry_tangents(model, run, tangents, orthonormal, work)
+    run.count[PREVIOUS_MODE] = run.count[MODE]
+    run.count[MODE] = limit_mode

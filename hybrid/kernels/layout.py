@@ -7,7 +7,7 @@ one after the other, so that each of them is contiguous. ``n`` is the dimension,
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64, types, void
+from numba import boolean, float64, int64, types, void
 
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
@@ -228,6 +228,39 @@ RECORD = types.NamedTuple(
     Record,
 )
 
+
+class Parts(NamedTuple):
+    """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
+
+    What is linked into a kernel is optimised again with it; what comes as an argument is not, and the implicit
+    step need not even exist where the method is explicit.
+    """
+
+    attempt_implicit: object
+    enter: object
+    jump: object
+    finish_chatter: object
+    rest: object
+    first_in_order: object
+
+
+PARTS = types.NamedTuple(
+    (
+        types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK)),
+        types.FunctionType(int64(MODEL, RUN, WORK)),
+        types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK)),
+        types.FunctionType(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK)),
+        types.FunctionType(void(MODEL, RUN, int64, int64, boolean, WORK)),
+        types.FunctionType(int64(MODEL, RUN, int64, WORK)),
+    ),
+    Parts,
+)
+
+# The driver itself comes as an argument to those who call it, for the same reason.
+ADVANCE = types.FunctionType(
+    int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
+)
+
 # A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time
 # to compile. Sums may be reordered and fused, but nan and infinity keep their meaning.
 ENTRY = {
@@ -236,6 +269,7 @@ ENTRY = {
     "cache": True,
     "fastmath": {"contract", "reassoc", "nsz"},
 }
-KERNEL = ENTRY | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+PART = ENTRY | {"no_cpython_wrapper": True}
+KERNEL = PART | {"no_cfunc_wrapper": True}
 # Small and called at every stage: passing the tuples would cost as much as the work.
 INLINE = KERNEL | {"forceinline": True}

@@ -9,7 +9,7 @@ import math
 
 from numba import boolean, float64, int64, njit, void
 
-from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
+from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, PART, VECTOR, WORK
 from hybrid.kernels.linear import factorise, substitute
 from hybrid.kernels.step import combine, error_ratio, estimate_error
 
@@ -166,7 +166,7 @@ def solve_tangents(model, method, mode, t, h, y, tangents, work):
     return True
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
 def attempt_radau(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 

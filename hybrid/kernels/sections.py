@@ -1,38 +1,36 @@
 """Stroboscopic points of a run, taken without leaving the compiled code."""
 
-from numba import boolean, float64, int64, njit, types
+from numba import float64, int64, njit, types
 
 from hybrid.kernels.codes import CYCLE, DONE, JUMPS, MODE
 from hybrid.kernels.layout import (
+    ADVANCE,
     ENTRY,
     INDEX_MATRIX,
     MATRIX,
     METHOD,
     MODEL,
+    PARTS,
     RECORD,
     RUN,
     WORK,
 )
 
-ADVANCE = types.FunctionType(
-    int64(MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
-)
-
 
 @njit(
     types.UniTuple(int64, 2)(
-        ADVANCE, MODEL, METHOD, RUN, RECORD, WORK, float64, int64, int64, MATRIX, INDEX_MATRIX
+        ADVANCE, PARTS, MODEL, METHOD, RUN, RECORD, WORK, float64, int64, int64, MATRIX, INDEX_MATRIX
     ),
     **ENTRY,
 )
-def strobe(advance, model, method, run, record, work, phase, max_steps, max_jumps, states, places):
+def strobe(advance, parts, model, method, run, record, work, phase, max_steps, max_jumps, states, places):
     """State ``(N, n)``, and cycle, mode and jump count ``(N, 3)``, at ``phase`` of the next N cycles.
 
     Returns how many were reached, and the driver's code.
     """
     for done in range(states.shape[0]):
         cycle = run.count[CYCLE] + 1
-        code = advance(model, method, run, record, 0, False, cycle, phase, max_steps, max_jumps, work)
+        code = advance(parts, model, method, run, record, 0, False, cycle, phase, max_steps, max_jumps, work)
         if code != DONE:
             return done, code
         for i in range(model.dimension):

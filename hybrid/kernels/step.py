@@ -4,7 +4,7 @@ import math
 
 from numba import float64, int64, njit, void
 
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, PART, VECTOR, WORK
 
 
 @njit(void(MODEL, int64, float64, VECTOR, int64, VECTOR), **INLINE)
@@ -150,3 +150,9 @@ def starting_step(model, method, mode, t, y, tangents, work):
     if not steepest > 1e-15:
         return min(max(1e-6, 1e-3 * h), method.max_step)
     return min(100.0 * h, (0.01 / steepest) ** method.exponent, method.max_step)
+
+
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
+def no_attempt(model, method, mode, t, h, y, tangents, work):
+    """Stands in for the implicit step where the method is explicit."""
+    return math.nan
