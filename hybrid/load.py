@@ -6,16 +6,36 @@ import importlib
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 
+DRIVER = "hybrid.kernels.drive"
 MESSAGE = "hybrid: compiling the kernels, once for all models (about 20 s) ..."
 
 
 @cache
-def load_kernels(module: str = "hybrid.kernels.drive") -> ModuleType:
+def load_kernels(module: str = DRIVER) -> ModuleType:
     """The kernel module of that name, compiled now or taken from the cache."""
     sources = sorted((Path(__file__).parent / "kernels").glob("*.py"))
     texts = [path.read_text(encoding="utf-8") for path in sources]
     with compiled_into(cache_directory() / f"kernels-{source_key(*texts)}"), announced(MESSAGE):
         return importlib.import_module(module)
+
+
+def address(kernel: Any) -> Any:
+    """A compiled kernel as a first-class function that may stand in a tuple of arguments."""
+    from numba.core.types import WrapperAddressProtocol
+
+    (signature,) = kernel.nopython_signatures
+    compiled = kernel.overloads[signature.args]
+    pointer = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
+    class Address(WrapperAddressProtocol):  # type: ignore[misc]
+        def __wrapper_address__(self) -> int:
+            return int(pointer)
+
+        def signature(self) -> Any:
+            return signature
+
+    return Address()

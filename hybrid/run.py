@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import attrs
@@ -11,7 +12,7 @@ import numpy as np
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.load import load_kernels
+from hybrid.load import address, load_kernels
 from hybrid.solvers import DOP853, RungeKutta
 from hybrid.status import Status, StatusCode, run_status
 from hybrid.system import HybridSystem
@@ -44,22 +45,23 @@ def method_tuple(solver: RungeKutta) -> Any:
     )
 
 
-def driver_parts(solver: RungeKutta) -> Any:
-    """The pieces that the driver calls now and then; the implicit step is loaded only for a solver that needs it."""
+@cache
+def driver_parts(implicit: bool) -> Any:
+    """The pieces that the driver is handed; those of the implicit step are loaded only for a solver that needs them."""
     from hybrid.kernels.layout import Parts
 
     jumps, corners = load_kernels("hybrid.kernels.jump"), load_kernels("hybrid.kernels.corner")
-    if solver.tableau.implicit:
+    if implicit:
         attempt = load_kernels("hybrid.kernels.radau").attempt_radau
     else:
-        attempt = load_kernels("hybrid.kernels.step").no_attempt
+        attempt = load_kernels("hybrid.kernels.step").attempt_explicit
     return Parts(
-        attempt_implicit=attempt,
-        enter=jumps.enter,
-        jump=jumps.jump,
-        finish_chatter=jumps.finish_chatter,
-        rest=jumps.rest,
-        first_in_order=corners.first_in_order,
+        attempt=address(attempt),
+        enter=address(jumps.enter),
+        jump=address(jumps.jump),
+        finish_chatter=address(jumps.finish_chatter),
+        rest=address(jumps.rest),
+        first_in_order=address(corners.first_in_order),
     )
 
 
@@ -309,7 +311,15 @@ def start(
     run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
     phase0 = split_time(t0, model.period)[1]
     return Trajectory(
-        compiled, model, method, run, work, tangents, driver_parts(solver), solver.max_steps, phase0
+        compiled,
+        model,
+        method,
+        run,
+        work,
+        tangents,
+        driver_parts(bool(solver.tableau.implicit)),
+        solver.max_steps,
+        phase0,
     )
 
 

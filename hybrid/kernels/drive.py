@@ -4,7 +4,6 @@ import math
 
 from numba import boolean, float64, int64, njit, types, void
 
-from hybrid.kernels.attempt import attempt
 from hybrid.kernels.codes import (
     ACCUMULATION,
     CYCLE,
@@ -189,7 +188,7 @@ def find_event(parts, model, method, run, record, tangents, h, work):
         if shortened != NOT_THERE:
             return shortened, correction, fired
         ignored = fired
-        attempt(parts, model, method, mode, t, h, run.y, tangents, work)
+        parts.attempt(model, method, mode, t, h, run.y, tangents, work)
         run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, 0.0
         run.count[GRAZING_GUARD] = fired
         remember_grazing(model, method, run, record, t, h, work)
@@ -319,7 +318,7 @@ def advance(
         proposed = min(run.clock[NEXT_STEP], method.max_step)
         last = proposed >= remaining
         h = remaining if last else proposed
-        ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
+        ratio = parts.attempt(model, method, mode, t, h, run.y, tangents, work)
         run.count[STEPS] += 1
         if not ratio <= 1.0:
             run.count[REJECTED] += 1

@@ -4,7 +4,6 @@ import math
 
 from numba import float64, int64, njit, types, void
 
-from hybrid.kernels.attempt import attempt
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, lowest, stays
 from hybrid.kernels.codes import (
     GRAZING_GUARD,
@@ -290,7 +289,7 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
     length = theta * h
     for trial in range(MOST_LANDINGS):
-        attempt(parts, model, method, mode, t, length, y, tangents, work)
+        parts.attempt(model, method, mode, t, length, y, tangents, work)
         if length == 0.0:
             return 0.0, 0.0
         value = guard_value(model, transition, t + length, work.new, work.scalar)

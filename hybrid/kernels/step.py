@@ -88,7 +88,7 @@ def error_ratio(method, h, y, dimension, tangents, work):
     return worst
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **INLINE)
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
 def attempt_explicit(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 
@@ -150,9 +150,3 @@ def starting_step(model, method, mode, t, y, tangents, work):
     if not steepest > 1e-15:
         return min(max(1e-6, 1e-3 * h), method.max_step)
     return min(100.0 * h, (0.01 / steepest) ** method.exponent, method.max_step)
-
-
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
-def no_attempt(model, method, mode, t, h, y, tangents, work):
-    """Stands in for the implicit step where the method is explicit."""
-    return math.nan
