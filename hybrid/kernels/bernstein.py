@@ -58,9 +58,9 @@ def first_crossing(coefficients, degree, side, direction, stack):
     """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
 
     ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
-    that differs at once is a crossing at 0, or 0 if there was none; ``stack (depth, >= degree + 3)``, its last row scratch.
-    Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero at 1 exactly counts
-    as crossed if the slope there leads across.
+    that differs at once is a crossing at 0, or 0 if there was none; ``stack (depth, >= degree + 3)``, its
+    last row scratch. Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero
+    at 1 exactly counts as crossed if the slope there leads across.
     """
     scratch = stack[stack.shape[0] - 1]
     top = 0

@@ -102,8 +102,8 @@ class Run(NamedTuple):
     the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
     vanishes at the entry of the mode and has not been left since, 2 where its speed does too; ``first_step
     (modes,)`` remembers the step a mode began with; ``scale (n,)`` the size of the components over the last
-    step, against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the
-    tangent vectors by orthonormalisation.
+    step, against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of
+    the tangent vectors by orthonormalisation.
     """
 
     count: np.ndarray
