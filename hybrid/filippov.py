@@ -110,10 +110,10 @@ def filippov(
     if surface.may_attract(state, tuple(parameters)):
         modes.append(Mode("sliding", surface.sliding_field))
         transitions = [
-            Transition("below", "above", Guard(surface.crosses_up, +1)),
             Transition("below", "sliding", Guard(surface.arrives_from_below, +1)),
-            Transition("above", "below", Guard(surface.crosses_down, +1)),
+            Transition("below", "above", Guard(surface.crosses_up, +1)),
             Transition("above", "sliding", Guard(surface.arrives_from_above, +1)),
+            Transition("above", "below", Guard(surface.crosses_down, +1)),
             Transition("sliding", "above", Guard(surface.attraction, -1), Reset(_nowhere), name="undecided"),
             Transition("sliding", "above", Guard(surface.above_tangent, +1), Reset(surface.projection)),
             Transition("sliding", "below", Guard(surface.below_tangent, -1), Reset(surface.projection)),

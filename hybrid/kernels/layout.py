@@ -108,10 +108,11 @@ class Run(NamedTuple):
 
     ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
     the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
-    vanishes at the entry of the mode, 2 where its speed does too; ``first_step (modes,)`` remembers the step
-    a mode began with; ``scale (n,)`` the size of the components over the last step, against which rounding is
-    judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the tangent vectors by
-    orthonormalisation. ``trail (3, n + 1)`` follows the jumps of one transition to their limit.
+    vanishes at the entry of the mode and has not been left since, 2 where its speed does too; ``first_step
+    (modes,)`` remembers the step a mode began with; ``scale (n,)`` the size of the components over the last
+    step, against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of
+    the tangent vectors by orthonormalisation.
+    ``trail (3, n + 1)`` follows the jumps of one transition to their limit.
     """
 
     count: np.ndarray
@@ -232,10 +233,11 @@ RECORD = types.NamedTuple(
 class Parts(NamedTuple):
     """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
 
-    What is linked into a kernel is optimised again with it; what comes as an argument is not. ``attempt`` is the step of
-    the solver's kind: it tries a step of length ``h`` from ``y``, puts the result into ``work.new`` and returns the ratio
-    of its error to the tolerance; above 1, or nan, rejects. ``work.stages[0]`` holds the rates at ``(t, y)``, the rates at the
-    new point are left in ``work.stages[s]``.
+    What is linked into a kernel is optimised again with it; what comes as an argument is not. ``attempt`` is
+    the step of the solver's kind: it tries a step of length ``h`` from ``y``, puts the result into
+    ``work.new`` and returns the ratio of its error to the tolerance; above 1, or nan, rejects.
+    ``work.stages[0]`` holds the rates at ``(t, y)``, the rates at the new point are left in
+    ``work.stages[s]``.
     """
 
     attempt: object

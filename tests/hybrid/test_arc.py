@@ -126,7 +126,7 @@ class TestSamples:
         np.testing.assert_array_equal(arc.j, [0, 1, 3])
         np.testing.assert_allclose(arc.x, [ball_exact(t) for t in arc.t], atol=1e-12)
         assert len(arc.jumps) == 6
-        with pytest.raises(hybrid.ArgumentError, match="keeps samples only. Run simulate without samples="):
+        with pytest.raises(hybrid.ArgumentError, match=r"keeps samples only\. Run simulate without samples="):
             arc(0.5)
 
     def test_none(self):

@@ -25,7 +25,9 @@ class TestForced:
         orbit = periodic_orbit(vibroimpact(), np.array(exact["x0"]) * 1.001, mode="free")
         assert orbit.status.ok
         np.testing.assert_allclose(orbit.x0, exact["x0"], atol=1e-8)
-        np.testing.assert_allclose(in_order(orbit.multipliers), complex_pairs(exact["multipliers"]), atol=1e-6)
+        np.testing.assert_allclose(
+            in_order(orbit.multipliers), complex_pairs(exact["multipliers"]), atol=1e-6
+        )
         assert orbit.signature == ("free", "contact", "free")
         assert orbit.residual < 1e-10
 
@@ -47,7 +49,7 @@ class TestForced:
         impact = closed.theta / 2.8
         t0 = impact + 0.5
         start = simulate(OSCILLATOR, (0.0, -0.8 * closed.V), (impact, t0), parameters=parameters).x[-1]
-        orbit = periodic_orbit(OSCILLATOR, start + [1e-3, -1e-3], t0=t0, parameters=parameters)
+        orbit = periodic_orbit(OSCILLATOR, start + np.array([1e-3, -1e-3]), t0=t0, parameters=parameters)
         assert orbit.status.ok
         np.testing.assert_allclose(orbit.x0, start, atol=1e-8)
         np.testing.assert_allclose(in_order(orbit.multipliers), in_order(closed.multipliers), atol=1e-8)
@@ -131,7 +133,11 @@ class TestNoOrbit:
     @pytest.mark.parametrize(
         ("system", "arguments", "text"),
         [
-            (OSCILLATOR, {"period": 1.0}, "period is for autonomous systems; this one has the forcing period"),
+            (
+                OSCILLATOR,
+                {"period": 1.0},
+                "period is for autonomous systems; this one has the forcing period",
+            ),
             (OSCILLATOR, {"periods": 0}, "periods must be a whole number of at least 1; got 0"),
             (OSCILLATOR, {"tolerance": 0.0}, "tolerance must be positive; got 0.0"),
             (OSCILLATOR, {"max_iterations": -1}, "max_iterations must be a whole number of at least 0"),

@@ -194,8 +194,11 @@ class TestIdentities:
 
 class TestErrors:
     def test_a_graze_has_no_matrix(self):
-        with pytest.raises(hybrid.ArgumentError, match=r"Transition 'bounce': the saltation matrix does not exist at "
-                           r"t = 0.5, x = \(0.0, 0.0\); the transversality is"):  # fmt: skip
+        text = (
+            r"Transition 'bounce': the saltation matrix does not exist at t = 0.5, x = \(0.0, 0.0\); "
+            "the transversality is"
+        )
+        with pytest.raises(hybrid.ArgumentError, match=text):
             saltation_matrix(BALL, "bounce", 0.5, (0.0, 0.0))
 
     def test_a_graze_of_a_continuous_field_has(self):

@@ -1,8 +1,8 @@
 """Sections against simulate at the same times, and against the jumps themselves."""
 
-import attrs
 import math
 
+import attrs
 import numpy as np
 import pytest
 
@@ -77,7 +77,9 @@ class TestStroboscopic:
             stroboscopic_section(OSCILLATOR, **({"x0": (0.0, 0.0), "periods": 3} | arguments))
 
     def test_without_a_period(self):
-        with pytest.raises(hybrid.ArgumentError, match="needs a forcing period, and the system declares none"):
+        with pytest.raises(
+            hybrid.ArgumentError, match="needs a forcing period, and the system declares none"
+        ):
             stroboscopic_section(BALL, (1.0, 0.0), periods=3)
 
 

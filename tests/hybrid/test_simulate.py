@@ -105,9 +105,7 @@ class TestExactAnswers:
         np.testing.assert_allclose(arc.jumps.x_minus[:, 1], BALL["v_minus"][: len(exact)], rtol=1e-12)
         t, v = arc.jumps[-1].t, arc.jumps[-1].x_plus[1]
         end = 3.9 - t
-        np.testing.assert_allclose(
-            arc.x[-1], [v * end - 9.81 * end**2 / 2, v - 9.81 * end], atol=1e-13
-        )
+        np.testing.assert_allclose(arc.x[-1], [v * end - 9.81 * end**2 / 2, v - 9.81 * end], atol=1e-13)
 
     def test_impact_oscillator(self, oscillator):
         arc = simulate(oscillator, FLIGHT["x0"], (0.0, FLIGHT["t_end"]), solver=TIGHT)
@@ -619,7 +617,7 @@ class TestBadArguments:
                 Transition("b", "a", Guard(lambda t, x, p: x.x + 1, -1)),
             ],
         )
-        with pytest.raises(hybrid.ModelError, match="allowed in more than one mode: a, b. Choose one"):
+        with pytest.raises(hybrid.ModelError, match=r"allowed in more than one mode: a, b\. Choose one"):
             simulate(system, (0.0,), (0.0, 1.0))
 
     def test_a_guard_that_is_not_defined(self):

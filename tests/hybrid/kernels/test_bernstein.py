@@ -1,6 +1,7 @@
 """Root isolation against polynomials whose roots are known, in exact arithmetic until the last rounding."""
 
 from fractions import Fraction
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -64,10 +65,7 @@ def bernstein(power, degree=None):
     n = degree or len(power) - 1
     power = [*power, *[Fraction(0)] * (n + 1 - len(power))]
     return np.array(
-        [
-            float(sum(power[j] * Fraction(comb(k, j), comb(n, j)) for j in range(k + 1)))
-            for k in range(n + 1)
-        ]
+        [float(sum(power[j] * Fraction(comb(k, j), comb(n, j)) for j in range(k + 1))) for k in range(n + 1)]
     )
 
 
@@ -82,7 +80,7 @@ def exact_crossing(roots, pairs, direction):
     cuts = [Fraction(0), *inside, Fraction(1)]
     signs = [
         1 if sum(a * ((left + right) / 2) ** i for i, a in enumerate(power)) > 0 else -1
-        for left, right in zip(cuts, cuts[1:], strict=False)
+        for left, right in pairwise(cuts)
     ]
     for root, before, after in zip(inside, signs, signs[1:], strict=False):
         if before != after and direction in (0, after):
@@ -125,7 +123,7 @@ def test_scale_does_not_matter(roots, pairs, direction, scale):
 def test_against_sampling(values, direction):
     """Whatever sampling sees is not missed, and what is found is a zero."""
     coefficients = np.array(values)
-    if not 1e-3 < abs(coefficients[0]):
+    if not abs(coefficients[0]) > 1e-3:
         return
     side = 1 if coefficients[0] > 0 else -1
     theta, _ = crossing(coefficients, side, direction)

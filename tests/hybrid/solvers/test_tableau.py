@@ -126,9 +126,7 @@ def test_interpolant_joins_the_ends(solver):
     np.testing.assert_allclose(tableau.interpolant[-1], step, atol=2e-14)
     start, end = np.eye(len(step))[0], np.eye(len(step))[s]
     np.testing.assert_allclose(degree * tableau.interpolant[1], start, atol=1e-12)
-    np.testing.assert_allclose(
-        degree * (tableau.interpolant[-1] - tableau.interpolant[-2]), end, atol=1e-12
-    )
+    np.testing.assert_allclose(degree * (tableau.interpolant[-1] - tableau.interpolant[-2]), end, atol=1e-12)
 
 
 @every_solver
