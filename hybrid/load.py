@@ -31,7 +31,7 @@ def address(kernel: Any) -> Any:
     compiled = kernel.overloads[signature.args]
     pointer = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
-    class Address(WrapperAddressProtocol):  # type: ignore[misc]
+    class Address(WrapperAddressProtocol):
         def __wrapper_address__(self) -> int:
             return int(pointer)
 

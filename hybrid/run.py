@@ -47,7 +47,7 @@ def method_tuple(solver: RungeKutta) -> Any:
 
 @cache
 def driver_parts(implicit: bool) -> Any:
-    """The pieces that the driver is handed; those of the implicit step are loaded only for a solver that needs them."""
+    """The pieces that the driver is handed; the implicit step is loaded only for a solver that needs it."""
     from hybrid.kernels.layout import Parts
 
     jumps, corners = load_kernels("hybrid.kernels.jump"), load_kernels("hybrid.kernels.corner")
@@ -276,8 +276,8 @@ class Trajectory:
         if code == codes.DONE and ambiguous:
             return Status(
                 StatusCode.AMBIGUOUS_ORDER,
-                f"{ambiguous} times two guards were reached together and the order of their transitions mattered; "
-                "the one listed first was fired first.",
+                f"{ambiguous} times two guards were reached together and the order of their transitions "
+                "mattered; the one listed first was fired first.",
                 "Choose the order in which the transitions are listed, or add one for the corner.",
             )
         last = self.run.count[codes.LAST_FIRED]

@@ -174,8 +174,8 @@ class Transition:
     def _check_limit(self, attribute: attrs.Attribute[str | None], value: object) -> None:
         if value is not None and self.source != self.target:
             raise ModelError(
-                f"Transition {self.source}->{self.target}: accumulates_to={value!r} is for transitions from a mode "
-                "to itself, whose jumps may accumulate. Leave it out."
+                f"Transition {self.source}->{self.target}: accumulates_to={value!r} is for transitions from "
+                "a mode to itself, whose jumps may accumulate. Leave it out."
             )
 
     @name.default

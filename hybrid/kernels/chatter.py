@@ -66,7 +66,7 @@ def extrapolate(model, method, run, ratio, shift, span, work):
 
 @njit(float64(MODEL, METHOD, RUN, int64, float64, WORK), **KERNEL)
 def accumulation(model, method, run, transition, since_last, work):
-    """Follow the jumps of one transition; once their limit is known to tolerance, return the time to it, else 0.
+    """Follow the jumps of one transition; once their limit is known, return the time to it, else 0.
 
     To be called right after a jump, ``since_last`` after the one before. Components and limit time are
     extrapolated as geometric series, with an error of second order in the remaining speed; two successive
@@ -106,7 +106,7 @@ def accumulation(model, method, run, transition, since_last, work):
 
 @njit(void(MODEL, RUN, int64, float64, WORK), **KERNEL)
 def remember_impulse(model, run, transition, transversality, work):
-    """Keep the restitution of the jump to ``work.new``, and the direction it moves the state in, per unit of speed."""
+    """Keep the restitution of the jump to ``work.new``, and its direction per unit of speed."""
     n = model.dimension
     after = guard_speed(model, transition, run.clock[PHASE], work.new, work.field_after, work.gradient)
     run.clock[RESTITUTION] = -after / transversality
@@ -183,7 +183,7 @@ def size_of(matrix, n):
 
 @njit(boolean(MODEL, RUN, int64, float64, WORK), **KERNEL)
 def drift_is_known(model, run, target, span, work):
-    """Whether the tangents' drift over the rest of the chatter is an exponential of the resting mode's Jacobian.
+    """Whether the tangents' drift in what is left is an exponential of the resting mode's Jacobian.
 
     It is where that Jacobian does not change until the limit in ``work.settled``, or changes too little to
     matter. The Jacobian at the limit is left in ``work.jacobian``.

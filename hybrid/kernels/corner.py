@@ -79,7 +79,7 @@ def order_matters(model, run, one, other, work):
 
 @njit(int64(MODEL, RUN, int64, WORK), **PART)
 def first_in_order(model, run, fired, work):
-    """Of the transitions due at the point just landed on, the one listed first; notes whether the order matters."""
+    """Of the transitions due where the run landed, the one listed first; notes whether order matters."""
     other = companion(model, run, fired, work)
     if other == NO_TRANSITION:
         return fired

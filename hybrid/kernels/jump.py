@@ -290,7 +290,7 @@ def forward(run, period, span):
 
 @njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)
 def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
-    """After a jump: if its like accumulate before the end of the run, go to their limit. Returns whether it did.
+    """After a jump: if its like accumulate before the end of the run, go to their limit; says whether it did.
 
     The limit is a jump of its own, into the mode that the transition names for it, if it names one.
     """
@@ -321,7 +321,7 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
 
 @njit(void(MODEL, RUN, int64, int64, boolean, WORK), **PART)
 def rest(model, run, limit_mode, tangents, orthonormal, work):
-    """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard already."""
+    """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     transition = run.count[LAST_FIRED]
     if tangents > 0:
         chatter_matrix(model, run, transition, work)

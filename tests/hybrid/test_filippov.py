@@ -408,10 +408,10 @@ class TestModel:
     def test_names(self, block):
         assert block.mode_names == ("below", "above", "sliding")
         assert block.transition_names == (
-            "below->above",
             "below->sliding",
-            "above->below",
+            "below->above",
             "above->sliding",
+            "above->below",
             "undecided",
             "sliding->above",
             "sliding->below",

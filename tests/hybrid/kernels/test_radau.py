@@ -9,9 +9,11 @@ from hybrid.load import load_kernels
 from hybrid.run import start
 
 load_kernels()
-from hybrid.kernels.attempt import attempt as attempt_inlined  # noqa: E402
 from hybrid.kernels.layout import METHOD, MODEL, VECTOR, WORK  # noqa: E402
-from hybrid.kernels.radau import NOT_SOLVED  # noqa: E402
+from hybrid.kernels.radau import (
+    NOT_SOLVED,
+    attempt_radau,
+)
 
 # Newton's iteration to rounding; fixed steps ignore the error ratio.
 TIGHT = hybrid.RadauIIA(rtol=1e-13, atol=1e-14)
@@ -19,7 +21,7 @@ TIGHT = hybrid.RadauIIA(rtol=1e-13, atol=1e-14)
 
 @njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
 def attempt(model, method, mode, t, h, y, tangents, work):
-    return attempt_inlined(model, method, mode, t, h, y, tangents, work)
+    return attempt_radau(model, method, mode, t, h, y, tangents, work)
 
 
 def system(*fields, state, **parameters):
