@@ -217,7 +217,7 @@ def composed_crossing(model, method, run, transition, t, h, offset, on_guard, si
 
 @njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, int64, WORK), **INLINE)
 def earliest_crossing(model, method, run, t, h, ignored, work):
-    """Earliest crossing on the attempted step over the guards of the mode but ``ignored``, and its transition.
+    """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
     Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)``; the sides of guards without a crossing
     are brought up to date, to the end of the step, and guards that were left are no longer held to be zero at

@@ -10,10 +10,7 @@ from hybrid.run import start
 
 load_kernels()
 from hybrid.kernels.layout import METHOD, MODEL, VECTOR, WORK  # noqa: E402
-from hybrid.kernels.radau import (
-    NOT_SOLVED,
-    attempt_radau,
-)
+from hybrid.kernels.radau import NOT_SOLVED, attempt_radau  # noqa: E402
 
 # Newton's iteration to rounding; fixed steps ignore the error ratio.
 TIGHT = hybrid.RadauIIA(rtol=1e-13, atol=1e-14)
