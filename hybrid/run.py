@@ -266,12 +266,31 @@ class Trajectory:
             )
         )
 
+    def _grazed(self) -> Status:
+        grazed = int(self.run.count[codes.ILL_CONDITIONED])
+        largest = self.run.clock[codes.LARGEST_SALTATION]
+        return Status(
+            StatusCode.SUCCESS,
+            f"Reached the end. {grazed} of {self.jumps} jumps grazed within the tolerances: their saltation "
+            f"matrices, with entries up to {largest:.2g}, stand for a square root.",
+            "Tighten the tolerances to resolve them, or move the parameters away.",
+        )
+
     def no_record(self) -> Any:
         """A record that keeps nothing."""
         return empty_record(self.model.dimension, len(self.method.interpolant) - 1)
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
+        singular = int(self.run.count[codes.SINGULAR_JUMPS])
+        if self.tangents and singular:
+            return Status(
+                StatusCode.SINGULAR_SALTATION,
+                f"{singular} of {self.jumps} jumps had no saltation matrix: they grazed exactly.",
+                "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
+            )
+        if self.tangents and code == codes.DONE and self.run.count[codes.ILL_CONDITIONED]:
+            return self._grazed()
         ambiguous = int(self.run.count[codes.ORDER_MATTERED])
         if code == codes.DONE and ambiguous:
             return Status(

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status, StatusCode
+from hybrid import ArgumentError, HybridSystem, Status
 from hybrid.kernels import codes
 from hybrid.load import load_kernels
 from hybrid.progress import Progress, progress_bar
@@ -184,6 +184,7 @@ class _Estimate:
         self.cycle = run.count[codes.CYCLE : codes.CYCLE + 1].copy()
         self.phase = run.clock[codes.PHASE : codes.PHASE + 1].copy()
         self.record = trajectory.no_record()
+        self.grazed_growth = 0.0
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
         trajectory, k = self.trajectory, self.trajectory.tangents
@@ -192,6 +193,7 @@ class _Estimate:
             _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
         mean, batches = TaperedMean(k + 1), new_batches(k + 1)
         jumps = trajectory.jumps
+        self.grazed_growth = trajectory.run.clock[codes.ILL_CONDITIONED_GROWTH]
         growths = np.empty((0, k))
         if code == codes.DONE:
             growths, code = self._collect(intervals, mean, batches, history, bar)
@@ -207,7 +209,7 @@ class _Estimate:
             jumps_per_interval=(trajectory.jumps - jumps) / max(mean.count, 1),
             mode=trajectory.mode,
             x=trajectory.x,
-            status=self._status(code),
+            status=self._status(code, max(mean.count, 1)),
         )
 
     def _collect(
@@ -242,12 +244,12 @@ class _Estimate:
                 kept.append(rates[:done, :-1])
         return np.concatenate(kept), code
 
-    def _status(self, code: int) -> Status:
-        singular = int(self.trajectory.run.count[codes.SINGULAR_JUMPS])
-        if code == codes.DONE and singular:
-            return Status(
-                StatusCode.SINGULAR_SALTATION,
-                f"{singular} of {self.trajectory.jumps} jumps had no saltation matrix: they graze.",
-                "The exponents mean nothing there; move the parameters away from the grazing.",
-            )
-        return self.trajectory.status(code)
+    def _status(self, code: int, intervals: int) -> Status:
+        status = self.trajectory.status(code)
+        run, grazed = self.trajectory.run, int(self.trajectory.run.count[codes.ILL_CONDITIONED])
+        if not status.ok or not grazed:
+            return status
+        share = (run.clock[codes.ILL_CONDITIONED_GROWTH] - self.grazed_growth) / (self.interval * intervals)
+        return attrs.evolve(
+            status, message=f"{status.message} They contribute {share:.3g} to the first exponent."
+        )

@@ -255,7 +255,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     if tangents > 0:
         before = run.growth[0]
         carry_tangents(model, run, tangents, orthonormal, work)
-        if kind == GRAZING:
+        if kind == GRAZING and orthonormal:
             run.clock[ILL_CONDITIONED_GROWTH] += run.growth[0] - before
     if mode == target and model.direction[transition] != 0:
         remember_impulse(model, run, transition, transversality, work)
