@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, int64, njit, types, void
+from numba import float64, int64, njit, types
 
 from hybrid.kernels.codes import (
     DIVERGENCE,
@@ -37,10 +37,10 @@ from lyapunov import statistics
 
 UNLIMITED = 9223372036854775807
 
-push = njit(void(MATRIX, INDICES, VECTOR), **KERNEL)(statistics.push)
+push = njit(**KERNEL)(statistics.push)
 
 
-@njit(types.Tuple((int64, float64))(float64, int64, float64, float64), **KERNEL)
+@njit(**KERNEL)
 def later(period, cycle, phase, interval):
     """Time an interval later, in periods and a phase; a forcing period later is exactly the next cycle."""
     if interval == period:
@@ -116,7 +116,7 @@ def growth_rates(
     return rates.shape[0], DONE
 
 
-@njit(float64(RUN, RUN, int64), **KERNEL)
+@njit(**KERNEL)
 def distance(run, other, n):
     """Euclidean distance of the states of two runs; the phase of the forcing is the same in both."""
     total = 0.0
@@ -125,7 +125,7 @@ def distance(run, other, n):
     return math.sqrt(total)
 
 
-@njit(void(RUN, RUN, int64, float64), **KERNEL)
+@njit(**KERNEL)
 def rescale(run, other, n, factor):
     """Multiply the distance of ``other`` from ``run`` by ``factor``, and put it in the mode of ``run``."""
     for i in range(n):

@@ -5,16 +5,16 @@ and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 
 else is cut in two. The coefficients' hull makes "no root" the cheap case, which nearly every step is.
 """
 
-from numba import boolean, float64, int64, njit, types, void
+from numba import njit
 
-from hybrid.kernels.layout import INLINE, KERNEL, MATRIX, VECTOR
+from hybrid.kernels.layout import INLINE, KERNEL
 
 NO_ROOT = 2.0
 # Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
 CLUSTER = 1e-14
 
 
-@njit(types.UniTuple(float64, 2)(VECTOR, int64, float64, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def value_and_slope(coefficients, degree, theta, scratch):
     """Value and derivative at ``theta`` by de Casteljau; ``coefficients``, ``scratch (degree + 1,)``."""
     for i in range(degree + 1):
@@ -28,7 +28,7 @@ def value_and_slope(coefficients, degree, theta, scratch):
     return scratch[0], slope
 
 
-@njit(float64(VECTOR, int64, int64, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def simple_root(coefficients, degree, sign_left, scratch):
     """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
     low, high = 0.0, 1.0
@@ -53,7 +53,7 @@ def simple_root(coefficients, degree, sign_left, scratch):
     return theta
 
 
-@njit(types.Tuple((float64, int64))(VECTOR, int64, int64, int64, MATRIX), **KERNEL)
+@njit(**KERNEL)
 def first_crossing(coefficients, degree, side, direction, stack):
     """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
 
@@ -118,7 +118,7 @@ def first_crossing(coefficients, degree, side, direction, stack):
     return NO_ROOT, side
 
 
-@njit(boolean(VECTOR, int64, int64, float64), **INLINE)
+@njit(**INLINE)
 def stays(coefficients, degree, side, band):
     """Whether all coefficients lie beyond ``band`` on one side: the proof that serves nearly every step."""
     for i in range(degree + 1):  # noqa: SIM110 (no generators in kernels)
@@ -127,7 +127,7 @@ def stays(coefficients, degree, side, band):
     return True
 
 
-@njit(void(VECTOR, int64, float64), **KERNEL)
+@njit(**KERNEL)
 def restrict(coefficients, degree, start):
     """Replace a polynomial, in place, by its restriction to ``[start, 1]`` as a polynomial on ``[0, 1]``."""
     for level in range(degree, 0, -1):
@@ -135,7 +135,7 @@ def restrict(coefficients, degree, start):
             coefficients[i] += start * (coefficients[i + 1] - coefficients[i])
 
 
-@njit(types.UniTuple(float64, 2)(VECTOR, int64, int64, MATRIX), **KERNEL)
+@njit(**KERNEL)
 def lowest(coefficients, degree, side, stack):
     """Place and value of the deepest interior minimum of ``side * polynomial``; ``NO_ROOT`` if there is none.
 
@@ -164,7 +164,7 @@ def lowest(coefficients, degree, side, stack):
     return best, depth
 
 
-@njit(int64(VECTOR, int64), **KERNEL)
+@njit(**KERNEL)
 def divide_by_theta(coefficients, degree):
     """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree.
 

@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, void
+from numba import njit
 
 from hybrid.kernels.codes import (
     CHATTER_JUMPS,
@@ -13,7 +13,7 @@ from hybrid.kernels.codes import (
     RESTITUTION,
 )
 from hybrid.kernels.guards import guard_acceleration, guard_speed, rounding_band
-from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, RUN, VECTOR, WORK
+from hybrid.kernels.layout import KERNEL
 
 # Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
 BEFORE = 0
@@ -29,7 +29,7 @@ ROUGH = 1e-6
 EPSILON = 2.220446049250313e-16
 
 
-@njit(float64(MODEL, RUN, int64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def remaining_chatter(model, run, transition, speed, work):
     """Time ``2 v / (a (1 - r))`` that infinitely many flights with speeds ``v, r v, r^2 v, ...`` still take.
 
@@ -45,7 +45,7 @@ def remaining_chatter(model, run, transition, speed, work):
     return 2.0 * speed / (pull * (1.0 - ratio))
 
 
-@njit(float64(MODEL, METHOD, RUN, float64, float64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def extrapolate(model, method, run, ratio, shift, span, work):
     """Limit of the state as a geometric series, into ``work.settled (n,)``, and how far to trust it.
 
@@ -64,7 +64,7 @@ def extrapolate(model, method, run, ratio, shift, span, work):
     return misfit
 
 
-@njit(float64(MODEL, METHOD, RUN, int64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def accumulation(model, method, run, transition, since_last, work):
     """Follow the jumps of one transition; once their limit is known, return the time to it, else 0.
 
@@ -104,7 +104,7 @@ def accumulation(model, method, run, transition, since_last, work):
     return span if found else 0.0
 
 
-@njit(void(MODEL, RUN, int64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def remember_impulse(model, run, transition, transversality, work):
     """Keep the restitution of the jump to ``work.new``, and its direction per unit of speed."""
     n = model.dimension
@@ -114,7 +114,7 @@ def remember_impulse(model, run, transition, transversality, work):
         run.trail[IMPULSE, i] = (work.new[i] - run.y[i]) / (after - transversality)
 
 
-@njit(void(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **KERNEL)
+@njit(**KERNEL)
 def speed_gradient(model, transition, mode, t, x, out, work):
     """Derivative of the guard's speed along the flow in the state, ``(n,)``.
 
@@ -143,7 +143,7 @@ def speed_gradient(model, transition, mode, t, x, out, work):
         out[j] += (up - down) / (2.0 * step)
 
 
-@njit(void(MODEL, RUN, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def chatter_matrix(model, run, transition, work):
     """Tangent map of a complete chatter at its beginning, into ``work.saltation (n, n)``.
 
@@ -169,7 +169,7 @@ def chatter_matrix(model, run, transition, work):
             work.saltation[i, j] = (1.0 if i == j else 0.0) - removed
 
 
-@njit(float64(MATRIX, int64), **KERNEL)
+@njit(**KERNEL)
 def size_of(matrix, n):
     """Largest row sum of the first ``n`` columns."""
     largest = 0.0
@@ -181,7 +181,7 @@ def size_of(matrix, n):
     return largest
 
 
-@njit(boolean(MODEL, RUN, int64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def drift_is_known(model, run, target, span, work):
     """Whether the tangents' drift in what is left is an exponential of the resting mode's Jacobian.
 
@@ -198,7 +198,7 @@ def drift_is_known(model, run, target, span, work):
     return size_of(work.jacobian, n) * span <= (LONG if constant else SHORT)
 
 
-@njit(void(VECTOR, int64, int64, MATRIX, float64, VECTOR, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def drift(y, n, tangents, matrix, span, term, image):
     """Multiply the tangent vectors in ``y`` by ``exp(matrix span)``, by its series; scratch ``(n,)``."""
     for start in range(n, n * (1 + tangents), n):

@@ -1,6 +1,6 @@
 """Guards reached together: whether the order in which they fire matters."""
 
-from numba import boolean, float64, int64, njit
+from numba import int64, njit
 
 from hybrid.kernels.codes import (
     MODE,
@@ -10,14 +10,14 @@ from hybrid.kernels.codes import (
     SIMULTANEOUS,
 )
 from hybrid.kernels.guards import guard_speed, guard_value, rounding_band
-from hybrid.kernels.layout import KERNEL, MODEL, PART, RUN, VECTOR, WORK
+from hybrid.kernels.layout import KERNEL, MODEL, PART, RUN, WORK
 
 MOST_JUMPS = 50
 # States that differ by less than this, relative to their sizes, came out the same.
 SAME = 1e-9
 
 
-@njit(boolean(MODEL, RUN, int64, int64, float64, VECTOR, WORK), **KERNEL)
+@njit(**KERNEL)
 def is_due(model, run, transition, mode, t, x, work):
     """Whether a guard is zero, up to rounding, and moving to where its transition fires."""
     value = guard_value(model, transition, t, x, work.scalar)
@@ -28,7 +28,7 @@ def is_due(model, run, transition, mode, t, x, work):
     return speed * model.direction[transition] > 0.0
 
 
-@njit(int64(MODEL, RUN, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def companion(model, run, fired, work):
     """Another transition due at the very point where ``fired`` has landed, or none."""
     mode = run.count[MODE]
@@ -39,7 +39,7 @@ def companion(model, run, fired, work):
     return NO_TRANSITION
 
 
-@njit(int64(MODEL, RUN, int64, VECTOR, WORK), **KERNEL)
+@njit(**KERNEL)
 def settle(model, run, first, out, work):
     """State ``(n,)`` after ``first`` and all that it sets off at the same instant; returns the mode."""
     n, t = model.dimension, run.clock[PHASE]
@@ -63,7 +63,7 @@ def settle(model, run, first, out, work):
     return mode
 
 
-@njit(boolean(MODEL, RUN, int64, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def order_matters(model, run, one, other, work):
     """Whether firing ``one`` or ``other`` first leads to different states or modes."""
     mode_one = settle(model, run, one, work.error, work)

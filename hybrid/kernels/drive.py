@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, types, void
+from numba import boolean, float64, int64, njit
 
 from hybrid.kernels.codes import (
     ACCUMULATION,
@@ -65,7 +65,7 @@ EPSILON = 2.220446049250313e-16
 MOST_JUMPS_AT_ONCE = 100
 
 
-@njit(int64(MODEL, RUN, WORK), **KERNEL)
+@njit(**KERNEL)
 def arrived(model, run, work):
     """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run."""
     mode, t = run.count[MODE], run.clock[PHASE]
@@ -83,7 +83,7 @@ def arrived(model, run, work):
     return NO_TRANSITION
 
 
-@njit(boolean(MODEL, int64), **INLINE)
+@njit(**INLINE)
 def all_affine(model, mode):
     """Whether every guard of the mode is affine, so that following them needs no interpolant of the state."""
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -92,7 +92,7 @@ def all_affine(model, mode):
     return True
 
 
-@njit(void(MODEL, METHOD, RUN, RECORD, float64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def remember_step(model, method, run, record, t, h, work):
     """Write the step just taken from ``run.y`` into the record; its stages are those of ``work``."""
     slot = record.used[0]
@@ -109,7 +109,7 @@ def remember_step(model, method, run, record, t, h, work):
     record.used[0] = slot + 1
 
 
-@njit(void(MODEL, METHOD, RUN, int64, float64, float64, WORK), **INLINE)
+@njit(**INLINE)
 def accept(model, method, run, tangents, h, correction, work):
     """Move the run to the end of the attempted step in ``work.new``."""
     n = model.dimension
@@ -131,13 +131,13 @@ def accept(model, method, run, tangents, h, correction, work):
     forward(run, model.period, h + correction)
 
 
-@njit(float64(MODEL, RUN, int64, float64), **INLINE)
+@njit(**INLINE)
 def time_left(model, run, stop_cycle, stop_phase):
     """Time until the stop; periods are counted, not measured, so that none of their digits is lost."""
     return (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - run.clock[PHASE])
 
 
-@njit(void(MODEL, METHOD, RUN, RECORD, float64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def remember_grazing(model, method, run, record, t, h, work):
     """Count the grazing found on the attempted step, and write it into the record if that keeps any."""
     run.count[GRAZINGS] += 1
@@ -160,9 +160,7 @@ def remember_grazing(model, method, run, record, t, h, work):
     record.used[2] = slot + 1
 
 
-@njit(
-    types.Tuple((float64, float64, int64))(PARTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK), **KERNEL
-)
+@njit(**KERNEL)
 def find_event(parts, model, method, run, record, tangents, h, work):
     """Shorten the attempted step to its first event, if there is one.
 
@@ -195,7 +193,7 @@ def find_event(parts, model, method, run, record, tangents, h, work):
     return h, 0.0, NO_TRANSITION
 
 
-@njit(void(METHOD, int64, WORK), **INLINE)
+@njit(**INLINE)
 def carry_rates(method, length, work):
     """The rates at the end of a step are those at the start of the next."""
     s = method.b.shape[0]
@@ -203,7 +201,7 @@ def carry_rates(method, length, work):
         work.stages[0, i] = work.stages[s, i]
 
 
-@njit(float64(METHOD, RUN, float64, float64), **INLINE)
+@njit(**INLINE)
 def growth_factor(method, run, h, ratio):
     """Factor to the next step from this error ratio, and from its trend over the last two steps.
 
@@ -217,7 +215,7 @@ def growth_factor(method, run, h, ratio):
     return min(GROW, max(SHRINK, SAFETY * factor))
 
 
-@njit(boolean(RUN, int64), **KERNEL)
+@njit(**KERNEL)
 def finite(run, length):
     """Whether the first ``length`` entries of the run's vector are finite."""
     total = 0.0

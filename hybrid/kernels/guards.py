@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, int64, njit, types, void
+from numba import float64, njit, void
 
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, lowest, stays
 from hybrid.kernels.codes import (
@@ -12,7 +12,7 @@ from hybrid.kernels.codes import (
     MODE,
     NO_TRANSITION,
 )
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, PARTS, RUN, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MODEL, VECTOR
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
 # crossings that reach no farther beyond zero than the misfit are lost.
@@ -31,7 +31,7 @@ MOST_LANDINGS = 120
 NOT_THERE = -1.0
 
 
-@njit(float64(MODEL, int64, float64, VECTOR, VECTOR), **INLINE)
+@njit(**INLINE)
 def guard_value(model, transition, t, x, scalar):
     """``g(t, x, p)``; ``scalar (1,)`` is scratch."""
     model.guard(transition, t, x, model.parameters, scalar)
@@ -45,7 +45,7 @@ def guard_values(model, t, x, out):
         model.guard(transition, t, x, model.parameters, out[transition : transition + 1])
 
 
-@njit(float64(MODEL, int64, float64, VECTOR, VECTOR, VECTOR), **INLINE)
+@njit(**INLINE)
 def guard_speed(model, transition, t, x, field, gradient):
     """Transversality ``D_t g + D_x g f``; leaves ``(D_x g, D_t g)`` in ``gradient (n + 1,)``."""
     model.guard_gradient(transition, t, x, model.parameters, gradient)
@@ -55,7 +55,7 @@ def guard_speed(model, transition, t, x, field, gradient):
     return speed
 
 
-@njit(float64(MODEL, RUN, float64, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def rounding_band(model, run, t, gradient):
     """How far from zero rounding alone can leave a guard whose state has the sizes in ``run.scale``."""
     n = model.dimension
@@ -65,7 +65,7 @@ def rounding_band(model, run, t, gradient):
     return 16 * 2.220446049250313e-16 * size
 
 
-@njit(void(MODEL, RUN, WORK), **KERNEL)
+@njit(**KERNEL)
 def widen_scale(model, run, work):
     """Judge rounding at the start and the end of a run alike, whatever steps lead there.
 
@@ -79,7 +79,7 @@ def widen_scale(model, run, work):
         run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
 
 
-@njit(int64(MODEL, METHOD, int64, float64, float64, VECTOR, float64, WORK), **INLINE)
+@njit(**INLINE)
 def affine_polynomial(model, method, transition, t, h, x, value, work):
     """Bernstein coefficients of an affine guard on the interpolant, exactly; returns their degree."""
     n = model.dimension
@@ -98,7 +98,7 @@ def affine_polynomial(model, method, transition, t, h, x, value, work):
     return degree
 
 
-@njit(float64(MODEL, int64, float64, float64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def value_on_interpolant(model, transition, t, h, theta, work):
     """The guard on the interpolant at ``t + theta h``; ``work.coefficients`` holds the interpolant."""
     degree = work.coefficients.shape[0] - 1
@@ -113,7 +113,7 @@ def value_on_interpolant(model, transition, t, h, theta, work):
     return guard_value(model, transition, t + theta * h, work.state, work.scalar)
 
 
-@njit(float64(MODEL, int64, float64, float64, float64, float64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def fit_polynomial(model, transition, t, h, start, end, offset, work):
     """Fit a polynomial to ``g - offset`` over ``[start, end]`` of the step; returns its misfit between nodes.
 
@@ -143,7 +143,7 @@ def fit_polynomial(model, transition, t, h, start, end, offset, work):
     return misfit
 
 
-@njit(float64(METHOD, RUN, VECTOR, int64), **INLINE)
+@njit(**INLINE)
 def error_band(method, run, gradient, n):
     """How far the tolerances can move a guard with this gradient: closer to zero than that is a grazing."""
     size = 0.0
@@ -152,7 +152,7 @@ def error_band(method, run, gradient, n):
     return size
 
 
-@njit(void(RUN, int64, int64, int64, float64, float64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def note_grazing(run, transition, degree, side, band, start, end, work):
     """Keep the earliest place of the step where a guard comes within ``band`` of zero and turns back.
 
@@ -165,10 +165,7 @@ def note_grazing(run, transition, degree, side, band, start, end, work):
         run.count[GRAZING_GUARD] = transition
 
 
-@njit(
-    types.Tuple((float64, int64))(MODEL, METHOD, RUN, int64, float64, float64, float64, int64, int64, WORK),
-    **KERNEL,
-)
+@njit(**KERNEL)
 def composed_crossing(model, method, run, transition, t, h, offset, on_guard, side, work):
     """First crossing of a guard that is not affine, by polynomials fitted piecewise along the interpolant.
 
@@ -215,7 +212,7 @@ def composed_crossing(model, method, run, transition, t, h, offset, on_guard, si
     return NO_ROOT, side
 
 
-@njit(types.Tuple((float64, int64))(MODEL, METHOD, RUN, float64, float64, int64, WORK), **INLINE)
+@njit(**INLINE)
 def earliest_crossing(model, method, run, t, h, ignored, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
@@ -268,12 +265,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
     return earliest, fired
 
 
-@njit(
-    types.UniTuple(float64, 2)(
-        PARTS, MODEL, METHOD, int64, int64, int64, float64, float64, float64, VECTOR, int64, WORK
-    ),
-    **KERNEL,
-)
+@njit(**KERNEL)
 def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents, work):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
@@ -315,7 +307,7 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     return NOT_THERE, 0.0
 
 
-@njit(float64(MODEL, int64, int64, float64, VECTOR, WORK), **KERNEL)
+@njit(**KERNEL)
 def guard_acceleration(model, transition, mode, t, x, work):
     """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
 

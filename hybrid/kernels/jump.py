@@ -47,7 +47,7 @@ from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalis
 EPSILON = 2.220446049250313e-16
 
 
-@njit(void(MODEL, RUN, WORK), **KERNEL)
+@njit(**KERNEL)
 def sides_at_jump(model, run, work):
     """Bring the sides of the guards of the mode, known at the ends of a step only, to the point of the jump.
 
@@ -67,7 +67,7 @@ def sides_at_jump(model, run, work):
             run.side[transition] = -direction
 
 
-@njit(float64(MODEL, RUN, int64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def speed_rounding(model, run, mode, t, work):
     """How far from zero rounding of the state alone can leave the speed of the guard in ``work.gradient``."""
     n = model.dimension
@@ -156,7 +156,7 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
     return transversality
 
 
-@njit(void(MODEL, RUN, RECORD, int64, float64, int64, VECTOR, WORK), **KERNEL)
+@njit(**KERNEL)
 def remember_jump(model, run, record, transition, transversality, kind, x_plus, work):
     """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any."""
     n, slot = model.dimension, record.used[1]
@@ -173,7 +173,7 @@ def remember_jump(model, run, record, transition, transversality, kind, x_plus, 
     record.used[1] = slot + 1
 
 
-@njit(void(MODEL, RUN, int64, boolean, WORK), **KERNEL)
+@njit(**KERNEL)
 def carry_tangents(model, run, tangents, orthonormal, work):
     """Multiply the tangent vectors by ``work.saltation``, and add its log-determinant to the run's.
 
@@ -196,7 +196,7 @@ def carry_tangents(model, run, tangents, orthonormal, work):
     run.clock[LOG_DETERMINANT] += log_abs_determinant(work.saltation, work.reset_jacobian, n)
 
 
-@njit(boolean(MODEL, METHOD, RUN, int64, float64, WORK), **KERNEL)
+@njit(**KERNEL)
 def is_grazing(model, method, run, transition, transversality, work):
     """Whether the state dips beyond the guard by less than the tolerances can tell.
 
@@ -210,7 +210,7 @@ def is_grazing(model, method, run, transition, transversality, work):
     return depth <= error_band(method, run, work.gradient, model.dimension)
 
 
-@njit(void(RUN, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def judge(run, n, work):
     """Keep the largest entry of any saltation matrix so far, and count those that are not finite."""
     largest = 0.0
@@ -222,7 +222,7 @@ def judge(run, n, work):
         run.count[SINGULAR_JUMPS] += 1
 
 
-@njit(void(MODEL, RUN, int64, int64, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def move(model, run, transition, target, x_plus):
     """Put the run behind a jump: state, mode and counters."""
     for i in range(model.dimension):
@@ -262,7 +262,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     move(model, run, transition, target, work.new)
 
 
-@njit(void(RUN, RECORD, int64, float64, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def remember_flight(run, record, n, span, x_limit):
     """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
     slot = record.used[0]
@@ -278,7 +278,7 @@ def remember_flight(run, record, n, span, x_limit):
     record.used[0] = slot + 1
 
 
-@njit(void(RUN, float64, float64), **KERNEL)
+@njit(**KERNEL)
 def forward(run, period, span):
     """Move the clock of a run on, keeping the phase below the period."""
     phase = run.clock[PHASE] + span

@@ -265,15 +265,14 @@ ADVANCE = types.FunctionType(
     int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
 )
 
-# A kernel that only kernels call needs no wrapper for Python, and those wrappers are most of what takes time
-# to compile. Sums may be reordered and fused, but nan and infinity keep their meaning.
-ENTRY = {
-    "nogil": True,
-    "error_model": "numpy",
-    "cache": True,
-    "fastmath": {"contract", "reassoc", "nsz"},
-}
+# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning.
+_MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
+# Called from Python, and kept on disk: these state their signatures.
+ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}
+# Handed to the driver as a first-class function.
 PART = ENTRY | {"no_cpython_wrapper": True}
-KERNEL = PART | {"no_cfunc_wrapper": True}
+# Called by other kernels only: it becomes part of them, so it is neither wrapped nor kept by itself and takes
+# its types from its callers. A process that finds its callers on disk never looks at it.
+KERNEL = _MATHEMATICS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # Small and called at every stage: passing the tuples would cost as much as the work.
 INLINE = KERNEL | {"forceinline": True}

@@ -1,11 +1,11 @@
 """Small dense linear systems, solved in place: LU factors with row exchanges."""
 
-from numba import boolean, int64, njit, void
+from numba import njit
 
-from hybrid.kernels.layout import INDICES, KERNEL, MATRIX, VECTOR
+from hybrid.kernels.layout import KERNEL
 
 
-@njit(boolean(MATRIX, INDICES, int64), **KERNEL)
+@njit(**KERNEL)
 def factorise(matrix, pivots, n):
     """Replace the leading ``(n, n)`` of ``matrix`` by its LU factors; false if it is singular or not finite.
 
@@ -32,7 +32,7 @@ def factorise(matrix, pivots, n):
     return True
 
 
-@njit(void(MATRIX, INDICES, int64, VECTOR), **KERNEL)
+@njit(**KERNEL)
 def substitute(matrix, pivots, n, vector):
     """Replace ``vector (n,)`` by the solution of the system that ``factorise`` has factored."""
     for i in range(n):

@@ -7,9 +7,9 @@ the end of the step, so the last of them is the derivative there.
 
 import math
 
-from numba import boolean, float64, int64, njit, void
+from numba import float64, int64, njit
 
-from hybrid.kernels.layout import KERNEL, MATRIX, METHOD, MODEL, PART, VECTOR, WORK
+from hybrid.kernels.layout import KERNEL, METHOD, MODEL, PART, VECTOR, WORK
 from hybrid.kernels.linear import factorise, substitute
 from hybrid.kernels.step import combine, error_ratio, estimate_error
 
@@ -22,7 +22,7 @@ NOT_SOLVED = 10.0
 LAST_LENGTH, LAST_MODE = 0, 1
 
 
-@njit(void(METHOD, float64, MATRIX, int64, int64, MATRIX), **KERNEL)
+@njit(**KERNEL)
 def fill_rows(method, h, jacobian, n, stage, matrix):
     """The ``n`` rows of collocation stage ``stage`` in ``I - h A (x) J``, with the Jacobian of that stage."""
     s = method.b.shape[0]
@@ -36,7 +36,7 @@ def fill_rows(method, h, jacobian, n, stage, matrix):
         matrix[row + i, row + i] += 1.0
 
 
-@njit(void(METHOD, int64, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def predict(method, mode, h, y, n, work):
     """First guess of the collocation derivatives: those of the last step's polynomial, or zero.
 
@@ -64,7 +64,7 @@ def predict(method, mode, h, y, n, work):
                     work.stages[stage, i] += weight * last[j - 1, i]
 
 
-@njit(void(METHOD, int64, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def remember(method, mode, h, y, n, work):
     """Keep the polynomial of this step for the next guess."""
     s = method.b.shape[0]
@@ -78,7 +78,7 @@ def remember(method, mode, h, y, n, work):
     last[s + 2, LAST_MODE] = mode if h > 0.0 else -1.0
 
 
-@njit(boolean(MODEL, METHOD, int64, float64, float64, VECTOR, WORK), **KERNEL)
+@njit(**KERNEL)
 def solve_stages(model, method, mode, t, h, y, work):
     """Simplified Newton iteration for the state's stages; their system is factored. False if it fails.
 
@@ -129,7 +129,7 @@ def solve_stages(model, method, mode, t, h, y, work):
     return change <= stalled
 
 
-@njit(boolean(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def solve_tangents(model, method, mode, t, h, y, tangents, work):
     """Stages of the tangent vectors, exactly: ``K_i = J_i (v + h sum_j a_ij K_j)`` is linear in them.
 

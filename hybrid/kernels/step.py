@@ -7,7 +7,7 @@ from numba import float64, int64, njit, void
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, PART, VECTOR, WORK
 
 
-@njit(void(MODEL, int64, float64, VECTOR, int64, VECTOR), **INLINE)
+@njit(**INLINE)
 def rates(model, mode, t, y, tangents, out):
     """Time derivative of ``y (n (1 + k),)`` into ``out``; with tangents, div f in the place after it."""
     if tangents == 0:
@@ -28,7 +28,7 @@ def flow_jacobian(model, mode, t, x, out):
     model.flow_jacobian(mode, t, x, model.parameters, out)
 
 
-@njit(void(VECTOR, float64, VECTOR, MATRIX, int64, int64, VECTOR), **INLINE)
+@njit(**INLINE)
 def combine(y, h, weights, stages, count, length, out):
     """``out = y + h * weights @ stages`` over the first ``count`` stages and ``length`` components."""
     for i in range(length):
@@ -41,7 +41,7 @@ def combine(y, h, weights, stages, count, length, out):
                 out[i] += weight * stage[i]
 
 
-@njit(void(METHOD, int64, WORK), **INLINE)
+@njit(**INLINE)
 def estimate_error(method, length, work):
     """The two embedded error estimates over the step's length, from its stages."""
     error, second_error = work.error, work.second_error
@@ -57,7 +57,7 @@ def estimate_error(method, length, work):
                 second_error[i] += second_weight * stage[i]
 
 
-@njit(float64(METHOD, float64, VECTOR, int64, int64, WORK), **INLINE)
+@njit(**INLINE)
 def error_ratio(method, h, y, dimension, tangents, work):
     """Largest ratio of estimated error to tolerance over the state and each tangent vector.
 
@@ -106,7 +106,7 @@ def attempt_explicit(model, method, mode, t, h, y, tangents, work):
     return error_ratio(method, h, y, model.dimension, tangents, work)
 
 
-@njit(void(MODEL, METHOD, int64, float64, float64, VECTOR, WORK), **INLINE)
+@njit(**INLINE)
 def interpolation_stages(model, method, mode, t, h, y, work):
     """Evaluate the stages that only the interpolant of the last attempted step needs, for the state alone."""
     n = model.dimension
@@ -115,14 +115,14 @@ def interpolation_stages(model, method, mode, t, h, y, work):
         model.flow(mode, t + method.c[i] * h, work.trial, model.parameters, work.stages[i])
 
 
-@njit(void(METHOD, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def interpolate(method, h, y, dimension, work):
     """Bernstein coefficients of the state over the last step, into ``work.coefficients (d + 1, n)``."""
     for i in range(work.coefficients.shape[0]):
         combine(y, h, method.interpolant[i], work.stages, method.a.shape[0], dimension, work.coefficients[i])
 
 
-@njit(float64(MODEL, METHOD, int64, float64, VECTOR, int64, WORK), **KERNEL)
+@njit(**KERNEL)
 def starting_step(model, method, mode, t, y, tangents, work):
     """A first step length from the sizes of ``y``, ``y'`` and ``y''`` (Hairer, Norsett, Wanner 1993, II.4).
 

@@ -2,15 +2,15 @@
 
 import math
 
-from numba import float64, int64, njit
+from numba import njit
 
-from hybrid.kernels.layout import KERNEL, MATRIX, VECTOR
+from hybrid.kernels.layout import KERNEL
 
 # Below this length a unit vector's image is rounding: the map that produced it is singular.
 COLLAPSED = 1e-13
 
 
-@njit(int64(VECTOR, int64, int64, VECTOR, float64), **KERNEL)
+@njit(**KERNEL)
 def orthonormalise(y, n, k, growth, threshold):
     """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``.
 
@@ -50,7 +50,7 @@ def orthonormalise(y, n, k, growth, threshold):
     return collapsed
 
 
-@njit(float64(MATRIX, MATRIX, int64), **KERNEL)
+@njit(**KERNEL)
 def log_abs_determinant(matrix, magnitude, n):
     """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if singular to rounding.
 
