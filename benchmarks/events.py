@@ -1,0 +1,265 @@
+"""How many crossings are missed or doubled over random near-double roots, and how exact event times are.
+
+``python -m benchmarks.events --pairs 1000000`` sends that many polynomials with known roots through the
+isolation of the library, and some such motions through whole runs and through SciPy.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from fractions import Fraction
+
+import numpy as np
+from numba import njit
+from scipy.integrate import solve_ivp
+from scipy.special import comb
+
+import models
+from benchmarks.common import heading, table
+from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Transition, Tsit5, simulate
+from hybrid.kernels.bernstein import NO_ROOT, first_crossing, restrict
+from hybrid.run import ISOLATION_DEPTH
+
+DEGREE = 7
+BATCH = 50_000
+# Roots are told apart if they are this many roundings of the coefficients apart in value.
+ROUNDING = 64 * np.finfo(float).eps
+TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
+
+
+def random_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two close roots, and two pairs of complex ones: ``(count, 2)``, ``(count, 2)``, ``(count, 2)``.
+
+    The distance of the roots is ``10^-u`` with ``u`` uniform in 0..8, in an interval of length 1; the complex
+    pairs, given by real and imaginary part, make the polynomial positive but not flat.
+    """
+    apart = 10.0 ** -rng.uniform(0, 8, count)
+    first = rng.uniform(0, 1 - apart)
+    roots = np.column_stack([first, first + apart])
+    return roots, rng.uniform(-0.5, 1.5, (count, 2)), rng.uniform(0.3, 1.0, (count, 2))
+
+
+def bernstein(roots: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> np.ndarray:
+    """Bernstein coefficients ``(count, 7)`` of the products: factor by factor, without cancellation."""
+    rows = product(linear(roots[:, 0]), linear(roots[:, 1]))
+    for a, b in zip(real.T, imaginary.T, strict=True):
+        square = product(linear(a), linear(a))
+        rows = product(rows, square + (b * b)[:, None])
+    return rows
+
+
+def linear(root: np.ndarray) -> np.ndarray:
+    return np.column_stack([-root, 1 - root])
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    m, n = a.shape[1] - 1, b.shape[1] - 1
+    out = np.zeros((len(a), m + n + 1))
+    for i in range(m + 1):
+        for j in range(n + 1):
+            out[:, i + j] += comb(m, i) * comb(n, j) / comb(m + n, i + j) * a[:, i] * b[:, j]
+    return out
+
+
+@njit
+def count_crossings(polynomials, found, stack):
+    """Crossings that the isolation finds, one after the other, ``(count,)``; up to three."""
+    degree = polynomials.shape[1] - 1
+    rest = np.empty(degree + 1)
+    for row in range(polynomials.shape[0]):
+        rest[:] = polynomials[row]
+        side, start = 0, 0.0
+        for _ in range(3):
+            if side == 0:
+                side = 1 if rest[0] > 0.0 else -1
+            theta, after = first_crossing(rest, degree, side, 0, stack)
+            if theta == NO_ROOT:
+                break
+            found[row] += 1
+            side = after
+            if theta >= 1.0:
+                break
+            restrict(rest, degree, theta)
+            rest[0] = 0.0
+            start += theta * (1.0 - start)
+
+
+def isolation(rng: np.random.Generator, pairs: int) -> list[list[str]]:
+    stack = np.zeros((ISOLATION_DEPTH, DEGREE + 6))
+    missed = doubled = unresolved = 0
+    begin = time.perf_counter()
+    for done in range(0, pairs, BATCH):
+        count = min(BATCH, pairs - done)
+        roots, real, imaginary = random_pairs(rng, count)
+        polynomials = bernstein(roots, real, imaginary)
+        found = np.zeros(count, dtype=np.int64)
+        count_crossings(polynomials, found, stack)
+        # The dip between the roots, against the rounding of the coefficients.
+        middle = 0.5 * roots.sum(axis=1)
+        depth = (0.5 * (roots[:, 1] - roots[:, 0])) ** 2
+        for a, b in zip(real.T, imaginary.T, strict=True):
+            depth *= (middle - a) ** 2 + b**2
+        seen = depth > ROUNDING * np.abs(polynomials).max(axis=1)
+        missed += int(((found < 2) & seen).sum())
+        doubled += int(((found > 2) & seen).sum())
+        unresolved += int(((found != 2) & ~seen).sum())
+    seconds = time.perf_counter() - begin
+    return [
+        [
+            "isolation alone",
+            str(pairs),
+            str(missed),
+            str(doubled),
+            str(unresolved),
+            f"{seconds / pairs * 1e6:.1f} us",
+        ]
+    ]
+
+
+# The same roots as a motion: x' is the derivative of the polynomial, its roots parameters.
+def polynomial_motion(bent: bool) -> HybridSystem:
+    def derivative(t, p):
+        a, b = t - p.r1, t - p.r2
+        s1, s2 = (t - p.a1) ** 2 + p.b1**2, (t - p.a2) ** 2 + p.b2**2
+        return (a + b) * s1 * s2 + 2 * a * b * ((t - p.a1) * s2 + (t - p.a2) * s1)
+
+    return HybridSystem(
+        name="near-double roots",
+        state=("x", "n"),
+        parameters=dict.fromkeys(NAMES, 0.5),
+        modes=[Mode("run", lambda t, x, p: (derivative(t, p), 0.0))],
+        transitions=[
+            Transition(
+                "run",
+                "run",
+                Guard((lambda t, x, p: np.sin(x.x) + x.x**3) if bent else (lambda t, x, p: x.x)),
+                Reset(lambda t, x, p: (x.x, x.n + 1)),
+            )
+        ],
+    )
+
+
+NAMES = ("r1", "r2", "a1", "a2", "b1", "b2")
+
+
+def start_value(values: np.ndarray) -> float:
+    """The polynomial at zero, rounded once."""
+    r1, r2, a1, a2, b1, b2 = map(Fraction, values.tolist())
+    return float(r1 * r2 * (a1 * a1 + b1 * b1) * (a2 * a2 + b2 * b2))
+
+
+def depth_of(values: np.ndarray) -> float:
+    r1, r2, a1, a2, b1, b2 = values
+    m = 0.5 * (r1 + r2)
+    return (0.5 * (r2 - r1)) ** 2 * ((m - a1) ** 2 + b1**2) * ((m - a2) ** 2 + b2**2)
+
+
+def whole_runs(rng: np.random.Generator, pairs: int) -> list[list[str]]:
+    roots, real, imaginary = random_pairs(rng, pairs)
+    values = np.column_stack([roots, real, imaginary])
+    rows = []
+    for bent in (False, True):
+        system = polynomial_motion(bent)
+        for method in (DOP853, Tsit5):
+            tally = Tally(pairs)
+            begin = time.perf_counter()
+            for row in values:
+                x0 = start_value(row)
+                solver = method(rtol=1e-10, atol=1e-12)
+                parameters = dict(zip(NAMES, row.tolist(), strict=True))
+                arc = simulate(
+                    system, (x0, 0.0), (0.0, 1.0), mode="run", parameters=parameters, solver=solver
+                )
+                tally.add(
+                    len(arc.jumps), len(arc.grazings), depth_of(row) <= 1e-12 + 1e-10 * max(abs(x0), 1.0)
+                )
+            guard = "sin x + x^3" if bent else "x"
+            rows.append(tally.row(f"{method.__name__}, guard {guard}", time.perf_counter() - begin))
+    for largest in (math.inf, 0.01):
+        tally = Tally(pairs)
+        begin = time.perf_counter()
+        for row in values:
+            tally.add(
+                scipy_crossings(row, largest), 0, depth_of(row) <= 1e-12 + 1e-10 * max(start_value(row), 1.0)
+            )
+        name = "SciPy DOP853, events" + ("" if math.isinf(largest) else f", max_step {largest}")
+        rows.append(tally.row(name, time.perf_counter() - begin))
+    return rows
+
+
+class Tally:
+    """Counts of crossings missed and doubled where the tolerance tells them, and of the rest."""
+
+    def __init__(self, pairs: int) -> None:
+        self.pairs, self.missed, self.doubled, self.reported, self.silent = pairs, 0, 0, 0, 0
+
+    def add(self, found: int, grazings: int, within: bool) -> None:
+        if found != 2 and within:
+            self.reported += grazings > 0
+            self.silent += grazings == 0
+        else:
+            self.missed += max(2 - found, 0)
+            self.doubled += max(found - 2, 0)
+
+    def row(self, name: str, seconds: float) -> list[str]:
+        unresolved = f"{self.reported + self.silent}, of which reported {self.reported}"
+        return [
+            name,
+            str(self.pairs),
+            str(self.missed),
+            str(self.doubled),
+            unresolved,
+            f"{seconds / self.pairs * 1e6:.0f} us",
+        ]
+
+
+def scipy_crossings(row: np.ndarray, largest: float) -> int:
+    r1, r2, a1, a2, b1, b2 = row.tolist()
+
+    def field(t, x):
+        a, b = t - r1, t - r2
+        s1, s2 = (t - a1) ** 2 + b1**2, (t - a2) ** 2 + b2**2
+        return [(a + b) * s1 * s2 + 2 * a * b * ((t - a1) * s2 + (t - a2) * s1)]
+
+    options = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12, "max_step": largest}
+    solution = solve_ivp(field, (0.0, 1.0), [start_value(row)], events=lambda t, x: x[0], **options)
+    return len(solution.t_events[0])
+
+
+def event_times() -> list[list[str]]:
+    """Errors of the times at which a ball bounces, in ulp: of the first, and the largest of ten."""
+    ball = models.bouncing_ball()
+    e, g = Fraction(0.5), Fraction(9.81)
+    # From the ground, so that the exact times are rational: 2 v (1 + e + ... + e^(k-1)) / g.
+    speed = Fraction(3.0)
+    rows = []
+    for method in (DOP853, Tsit5):
+        for rtol in TOLERANCES:
+            solver = method(rtol=rtol, atol=rtol / 100)
+            arc = simulate(ball, (0.0, 3.0), (0.0, 1.2223), parameters={"e": 0.5}, solver=solver)
+            exact = [2 * speed / g * sum(e**i for i in range(k + 1)) for k in range(10)]
+            errors = [
+                float(abs(Fraction(float(t)) - truth) / Fraction(float(np.spacing(float(truth)))))
+                for t, truth in zip(arc.jumps.t[:10], exact, strict=True)
+            ]
+            rows.append([method.__name__, f"{rtol:.0e}", f"{errors[0]:.1f}", f"{max(errors):.1f}"])
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pairs", type=int, default=1_000_000, help="polynomials through the isolation")
+    parser.add_argument("--runs", type=int, default=2000, help="of them whole runs, and runs with SciPy")
+    arguments = parser.parse_args()
+    heading("Two crossings 10^-u apart in a unit interval, u uniform in 0..8: how many are found?")
+    rng = np.random.default_rng(0)
+    rows = isolation(rng, arguments.pairs) + whole_runs(rng, arguments.runs)
+    table(["", "pairs", "missed", "doubled", "other than two, dip within tolerance", "time each"], rows)
+    print("Error of the times of ten bounces of a ball, e = 0.5, in units in the last place.\n")
+    table(["solver", "rtol = 100 atol", "first", "largest"], event_times())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""Guards that touch zero, or nearly: classified, kept on the arc, never lost and never fired twice."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Transition, Tsit5, simulate
+
+DEPTHS = tuple(10.0**-u for u in range(1, 17))
+GUARDS = {
+    "affine": lambda t, x, p: x.q,
+    "bent": lambda t, x, p: np.sin(x.q),
+}
+
+
+@cache
+def parabola(guard="affine", direction=0):
+    """A motion ``q = (t - 1)^2 + c``, and a counter of the crossings of its guard."""
+    return HybridSystem(
+        state=("q", "v", "n"),
+        modes=[Mode("move", lambda t, x, p: (x.v, 2.0, 0.0))],
+        transitions=[
+            Transition(
+                "move",
+                "move",
+                Guard(GUARDS[guard], direction=direction),
+                Reset(lambda t, x, p: (x.q, x.v, x.n + 1)),
+                name="touch",
+            )
+        ],
+    )
+
+
+@cache
+def rigid(e=0.8):
+    """The parabola with a wall at zero, off which it bounces."""
+    return HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("move", lambda t, x, p: (x.v, 2.0))],
+        transitions=[
+            Transition(
+                "move",
+                "move",
+                Guard(lambda t, x, p: x.q, direction=-1),
+                Reset(lambda t, x, p: (0.0, -e * x.v)),
+                name="bounce",
+            )
+        ],
+    )
+
+
+def run(c, guard="affine", direction=0, end=2.25, **options):
+    return simulate(parabola(guard, direction), (1.0 + c, -2.0, 0.0), (0.0, end), mode="move", **options)
+
+
+class TestTouches:
+    @pytest.mark.parametrize("guard", GUARDS)
+    @pytest.mark.parametrize("c", DEPTHS)
+    def test_above_the_guard_nothing_fires(self, c, guard):
+        # 1 + c is a rounded number: below 2e-16 the touch is exact.
+        arc = run(c, guard)
+        assert arc.x[-1, 2] == len(arc.jumps)
+        if c > 1e-14:
+            assert len(arc.jumps) == 0
+        assert len(arc.jumps) in (0, 2)
+
+    @pytest.mark.parametrize("guard", GUARDS)
+    @pytest.mark.parametrize("direction", [-1, 0, +1])
+    @pytest.mark.parametrize("c", DEPTHS)
+    def test_below_the_guard_each_crossing_fires_once(self, c, guard, direction):
+        arc = run(-c, guard, direction)
+        expected = 2 if direction == 0 else 1
+        if c >= 1e-14:
+            assert len(arc.jumps) == expected
+        else:
+            # The depth is of the size of the rounding of 1 - c.
+            assert arc.x[-1, 2] == len(arc.jumps) <= 2
+            assert len(arc.jumps) + len(arc.grazings) > 0
+        if c >= 1e-9:
+            exact = [1 - np.sqrt(c), 1 + np.sqrt(c)]
+            chosen = {-1: exact[:1], 0: exact, +1: exact[1:]}[direction]
+            # A time error is the guard's error over its speed.
+            np.testing.assert_allclose(arc.jumps.t, chosen, rtol=0, atol=1e-14 / np.sqrt(c))
+
+    @pytest.mark.parametrize("guard", GUARDS)
+    @pytest.mark.parametrize("c", [0.0, 1e-12, 1e-13])
+    def test_a_touch_within_the_tolerances_is_kept_on_the_arc(self, c, guard):
+        arc = run(c, guard)
+        (grazing,) = arc.grazings
+        assert grazing.transition == "touch"
+        assert abs(grazing.t - 1) < 1e-6
+        assert abs(grazing.value - c) < 1e-14
+        assert grazing.acceleration == pytest.approx(2.0, rel=1e-6)
+        np.testing.assert_allclose(grazing.x, [c, 0.0, 0.0], atol=1e-6)
+
+    @pytest.mark.parametrize("c", [1e-3, 1e-6, 1e-8])
+    def test_a_clear_miss_is_not(self, c):
+        assert run(c).grazings == ()
+
+    def test_more_tolerance_makes_more_a_grazing(self):
+        assert len(run(1e-8, solver=DOP853(rtol=1e-6, atol=1e-8)).grazings) == 1
+        assert len(run(1e-8, solver=DOP853(rtol=1e-12, atol=1e-14)).grazings) == 0
+
+    def test_from_below(self):
+        arc = simulate(parabola(direction=-1), (1.0, -2.0, 0.0), (0.0, 2.0))
+        assert (len(arc.jumps), len(arc.grazings)) == (0, 1)
+
+
+class TestKinds:
+    def test_a_dip_below_the_tolerances_is_a_grazing_jump(self):
+        assert [jump.kind for jump in run(-1e-12, direction=-1).jumps] == ["grazing"]
+
+    def test_a_deeper_one_is_transverse(self):
+        assert [jump.kind for jump in run(-1e-6).jumps] == ["transverse"] * 2
+
+    @pytest.mark.parametrize("c", [1e-2, 1e-4, 1e-6, 1e-8])
+    def test_the_saltation_grows_like_one_over_the_root_of_the_depth(self, c):
+        arc = simulate(rigid(), (1.0 - c, -2.0), (0.0, 1.0))
+        (jump,) = arc.jumps
+        assert jump.transversality == pytest.approx(-2 * np.sqrt(c), rel=1e-6)
+        assert abs(jump.saltation[1, 0]) == pytest.approx(1.8 * 2 / (2 * np.sqrt(c)), rel=1e-6)
+
+
+class TestBounces:
+    @pytest.mark.parametrize("c", DEPTHS)
+    def test_one_bounce_or_none(self, c):
+        """After a grazing bounce the parabola leads away, and the state follows the exact motion."""
+        arc = simulate(rigid(), (1.0 - c, -2.0), (0.0, 2.0))
+        assert len(arc.jumps) in ((1,) if c >= 1e-14 else (0, 1))
+        s = np.sqrt(c)
+        exact = 0.8 * 2 * s * (1 + s) + (1 + s) ** 2
+        assert arc.x[-1, 0] == pytest.approx(exact, abs=max(1e-7, 1e-12 / s) if c < 1e-9 else 1e-10)
+
+    @given(
+        u=st.floats(0.5, 13.0),
+        sign=st.sampled_from([-1, 1]),
+        step=st.floats(0.05, 10.0),
+        guard=st.sampled_from(sorted(GUARDS)),
+        method=st.sampled_from([DOP853, Tsit5]),
+    )
+    def test_never_doubled_never_lost(self, u, sign, step, guard, method):
+        c = sign * 10.0**-u
+        arc = run(c, guard, end=2.0, solver=method(rtol=1e-10, atol=1e-12, max_step=step))
+        assert arc.status.ok
+        assert arc.x[-1, 2] == len(arc.jumps) == (2 if sign < 0 else 0)
