@@ -8,6 +8,7 @@ from hybrid.kernels.codes import (
     CHATTER_JUMPS,
     CHATTERING,
     JUMPS,
+    LAST_FIRED,
     MODE,
     PHASE,
     RESTITUTION,
@@ -24,6 +25,8 @@ FEWEST_JUMPS = 16
 # Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
 SHORT = 1e-5
 LONG = 1.0
+# Relative difference of mean and limit fields that the limit's own error may be blamed for.
+NEGLIGIBLE = 1e-4
 # Largest relative change of the limit that rounding may be blamed for.
 ROUGH = 1e-6
 EPSILON = 2.220446049250313e-16
@@ -166,7 +169,37 @@ def chatter_matrix(model, run, transition, work):
     for i in range(n):
         for j in range(n):
             removed = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
-            work.saltation[i, j] = (1.0 if i == j else 0.0) - removed
+            entry = (1.0 if i == j else 0.0) - removed
+            # What the projection takes out is taken out exactly: its rounding would pass for a direction.
+            work.saltation[i, j] = entry if abs(entry) > 1e-13 * (1.0 + abs(removed)) else 0.0
+
+
+@njit(**KERNEL)
+def add_change_of_duration(model, run, target, span, work):
+    """Add to ``work.saltation`` what a change of the chatter's duration does.
+
+    A state that chatters longer drifts longer with the mean field of the chatter, ``f + a p`` with the pull
+    ``a`` and the impulse ``p``, and shorter with that of the limit mode; where the two agree nothing is
+    added. The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the
+    height through its energy. To be called after ``chatter_matrix``, whose slope and gradient it uses.
+    """
+    n, mode, transition = model.dimension, run.count[MODE], run.count[LAST_FIRED]
+    ratio, speed = run.clock[RESTITUTION], run.trail[BEFORE, n]
+    limit, side = run.clock[PHASE] + span, -model.direction[transition]
+    model.flow(mode, limit, work.settled, model.parameters, work.field)
+    guard_speed(model, transition, limit, work.settled, work.field, work.gradient)
+    pull = -side * guard_acceleration(model, transition, mode, limit, work.settled, work)
+    model.flow(target, limit, work.settled, model.parameters, work.field_after)
+    by_speed = 2.0 * side / (pull * (1.0 - ratio))
+    by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(work.field[i]), abs(work.field_after[i]))
+    for i in range(n):
+        excess = work.field[i] + side * pull * run.trail[IMPULSE, i] - work.field_after[i]
+        if abs(excess) > NEGLIGIBLE * largest:
+            for j in range(n):
+                work.saltation[i, j] += excess * (by_speed * work.error[j] + by_height * work.gradient[j])
 
 
 @njit(**KERNEL)

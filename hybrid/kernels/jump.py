@@ -4,7 +4,14 @@ import math
 
 from numba import boolean, float64, int64, njit, void
 
-from hybrid.kernels.chatter import accumulation, chatter_matrix, drift, drift_is_known, remember_impulse
+from hybrid.kernels.chatter import (
+    accumulation,
+    add_change_of_duration,
+    chatter_matrix,
+    drift,
+    drift_is_known,
+    remember_impulse,
+)
 from hybrid.kernels.codes import (
     CYCLE,
     EARLIER_JUMP_CYCLE,
@@ -309,6 +316,7 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     x_limit = work.settled
     remember_flight(run, record, model.dimension, span, x_limit)
     chatter_matrix(model, run, transition, work)
+    add_change_of_duration(model, run, target, span, work)
     if tangents > 0:
         carry_tangents(model, run, tangents, orthonormal, work)
         model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
