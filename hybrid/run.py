@@ -54,9 +54,9 @@ def driver_parts(implicit: bool) -> Any:
     if implicit:
         attempt = load_kernels("hybrid.kernels.radau").attempt_radau
     else:
-        attempt = load_kernels("hybrid.kernels.step").attempt_explicit
+        attempt = load_kernels("hybrid.kernels.step").no_attempt
     return Parts(
-        attempt=address(attempt),
+        attempt_implicit=address(attempt),
         enter=address(jumps.enter),
         jump=address(jumps.jump),
         finish_chatter=address(jumps.finish_chatter),

@@ -52,7 +52,14 @@ from hybrid.kernels.guards import (
 )
 from hybrid.kernels.jump import forward
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
-from hybrid.kernels.step import interpolate, interpolation_stages, rates, starting_step
+from hybrid.kernels.step import (
+    attempt,
+    attempt_again,
+    interpolate,
+    interpolation_stages,
+    rates,
+    starting_step,
+)
 
 SAFETY = 0.9
 SHRINK = 0.2
@@ -160,7 +167,7 @@ def remember_grazing(model, method, run, record, t, h, work):
     record.used[2] = slot + 1
 
 
-@njit(**KERNEL)
+@njit(**INLINE)
 def find_event(parts, model, method, run, record, tangents, h, work):
     """Shorten the attempted step to its first event, if there is one.
 
@@ -186,7 +193,7 @@ def find_event(parts, model, method, run, record, tangents, h, work):
         if shortened != NOT_THERE:
             return shortened, correction, fired
         ignored = fired
-        parts.attempt(model, method, mode, t, h, run.y, tangents, work)
+        attempt_again(parts, model, method, mode, t, h, run.y, tangents, work)
         run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, 0.0
         run.count[GRAZING_GUARD] = fired
         remember_grazing(model, method, run, record, t, h, work)
@@ -316,7 +323,7 @@ def advance(
         proposed = min(run.clock[NEXT_STEP], method.max_step)
         last = proposed >= remaining
         h = remaining if last else proposed
-        ratio = parts.attempt(model, method, mode, t, h, run.y, tangents, work)
+        ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
         run.count[STEPS] += 1
         if not ratio <= 1.0:
             run.count[REJECTED] += 1

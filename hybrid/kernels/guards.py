@@ -13,6 +13,7 @@ from hybrid.kernels.codes import (
     NO_TRANSITION,
 )
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MODEL, VECTOR
+from hybrid.kernels.step import attempt_again
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
 # crossings that reach no farther beyond zero than the misfit are lost.
@@ -281,7 +282,7 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
     length = theta * h
     for trial in range(MOST_LANDINGS):
-        parts.attempt(model, method, mode, t, length, y, tangents, work)
+        attempt_again(parts, model, method, mode, t, length, y, tangents, work)
         if length == 0.0:
             return 0.0, 0.0
         value = guard_value(model, transition, t + length, work.new, work.scalar)

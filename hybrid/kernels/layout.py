@@ -233,14 +233,11 @@ RECORD = types.NamedTuple(
 class Parts(NamedTuple):
     """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
 
-    What is linked into a kernel is optimised again with it; what comes as an argument is not. ``attempt`` is
-    the step of the solver's kind: it tries a step of length ``h`` from ``y``, puts the result into
-    ``work.new`` and returns the ratio of its error to the tolerance; above 1, or nan, rejects.
-    ``work.stages[0]`` holds the rates at ``(t, y)``, the rates at the new point are left in
-    ``work.stages[s]``.
+    What is linked into a kernel is optimised again with it; what comes as an argument is not, and the
+    implicit step need not even be compiled where the method is explicit.
     """
 
-    attempt: object
+    attempt_implicit: object
     enter: object
     jump: object
     finish_chatter: object

@@ -88,7 +88,7 @@ def error_ratio(method, h, y, dimension, tangents, work):
     return worst
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
+@njit(**INLINE)
 def attempt_explicit(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 
@@ -150,3 +150,27 @@ def starting_step(model, method, mode, t, y, tangents, work):
     if not steepest > 1e-15:
         return min(max(1e-6, 1e-3 * h), method.max_step)
     return min(100.0 * h, (0.01 / steepest) ** method.exponent, method.max_step)
+
+
+@njit(**INLINE)
+def attempt(parts, model, method, mode, t, h, y, tangents, work):
+    """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
+
+    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in
+    ``work.stages[s]``. A ratio above 1, or nan, rejects the step.
+    """
+    if method.implicit != 0:
+        return parts.attempt_implicit(model, method, mode, t, h, y, tangents, work)
+    return attempt_explicit(model, method, mode, t, h, y, tangents, work)
+
+
+@njit(**KERNEL)
+def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
+    """``attempt``, for the places where a step is taken again: compiled once, not into each of them."""
+    return attempt(parts, model, method, mode, t, h, y, tangents, work)
+
+
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
+def no_attempt(model, method, mode, t, h, y, tangents, work):
+    """Stands in for the implicit step where the method is explicit."""
+    return math.nan
