@@ -11,7 +11,7 @@ from typing import Any
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 
 DRIVER = "hybrid.kernels.drive"
-MESSAGE = "hybrid: compiling the kernels, once for all models (about half a minute) ..."
+MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
 @cache
