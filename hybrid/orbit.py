@@ -18,6 +18,8 @@ from hybrid.system import HybridSystem, finite_number
 
 # Newton steps are halved down to this part before they are taken as they are.
 SHORTEST_STEP = 1 / 64
+# Jumps of a guess that are looked at in the search for a point away from them.
+MOST_JUMPS_LOOKED_AT = 10_000
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -282,15 +284,7 @@ class _Shooting:
 
     def _quiet_time(self, guess: _Point) -> float:
         """Time after the guess at which neither it nor one period later is close to a jump."""
-        arc = simulate(
-            self.system,
-            guess.x,
-            (guess.t, guess.t + 2 * guess.period),
-            mode=self.mode,
-            parameters=self.parameters,
-            solver=self.solver,
-            max_jumps=10_000,
-        )
+        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
         candidates = np.linspace(0, guess.period, 201)[1:-1]
         distance = np.minimum(
@@ -300,14 +294,7 @@ class _Shooting:
         return float(candidates[np.argmax(distance)])
 
     def _moved(self, guess: _Point, shift: float) -> tuple[_Shooting, _Point]:
-        arc = simulate(
-            self.system,
-            guess.x,
-            (guess.t, guess.t + shift),
-            mode=self.mode,
-            parameters=self.parameters,
-            solver=self.solver,
-        )
+        arc = self._follow(guess, shift, self.mode)
         shooting = attrs.evolve(self, mode=str(arc.mode[-1]))
         return shooting, _Point(arc.x[-1], guess.t + shift, guess.period)
 
@@ -318,9 +305,8 @@ class _Shooting:
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: _Shot, iterations: int, tolerance: float) -> PeriodicOrbit:
-        values = np.linalg.eigvals(shot.fundamental) if np.all(np.isfinite(shot.fundamental)) else None
-        if values is None:
-            values = np.full(len(shot.end), np.nan)
+        finite = bool(np.all(np.isfinite(shot.fundamental)))
+        values = np.linalg.eigvals(shot.fundamental) if finite else np.full(len(shot.end), np.nan)
         values = values[np.argsort(-np.abs(values), kind="stable")]
         return PeriodicOrbit(
             system=self.system,
@@ -338,11 +324,20 @@ class _Shooting:
         )
 
     def _signature(self, shot: _Shot) -> tuple[str, ...]:
-        span = (shot.point.t, shot.point.t + shot.point.period)
-        arc = simulate(
-            self.system, shot.point.x, span, mode=shot.mode, parameters=self.parameters, solver=self.solver
-        )
+        arc = self._follow(shot.point, shot.point.period, shot.mode)
         return (shot.mode, *(jump.target for jump in arc.jumps))
+
+    def _follow(self, point: _Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
+        """The arc from a point over a time, without tangent vectors."""
+        return simulate(
+            self.system,
+            point.x,
+            (point.t, point.t + span),
+            mode=mode,
+            parameters=self.parameters,
+            solver=self.solver,
+            max_jumps=max_jumps,
+        )
 
     def _status(self, shot: _Shot, iterations: int, tolerance: float) -> Status:
         if self._closed(shot, tolerance):
