@@ -17,10 +17,15 @@ MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) .
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
     """The kernel module of that name, compiled now or taken from the cache."""
-    sources = sorted((Path(__file__).parent / "kernels").glob("*.py"))
-    texts = [path.read_text(encoding="utf-8") for path in sources]
-    with compiled_into(cache_directory() / f"kernels-{source_key(*texts)}"), announced(MESSAGE):
+    with compiled_into(cache_directory() / f"kernels-{_kernels_key()}"), announced(MESSAGE):
         return importlib.import_module(module)
+
+
+@cache
+def _kernels_key() -> str:
+    """Key of all kernel sources together, read once for all modules that are loaded."""
+    sources = sorted((Path(__file__).parent / "kernels").glob("*.py"))
+    return source_key(*(path.read_text(encoding="utf-8") for path in sources))
 
 
 def address(kernel: Any) -> Any:
