@@ -20,6 +20,7 @@ from hybrid.errors import ModelError
 from hybrid.names import PARAMETERS, STATE, plain_class
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
+from hybrid.propagator import Boundary, Propagator, propagator
 from hybrid.roles import Role, field_role, guard_role, reset_role
 from hybrid.symbolic import JUMPING, ONE, ZERO
 from hybrid.trace import Symbols, TraceError, model_symbols, trace
@@ -51,6 +52,8 @@ class Emitted:
         By mode: whether the field's derivative in the state is proved not to depend on the state.
     autonomous
         By mode: whether the field is proved not to depend on time.
+    propagators
+        By mode: how it is best advanced.
     """
 
     source: str
@@ -58,6 +61,7 @@ class Emitted:
     affine_guard: tuple[bool, ...]
     affine_mode: tuple[bool, ...]
     autonomous: tuple[bool, ...]
+    propagators: tuple[Propagator, ...]
 
 
 def emit(system: HybridSystem) -> Emitted:
@@ -73,6 +77,7 @@ def emit(system: HybridSystem) -> Emitted:
     fields = [writer.write(field_role(system, mode)) for mode in system.modes]
     guards = [writer.write(guard_role(transition)) for transition in system.transitions]
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
+    propagators = [_propagator(writer, system, i, fields[i], guards) for i in range(len(fields))]
     functions = (
         _function("flow", [field.value for field in fields]),
         _function("flow_jacobian", [field.derivative for field in fields]),
@@ -81,6 +86,7 @@ def emit(system: HybridSystem) -> Emitted:
         _function("guard_gradient", [guard.derivative for guard in guards]),
         _function("reset", [reset.value for reset in resets]),
         _function("reset_jacobian", [reset.derivative for reset in resets]),
+        _function("series", [each.statements for each in propagators], "index, t, x, p, order, out"),
     )
     symbols = writer.symbols
     return Emitted(
@@ -89,6 +95,7 @@ def emit(system: HybridSystem) -> Emitted:
         affine_guard=tuple(_is_affine(guard, symbols.variables) for guard in guards),
         affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
+        propagators=tuple(propagators),
     )
 
 
@@ -234,11 +241,28 @@ def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Writte
     return writer.identity() if role is None else writer.write(role)
 
 
-def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
-    lines = [f"def {name}(index, t, x, p, out):"]
+def _propagator(
+    writer: _Writer, system: HybridSystem, index: int, field: _Written, guards: Sequence[_Written]
+) -> Propagator:
+    mode = system.modes[index].name
+    boundaries = [
+        Boundary(
+            None if written.expressions is None else written.expressions[0],
+            -transition.guard.direction if transition.source != transition.target else 0,
+        )
+        for transition, written in zip(system.transitions, guards, strict=True)
+        if transition.source == mode
+    ]
+    return propagator(field.expressions, boundaries, writer.symbols)
+
+
+def _function(
+    name: str, branches: Iterable[Sequence[str]], arguments: str = "index, t, x, p, out"
+) -> str:
+    lines = [f"def {name}({arguments}):"]
     for index, statements in enumerate(branches):
         lines.append(f"    {'elif' if index else 'if'} index == {index}:")
-        lines += [f"        {statement}" for statement in statements]
+        lines += [f"        {statement}" for statement in statements or ("pass",)]
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n"

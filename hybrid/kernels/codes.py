@@ -64,3 +64,9 @@ GRAZING = 1
 LIMIT_OF_CHATTER = 2
 
 NO_MODE = -1
+
+# Propagators of a mode.
+RUNGE_KUTTA = 0
+TAYLOR = 1
+EXACT = 2
+DESINGULARISED = 3

@@ -1,0 +1,321 @@
+"""Which propagator fits a mode: exact series, series on a clock of its own, Taylor series, or Runge-Kutta.
+
+Tracing decides. What a guard says of the states inside its mode is used: where ``x1 - x2 >= 0`` in the whole
+mode, ``max(x1 - x2, 0)`` is ``x1 - x2`` there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import attrs
+import sympy
+from sympy.core.parameters import distribute
+
+from hybrid.kernels.codes import DESINGULARISED, EXACT, RUNGE_KUTTA, TAYLOR
+from hybrid.printer import assignments
+from hybrid.series import ONE_THEN_ZERO, Constants, NoSeries, Recurrences, directional, indented, loop
+from hybrid.symbolic import (
+    Absolute,
+    Less,
+    LessEqual,
+    Maximum,
+    Minimum,
+    Select,
+    Sign,
+    Step,
+)
+from hybrid.trace import Symbols
+
+ROOT = sympy.Symbol("w", positive=True)
+ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
+# Columns between those of the guards and the others: the time since the step's start, the integral of div f.
+CLOCK, DIVERGENCE, OTHERS = range(3)
+# The square root of a guard is started from no less than this share of the sizes it is a difference of.
+FLOOR = 1e-17
+
+
+@attrs.frozen
+class Boundary:
+    """A guard of a mode: its expression, and its sign inside the mode if the mode ends there, else 0."""
+
+    guard: sympy.Expr | None
+    inside: int
+
+
+@attrs.frozen
+class Propagator:
+    """How a mode is advanced, and why.
+
+    Attributes
+    ----------
+    kind
+        A code of ``hybrid.kernels.codes``: RUNGE_KUTTA, TAYLOR, EXACT or DESINGULARISED.
+    degree
+        Degree in time of every solution if that is a polynomial, else 0.
+    columns
+        Columns that the series need beside those of state, tangents and guards.
+    reason
+        What tracing found.
+    statements
+        Body of the mode in the role ``series``.
+    """
+
+    kind: int
+    degree: int
+    columns: int
+    reason: str
+    statements: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        names = {
+            RUNGE_KUTTA: "Runge-Kutta pair",
+            TAYLOR: "Taylor series",
+            EXACT: "exact",
+            DESINGULARISED: "Taylor series, desingularised",
+        }
+        return f"{names[self.kind]} ({self.reason})"
+
+
+def propagator(
+    field: Sequence[sympy.Expr] | None, boundaries: Sequence[Boundary], symbols: Symbols
+) -> Propagator:
+    """The propagator of a mode from its traced field (None if it could not be traced) and its guards."""
+    if field is None:
+        return Propagator(RUNGE_KUTTA, 0, 0, "its field is not traced")
+    known = [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
+    try:
+        with distribute(False):
+            return _series(field, boundaries, known, symbols)
+    except NoSeries as reason:
+        return Propagator(RUNGE_KUTTA, 0, 0, str(reason))
+
+
+def _series(
+    field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], known: list[sympy.Expr], symbols: Symbols
+) -> Propagator:
+    field = [_simplified(entry, known) for entry in field]
+    guards = []
+    for boundary in boundaries:
+        if boundary.guard is None:
+            raise NoSeries("a guard of it is not traced")
+        guards.append(_simplified(boundary.guard, []))
+    z = _singular_base(field, known)
+    if z is not None:
+        columns, statements = _write_desingularised(field, guards, z, symbols)
+        return Propagator(
+            DESINGULARISED, 0, columns, "half-integer powers of a guard, on the clock dt = 2 w ds", statements
+        )
+    columns, statements = _write(field, guards, symbols)
+    jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
+    if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
+        return Propagator(TAYLOR, 0, columns, "smooth, nonlinear in the state", statements)
+    if not all(_elementary(entry, symbols) for entry in field):
+        return Propagator(TAYLOR, 0, columns, "affine, its forcing has no short series", statements)
+    degree = _degree(field, jacobian, symbols)
+    how = f"polynomials of degree {degree}" if degree else "affine in the state"
+    return Propagator(EXACT, degree, columns, how, statements)
+
+
+def _simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
+    """The expression where everything in ``known`` is positive or zero."""
+    if not expression.has(Maximum, Minimum, Absolute, Sign, Step, Select):
+        return expression
+    args = [_simplified(argument, known) for argument in expression.args]
+    if isinstance(expression, Maximum | Minimum):
+        a, b = args
+        sign = _sign_of(a - b, known) * (1 if isinstance(expression, Maximum) else -1)
+        if sign:
+            return a if sign > 0 else b
+    if isinstance(expression, Absolute | Sign | Step):
+        sign = _sign_of(args[0], known)
+        if sign:
+            absolute = sign * args[0]
+            unit = sympy.Integer(sign) if isinstance(expression, Sign) else sympy.Integer((sign + 1) // 2)
+            return absolute if isinstance(expression, Absolute) else unit
+    if isinstance(expression, Select) and isinstance(args[0], Less | LessEqual):
+        a, b = args[0].args
+        sign = _sign_of(b - a, known)
+        if sign:
+            return args[1] if sign > 0 else args[2]
+    return expression.func(*args)
+
+
+def _sign_of(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> int:
+    for positive in known:
+        for sign in (1, -1):
+            if (expression - sign * positive).expand() == 0:
+                return sign
+    return 0
+
+
+def _singular_base(field: Sequence[sympy.Expr], known: Sequence[sympy.Expr]) -> sympy.Expr | None:
+    """The guard whose fractional powers the field has, which are singular where it vanishes; None if none."""
+    bases = set()
+    for power in {node for entry in field for node in entry.atoms(sympy.Pow)}:
+        if power.exp.is_Integer or _sign_of(power.base, known) == 0:
+            continue
+        if not (power.exp.is_Rational and power.exp.q == 2 and power.exp.is_positive):
+            raise NoSeries(f"it has the power {power.exp} of a guard")
+        bases.add(power.base)
+    if len(bases) > 1:
+        raise NoSeries("it has fractional powers of more than one guard")
+    return bases.pop() if bases else None
+
+
+def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
+    """Whether it depends on time by polynomials and by harmonics and exponentials of linear functions."""
+    for node in sympy.preorder_traversal(entry):
+        if not node.has(symbols.t) or node.is_Symbol or node.is_Add or node.is_Mul:
+            continue
+        if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
+            continue
+        if isinstance(node, ELEMENTARY) and not node.args[0].diff(symbols.t).has(symbols.t):
+            continue
+        return False
+    return True
+
+
+def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]], symbols: Symbols) -> int:
+    """Degree of the solutions in time if they are polynomials, else 0."""
+    if any(entry.has(*ELEMENTARY) and entry.has(symbols.t) for entry in field):
+        return 0
+    # x^(k + 1) = J x^(k) + d^k f/dt^k
+    rate, forcing = list(field), list(field)
+    for degree in range(1, 2 * len(field) + 4):
+        forcing = [entry.diff(symbols.t) for entry in forcing]
+        rate = [
+            (push + sympy.Add(*(a * r for a, r in zip(row, rate, strict=True)))).expand()
+            for row, push in zip(jacobian, forcing, strict=True)
+        ]
+        if all(entry == 0 for entry in rate):
+            return degree
+    return 0
+
+
+def _write(
+    field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
+) -> tuple[int, tuple[str, ...]]:
+    body = _Body(len(symbols.x), len(guards))
+    block = body.block({x: str(i) for i, x in enumerate(symbols.x)}, (symbols.t, ONE_THEN_ZERO))
+    seeds = _seeds(symbols)
+    tangents = [directional(rate, seeds) for rate in field]
+    trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
+    columns, starts = _state(symbols)
+    return body.assemble(block, columns, field, starts, guards, trace, tangents, seeds)
+
+
+def _write_desingularised(
+    field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols
+) -> tuple[int, tuple[str, ...]]:
+    """Series on the clock ``dt = 2 w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
+
+    All fields are multiplied by ``2 w``, and ``dw/ds = dz/dt``. The root is never started at zero exactly:
+    with a speed of zero too it would stay there. What it is started at is below the rounding of ``z``.
+    """
+    body = _Body(len(symbols.x), len(guards))
+    clock, root = body.column(CLOCK), body.column(OTHERS)
+    body.columns = OTHERS + 1
+    block = body.block({**{x: str(i) for i, x in enumerate(symbols.x)}, ROOT: root}, (symbols.t, f"out[o, {clock}]"))
+    seeds = _seeds(symbols)
+    slope = z.diff(symbols.t) + sympy.Add(
+        *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
+    )
+    rates = [_on_clock(rate, z) for rate in field]
+    tangents = [_on_clock(directional(rate, seeds), z) for rate in field]
+    trace = _on_clock(sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True))), z)
+    # Where z is zero its root crosses zero, with a slope.
+    crossing = [_sign_of(guard, [z]) * ROOT or _in_roots(guard, z) for guard in guards]
+    size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in symbols.x))
+    columns, starts = _state(symbols)
+    body.preamble += [*assignments(["z", "size"], [z, size]), f"root = sqrt(max(z, {FLOOR}*size, 1e-300))"]
+    return body.assemble(
+        block,
+        [*columns, clock, root],
+        [*rates, 2 * ROOT, _in_roots(slope, z)],
+        [*starts, "0.0", "root"],
+        crossing,
+        trace,
+        tangents,
+        seeds,
+    )
+
+
+def _on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
+    """``2 w`` times the rate, with powers of ``z`` as powers of ``w`` and none of them negative."""
+    terms = sympy.Add.make_args(_in_roots(rate, z))
+    singular = [term for term in terms if term.has(1 / ROOT)]
+    regular = sympy.Add(*(term for term in terms if term not in singular))
+    return sympy.Add(2 * ROOT * regular, *(2 * ROOT * term for term in singular))
+
+
+def _in_roots(expression: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
+    """Fractional powers of ``z`` as powers of its root."""
+    powers = {p for p in expression.atoms(sympy.Pow) if p.base == z and not p.exp.is_Integer}
+    return expression.xreplace({power: ROOT ** (2 * power.exp) for power in powers})
+
+
+def _seeds(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:
+    return {x: sympy.Symbol(f"v{i}", real=True) for i, x in enumerate(symbols.x)}
+
+
+def _state(symbols: Symbols) -> tuple[list[str], list[str]]:
+    n = len(symbols.x)
+    return [str(i) for i in range(n)], [f"x[{i}]" for i in range(n)]
+
+
+class _Body:
+    """The body of one mode: allots columns, and puts the loops one after the other."""
+
+    def __init__(self, n: int, guards: int) -> None:
+        self.n = n
+        self.columns = OTHERS
+        self.constants = Constants()
+        self.preamble = [f"m = len(x) + {guards}"]
+
+    def column(self, place: int) -> str:
+        """Text of a column behind those of the guards."""
+        return f"m + {place}"
+
+    def allot(self) -> str:
+        """A new column."""
+        self.columns += 1
+        return self.column(self.columns - 1)
+
+    def block(self, rows: dict[sympy.Symbol, str], time: tuple[sympy.Symbol, str]) -> Recurrences:
+        """The recurrences of the state."""
+        return Recurrences(rows, time, self.allot, "a", self.constants)
+
+    def assemble(
+        self,
+        block: Recurrences,
+        columns: list[str],
+        rates: Sequence[sympy.Expr],
+        starts: list[str],
+        guards: Sequence[sympy.Expr],
+        trace: sympy.Expr,
+        tangents: Sequence[sympy.Expr],
+        seeds: dict[sympy.Symbol, sympy.Symbol],
+    ) -> tuple[int, tuple[str, ...]]:
+        """The number of columns and the statements: state and guards first, then what rests on them."""
+        n = self.n
+        vector = Recurrences(
+            {seed: f"v + {i}" for i, seed in enumerate(seeds.values())}, None, self.allot, "b", self.constants, block
+        )
+        along = [f"v + {i}" for i in range(n)]
+        carried = loop(along, tangents, [f"x[{column}]" for column in along], vector)
+        volume = Recurrences({}, None, self.allot, "d", self.constants, block)
+        spread = loop([self.column(DIVERGENCE)], [trace], ["0.0"], volume)
+        for place, guard in enumerate(guards):
+            block.keep(guard, f"len(x) + {place}")
+        moved = loop(columns, rates, starts, block)
+        lines = [
+            *self.preamble,
+            *self.constants.statements(),
+            *moved,
+            f"if len(x) > {n}:",
+            *indented(spread),
+            f"for v in range({n}, len(x), {n}):",
+            *indented(carried),
+        ]
+        return self.columns, tuple(lines)

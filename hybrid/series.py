@@ -1,0 +1,435 @@
+"""Taylor series of a mode's solutions: recurrences for their coefficients, written as code.
+
+Every expression of the field is cut into elementary operations, each with a recurrence for its normalised
+Taylor coefficients along a solution (Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904; Griewank and
+Walther, Evaluating Derivatives, 2nd ed. 2008, table 13.2). Linear operations cost one multiplication an
+order, products and functions a convolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import sympy
+from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+from sympy.core.parameters import distribute
+
+from hybrid.printer import MATH_FUNCTIONS, assignments
+from hybrid.symbolic import ZERO
+
+# Functions whose derivative is again made of what has a recurrence.
+BY_DERIVATIVE = (
+    sympy.log, log1p, log2, log10, expm1,
+    sympy.asin, sympy.acos, sympy.atan, sympy.asinh, sympy.acosh, sympy.atanh,
+)  # fmt: skip
+# A pair, and the sign of the second's derivative: cos' = -sin, cosh' = sinh.
+PAIRS = {
+    sympy.sin: (sympy.sin, sympy.cos, "-"),
+    sympy.cos: (sympy.sin, sympy.cos, "-"),
+    sympy.sinh: (sympy.sinh, sympy.cosh, ""),
+    sympy.cosh: (sympy.sinh, sympy.cosh, ""),
+}
+# ``y' = (1 -+ y^2) u'``.
+OWN_SQUARE = {sympy.tanh: "-", sympy.tan: ""}
+
+
+class NoSeries(Exception):
+    """An expression has no Taylor recurrence here; the text says which part."""
+
+
+class Recurrences:
+    """The statements that compute the coefficients of some expressions, order by order.
+
+    The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, row]``;
+    expressions that enter a convolution are kept in a row of their own. ``first`` are the statements for
+    order zero, ``higher`` those for the others, which follow in a loop over ``o``.
+
+    Parameters
+    ----------
+    rows
+        Where the series of a symbol is: text of its column in ``out``.
+    time
+        The symbol of time and the text of its first-order and higher coefficient; None if it is a symbol
+        among ``rows``.
+    allot
+        Called for a new column, returns its text.
+    prefix
+        Begins the names of local variables.
+    known
+        Recurrences that run before these and hold the series of all that is free of the symbols in ``rows``.
+    """
+
+    def __init__(
+        self,
+        rows: dict[sympy.Symbol, str],
+        time: tuple[sympy.Symbol, str] | None,
+        allot: Callable[[], str],
+        prefix: str,
+        constants: Constants,
+        known: Recurrences | None = None,
+    ) -> None:
+        self.rows: dict[sympy.Expr, str] = dict(rows)
+        self.time = time
+        self.allot = allot
+        self.prefix = prefix
+        self.constants = constants
+        self.known = known
+        self.first: list[str] = []
+        self.higher: list[str] = []
+        self.variables: dict[sympy.Expr, str] = {}
+        self.own = frozenset(rows)
+        if known is None and time is not None:
+            self.own |= {time[0]}
+
+    def coefficient(self, expression: sympy.Expr) -> str:
+        """Text of the coefficient of order ``o``."""
+        if expression in self.variables:
+            return self.variables[expression]
+        if expression in self.rows:
+            return f"out[o, {self.rows[expression]}]"
+        if self.known is not None and not expression.free_symbols & self.own:
+            return f"out[o, {self.known.row(expression)}]"
+        if self._is_constant(expression):
+            return self._bind(expression, self.constants.name(expression), "0.0")
+        return self._operation(expression)
+
+    def row(self, expression: sympy.Expr) -> str:
+        """Text of the column that holds the series of the expression."""
+        if expression in self.rows:
+            return self.rows[expression]
+        if self.known is not None and not expression.free_symbols & self.own:
+            return self.known.row(expression)
+        text = self.coefficient(expression)
+        if expression not in self.rows:
+            self.rows[expression] = self.allot()
+            self._both(f"out[o, {self.rows[expression]}] = {text}")
+        return self.rows[expression]
+
+    def keep(self, expression: sympy.Expr, column: str) -> None:
+        """Write the series of the expression into a given column."""
+        self._both(f"out[o, {column}] = {self.coefficient(expression)}")
+
+    def _is_constant(self, expression: sympy.Expr) -> bool:
+        return not expression.free_symbols & self.own and (
+            self.known is None or self.known._is_constant(expression)
+        )
+
+    def _both(self, statement: str) -> None:
+        self.first.append(statement)
+        self.higher.append(statement)
+
+    def _bind(self, expression: sympy.Expr, first: str, *higher: str, name: str | None = None) -> str:
+        """A variable for the expression: its value at order zero, and statements or a value above that."""
+        name = name or self._name(expression)
+        self.first.append(f"{name} = {first}")
+        value, *more = higher
+        self.higher += [f"{name} = {value}", *more]
+        return name
+
+    def _name(self, expression: sympy.Expr) -> str:
+        return self.variables.setdefault(expression, f"{self.prefix}{len(self.variables)}")
+
+    def _kept(self, expression: sympy.Expr) -> tuple[str, str]:
+        """Name and column of an expression whose recurrence reads its own earlier coefficients."""
+        self.rows[expression] = self.allot()
+        return self._name(expression), self.rows[expression]
+
+    def _store(self, *expressions: sympy.Expr) -> None:
+        for expression in expressions:
+            self._both(f"out[o, {self.rows[expression]}] = {self.variables[expression]}")
+
+    def _operation(self, expression: sympy.Expr) -> str:
+        if self.time is not None and expression == self.time[0]:
+            return self._bind(expression, "t", self.time[1])
+        if expression.is_Add:
+            return self._sum(expression)
+        if expression.is_Mul:
+            return self._product(expression)
+        if expression.is_Pow and expression.base is sympy.E:
+            return self._exponential(expression, expression.exp)
+        if expression.is_Pow:
+            return self._power(expression)
+        if isinstance(expression, sympy.exp):
+            return self._exponential(expression, expression.args[0])
+        if expression.func in PAIRS:
+            return self._pair(expression)
+        if expression.func in OWN_SQUARE:
+            return self._own_square(expression)
+        if isinstance(expression, hypot):
+            a, b = expression.args
+            return self._bind(expression, *2 * (self.coefficient(sympy.sqrt(a**2 + b**2)),))
+        if isinstance(expression, exp2):
+            return self._bind(
+                expression, *2 * (self.coefficient(sympy.exp(sympy.log(2) * expression.args[0])),)
+            )
+        if isinstance(expression, BY_DERIVATIVE):
+            return self._by_derivative(expression)
+        raise NoSeries(f"{type(expression).__name__} is not analytic")
+
+    def _sum(self, expression: sympy.Expr) -> str:
+        constant = [term for term in expression.args if self._is_constant(term)]
+        text = " + ".join(self._term(term) for term in expression.args if term not in constant)
+        first = f"{text} + {self.constants.name(sympy.Add(*constant))}" if constant else text
+        return self._bind(expression, first, text)
+
+    def _term(self, term: sympy.Expr) -> str:
+        factors = sympy.Mul.make_args(term)
+        constant = [factor for factor in factors if self._is_constant(factor)]
+        rest = sympy.Mul(*(factor for factor in factors if factor not in constant))
+        if not constant:
+            return self.coefficient(rest)
+        return f"{self.constants.name(sympy.Mul(*constant))}*{self.coefficient(rest)}"
+
+    def _product(self, expression: sympy.Expr) -> str:
+        factors = expression.args
+        if any(self._is_constant(factor) for factor in factors):
+            return self._bind(expression, *2 * (self._term(expression),))
+        below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
+        # A divisor that is known has its reciprocal kept, and is multiplied by.
+        below = [f for f in below if self.known is None or f.free_symbols & self.own]
+        if below and len(below) < len(factors):
+            above = sympy.Mul(*(f for f in factors if f not in below))
+            return self._quotient(expression, above, sympy.Mul(*(1 / f for f in below)))
+        if len(below) > 1:
+            return self._quotient(expression, None, sympy.Mul(*(1 / f for f in below)))
+        *others, last = sorted(factors, key=lambda factor: bool(factor.free_symbols & self.own))
+        return self._convolution(expression, sympy.Mul(*others), last)
+
+    def _convolution(self, expression: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> str:
+        left, right = self.row(a), self.row(b)
+        name = self._name(expression)
+        return self._bind(
+            expression,
+            f"out[0, {left}]*out[0, {right}]",
+            "0.0",
+            "for j in range(o + 1):",
+            f"    {name} += out[j, {left}]*out[o - j, {right}]",
+        )
+
+    def _square(self, expression: sympy.Expr, base: sympy.Expr) -> str:
+        row, name = self.row(base), self._name(expression)
+        return self._bind(
+            expression,
+            f"out[0, {row}]*out[0, {row}]",
+            "0.0",
+            "for j in range((o + 1)//2):",
+            f"    {name} += out[j, {row}]*out[o - j, {row}]",
+            f"{name} += {name}",
+            "if o % 2 == 0:",
+            f"    {name} += out[o//2, {row}]*out[o//2, {row}]",
+        )
+
+    def _quotient(self, expression: sympy.Expr, above: sympy.Expr | None, below: sympy.Expr) -> str:
+        text = None if above is None else self.coefficient(above)
+        divisor = self.row(below)
+        name, row = self._kept(expression)
+        self._bind(
+            expression,
+            f"{text or '1.0'}/out[0, {divisor}]",
+            text or "0.0",
+            "for j in range(1, o + 1):",
+            f"    {name} -= out[j, {divisor}]*out[o - j, {row}]",
+            f"{name} /= out[0, {divisor}]",
+        )
+        self._store(expression)
+        return name
+
+    def _power(self, expression: sympy.Expr) -> str:
+        base, exponent = expression.args
+        if not self._is_constant(exponent):
+            return self._bind(
+                expression, *2 * (self.coefficient(sympy.exp(exponent * sympy.log(base))),)
+            )
+        if exponent.is_Integer and exponent.is_negative:
+            return self._quotient(expression, None, base**-exponent)
+        if exponent.is_Integer:
+            if exponent.p % 2:
+                return self._convolution(expression, base ** (exponent - 1), base)
+            return self._square(expression, base ** (exponent // 2))
+        u, k = self.row(base), self.constants.name(exponent)
+        name, row = self._kept(expression)
+        self._bind(
+            expression,
+            f"sqrt(out[0, {u}])" if exponent == sympy.Rational(1, 2) else f"out[0, {u}]**{k}",
+            "0.0",
+            "for j in range(1, o + 1):",
+            f"    {name} += (j*{k} - (o - j))*out[j, {u}]*out[o - j, {row}]",
+            f"{name} /= o*out[0, {u}]",
+        )
+        self._store(expression)
+        return name
+
+    def _rate(self, u: sympy.Expr) -> str | None:
+        """The constant rate of an argument that is linear in time, None for others."""
+        if self.time is None or self.time[1] != ONE_THEN_ZERO:
+            return None
+        slope = u.diff(self.time[0])
+        rest = u.free_symbols & self.own - {self.time[0]}
+        return None if rest or not self._is_constant(slope) else self.constants.name(slope)
+
+    def _exponential(self, expression: sympy.Expr, u: sympy.Expr) -> str:
+        rate = self._rate(u)
+        argument = self.coefficient(u)
+        u_row = None if rate else self.row(u)
+        name, row = self._kept(expression)
+        if rate:
+            self._bind(expression, f"exp({argument})", f"{rate}*out[o - 1, {row}]/o")
+        else:
+            self._bind(
+                expression,
+                f"exp({argument})",
+                "0.0",
+                "for j in range(1, o + 1):",
+                f"    {name} += j*out[j, {u_row}]*out[o - j, {row}]",
+                f"{name} /= o",
+            )
+        self._store(expression)
+        return name
+
+    def _pair(self, expression: sympy.Expr) -> str:
+        odd, even, sign = PAIRS[expression.func]
+        (u,) = expression.args
+        s, c = odd(u), even(u)
+        rate = self._rate(u)
+        argument = self.coefficient(u)
+        u_row = None if rate else self.row(u)
+        (s_name, s_row), (c_name, c_row) = self._kept(s), self._kept(c)
+        self.first.append(f"{s_name} = {odd.__name__}({argument})")
+        self.first.append(f"{c_name} = {even.__name__}({argument})")
+        if rate:
+            self.higher.append(f"{s_name} = {rate}*out[o - 1, {c_row}]/o")
+            self.higher.append(f"{c_name} = {sign}{rate}*out[o - 1, {s_row}]/o")
+        else:
+            self.higher += [
+                f"{s_name} = 0.0",
+                f"{c_name} = 0.0",
+                "for j in range(1, o + 1):",
+                f"    {s_name} += j*out[j, {u_row}]*out[o - j, {c_row}]",
+                f"    {c_name} {sign or '+'}= j*out[j, {u_row}]*out[o - j, {s_row}]",
+                f"{s_name} /= o",
+                f"{c_name} /= o",
+            ]
+        self._store(s, c)
+        return self.variables[expression]
+
+    def _own_square(self, expression: sympy.Expr) -> str:
+        sign = OWN_SQUARE[expression.func]
+        (u,) = expression.args
+        argument, u_row = self.coefficient(u), self.row(u)
+        slope = 1 - expression**2 if sign else 1 + expression**2
+        name, row = self._kept(expression)
+        slope_name, slope_row = self._kept(slope)
+        function = expression.func.__name__
+        self.first += [f"{name} = {function}({argument})", f"{slope_name} = 1.0 {sign or '+'} {name}*{name}"]
+        self.higher += [
+            f"{name} = 0.0",
+            "for j in range(1, o + 1):",
+            f"    {name} += j*out[j, {u_row}]*out[o - j, {slope_row}]",
+            f"{name} /= o",
+        ]
+        self._store(expression)
+        self.higher += [
+            f"{slope_name} = 0.0",
+            "for j in range(o + 1):",
+            f"    {slope_name} {sign or '+'}= out[j, {row}]*out[o - j, {row}]",
+        ]
+        self._store(slope)
+        return name
+
+    def _by_derivative(self, expression: sympy.Expr) -> str:
+        (u,) = expression.args
+        argument, u_row = self.coefficient(u), self.row(u)
+        slope = self.row(expression.fdiff())
+        name = self._name(expression)
+        return self._bind(
+            expression,
+            f"{MATH_FUNCTIONS[expression.func]}({argument})",
+            "0.0",
+            "for j in range(1, o + 1):",
+            f"    {name} += j*out[j, {u_row}]*out[o - j, {slope}]",
+            f"{name} /= o",
+        )
+
+
+ONE_THEN_ZERO = "(1.0 if o == 1 else 0.0)"
+
+
+class Constants:
+    """Names for expressions of the parameters alone, computed once a call."""
+
+    def __init__(self) -> None:
+        self.names: dict[sympy.Expr, str] = {}
+
+    def name(self, expression: sympy.Expr) -> str:
+        """A name, or the number itself."""
+        if expression.is_Number or expression.is_NumberSymbol:
+            text = repr(float(expression))
+            return f"({text})" if text.startswith("-") else text
+        return self.names.setdefault(expression, f"k{len(self.names)}")
+
+    def statements(self) -> list[str]:
+        """Assignments of all of them."""
+        return assignments(list(self.names.values()), list(self.names))
+
+
+def directional(expression: sympy.Expr, seeds: dict[sympy.Symbol, sympy.Symbol]) -> sympy.Expr:
+    """Derivative along the seeds, one for each symbol, in a form that keeps common factors together."""
+    if not expression.free_symbols & seeds.keys():
+        return ZERO
+    if expression.is_Symbol:
+        return seeds[expression]
+    if expression.is_Add:
+        return sympy.Add(*(directional(term, seeds) for term in expression.args))
+    if expression.is_Mul:
+        args = expression.args
+        return sympy.Add(
+            *(
+                sympy.Mul(*args[:i], directional(factor, seeds), *args[i + 1 :])
+                for i, factor in enumerate(args)
+                if factor.free_symbols & seeds.keys()
+            )
+        )
+    return sympy.Add(
+        *(
+            _outer(expression, i) * directional(argument, seeds)
+            for i, argument in enumerate(expression.args)
+            if argument.free_symbols & seeds.keys()
+        )
+    )
+
+
+def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
+    """Derivative of the outermost function in its argument of that index."""
+    if expression.is_Pow:
+        base, exponent = expression.args
+        return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
+    return expression.fdiff(index + 1)
+
+
+def indented(statements: Iterable[str]) -> list[str]:
+    """One level deeper."""
+    return [f"    {statement}" for statement in statements]
+
+
+def loop(
+    targets: Sequence[str], rates: Sequence[sympy.Expr], starts: Sequence[str], block: Recurrences
+) -> list[str]:
+    """Statements for the series of ``y' = rates`` from ``starts``, in the columns ``targets``."""
+    values = [block.coefficient(rate) for rate in rates]
+    carried = [f"{block.prefix}r{i} = {value}" for i, value in enumerate(values)]
+    return [
+        "o = 0",
+        *(f"out[0, {target}] = {start}" for target, start in zip(targets, starts, strict=True)),
+        *block.first,
+        *carried,
+        "for o in range(1, order + 1):",
+        *indented(
+            [
+                "shrink = 1.0/o",
+                *(f"out[o, {target}] = shrink*{block.prefix}r{i}" for i, target in enumerate(targets)),
+                *block.higher,
+                *carried,
+            ]
+        ),
+    ]
+
