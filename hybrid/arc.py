@@ -26,7 +26,7 @@ class Jump:
     t, j
         Time, and the number of jumps before this one.
     transition, source, target
-        Names of the transition and of the modes before and after.
+        Names of the transition and of the modes before and after; ``target`` is None where it ended the run.
     x_minus, x_plus
         States ``(n,)`` before and after.
     saltation
@@ -40,7 +40,7 @@ class Jump:
     j: int
     transition: str
     source: str
-    target: str
+    target: str | None
     x_minus: np.ndarray
     x_plus: np.ndarray
     saltation: np.ndarray

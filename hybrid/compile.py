@@ -70,17 +70,20 @@ class CompiledSystem:
             dimension=system.dimension,
             first_outgoing=_indices(first),
             outgoing=_indices(outgoing),
-            target=_indices(system.mode_index(transition.target) for transition in transitions),
+            target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             affine_guard=_indices(self.emitted.affine_guard),
             boundary=_indices(transition.source != transition.target for transition in transitions),
             marker=_indices(transition.is_marker for transition in transitions),
             accumulates_to=_indices(
-                NO_MODE if transition.accumulates_to is None else system.mode_index(transition.accumulates_to)
-                for transition in transitions
+                _index_or_none(system, transition.accumulates_to) for transition in transitions
             ),
             period=system.forcing_period(parameters) or 0.0,
         )
+
+
+def _index_or_none(system: HybridSystem, mode: str | None) -> int:
+    return NO_MODE if mode is None else system.mode_index(mode)
 
 
 def _indices(values: Any) -> np.ndarray:

@@ -21,12 +21,12 @@ from hybrid.names import PARAMETERS, STATE, plain_class
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
 from hybrid.propagator import Boundary, Propagator, propagator
-from hybrid.roles import Role, field_role, guard_role, reset_role
-from hybrid.symbolic import JUMPING, ONE, ZERO
+from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
+from hybrid.symbolic import JUMPING, ONE, ZERO, Select
 from hybrid.trace import Symbols, TraceError, model_symbols, trace
 
 if TYPE_CHECKING:
-    from hybrid.system import HybridSystem
+    from hybrid.system import HybridSystem, Transition
 
 # A cell of a matrix in the statements for a derivative.
 _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
@@ -40,7 +40,8 @@ class Emitted:
     ----------
     source
         Text of a module with the functions ``flow``, ``flow_jacobian``, ``variational_flow``, ``guard``,
-        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. The same
+        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. Behind the
+        guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
         model gives the same text, in any process.
     opaque
         What the text refers to by name: the model functions that tracing could not follow, to be
@@ -76,13 +77,14 @@ def emit(system: HybridSystem) -> Emitted:
     writer = _Writer(system)
     fields = [writer.write(field_role(system, mode)) for mode in system.modes]
     guards = [writer.write(guard_role(transition)) for transition in system.transitions]
+    conditions = [_written_condition(writer, transition) for transition in system.transitions]
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
     propagators = [_propagator(writer, system, i, fields[i], guards) for i in range(len(fields))]
     functions = (
         _function("flow", [field.value for field in fields]),
         _function("flow_jacobian", [field.derivative for field in fields]),
         _function("variational_flow", [_variational(field, system.dimension) for field in fields]),
-        _function("guard", [guard.value for guard in guards]),
+        _function("guard", [*(guard.value for guard in guards), *conditions]),
         _function("guard_gradient", [guard.derivative for guard in guards]),
         _function("reset", [reset.value for reset in resets]),
         _function("reset_jacobian", [reset.derivative for reset in resets]),
@@ -133,6 +135,14 @@ class _Writer:
         given = role.derivative is not None
         return _Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
+    def condition(self, role: Role) -> list[str]:
+        """Statements for the condition of a guard; a truth value becomes 1 or 0."""
+        try:
+            [value] = self._traced(role.function)
+        except ModelError:
+            return self._opaque_value(role, ["out[0]"])
+        return assignments(["out[0]"], [Select(value, ONE, ZERO) if value.is_Boolean else value])
+
     def identity(self) -> _Written:
         """The reset of a transition that has none."""
         n = self.system.dimension
@@ -147,9 +157,7 @@ class _Writer:
         return expressions
 
     def _write_opaque(self, role: Role, targets: Sequence[str], reason: ModelError) -> _Written:
-        name = self._opaque_name(role.function)
-        value = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
-        value += [f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)]
+        value = self._opaque_value(role, targets)
         if role.derivative is not None:
             return _Written(value, self._given_derivative(role, role.derivative))
         error = complex_step_error(self.system, role)
@@ -159,10 +167,16 @@ class _Writer:
                 f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, np.where) "
                 f"or give its derivative as {role.derivative_name}=."
             ) from (reason.__cause__ or error)
-        return _Written(value, self._complex_step(role, name))
+        return _Written(value, self._complex_step(role))
 
-    def _complex_step(self, role: Role, name: str) -> list[str]:
-        n = self.system.dimension
+    def _opaque_value(self, role: Role, targets: Sequence[str]) -> list[str]:
+        lines = [f"v = {self._opaque_name(role.function)}(t, {self._state()}, {self._parameters()})"]
+        return lines + [
+            f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)
+        ]
+
+    def _complex_step(self, role: Role) -> list[str]:
+        n, name = self.system.dimension, self._opaque_name(role.function)
         lines = []
         if isinstance(self.system.state, int):
             lines.append(f"z = x[:{n}].astype(np.complex128)")
@@ -213,6 +227,9 @@ class _Writer:
         return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
 
     def _opaque_name(self, function: Callable[..., Any]) -> str:
+        for name, known in self.opaque.items():
+            if known is function:
+                return name
         name = f"model_{sum(key.startswith('model_') for key in self.opaque)}"
         self.opaque[name] = function
         return name
@@ -248,7 +265,7 @@ def _propagator(
     boundaries = [
         Boundary(
             None if written.expressions is None else written.expressions[0],
-            -transition.guard.direction if transition.source != transition.target else 0,
+            -transition.guard.direction if _ends_mode(transition) else 0,
         )
         for transition, written in zip(system.transitions, guards, strict=True)
         if transition.source == mode
@@ -256,13 +273,23 @@ def _propagator(
     return propagator(field.expressions, boundaries, writer.symbols)
 
 
-def _function(
-    name: str, branches: Iterable[Sequence[str]], arguments: str = "index, t, x, p, out"
-) -> str:
+def _ends_mode(transition: Transition) -> bool:
+    """Whether no state beyond the guard stays in the mode."""
+    return transition.source != transition.target and transition.guard.when is None
+
+
+def _written_condition(writer: _Writer, transition: Transition) -> list[str]:
+    role = condition_role(transition)
+    return [] if role is None else writer.condition(role)
+
+
+def _function(name: str, branches: Iterable[Sequence[str]], arguments: str = "index, t, x, p, out") -> str:
+    """Source of a role with one branch an index; an empty one is left out."""
     lines = [f"def {name}({arguments}):"]
     for index, statements in enumerate(branches):
-        lines.append(f"    {'elif' if index else 'if'} index == {index}:")
-        lines += [f"        {statement}" for statement in statements or ("pass",)]
+        if statements:
+            lines.append(f"    {'if' if len(lines) == 1 else 'elif'} index == {index}:")
+            lines += [f"        {statement}" for statement in statements]
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n"

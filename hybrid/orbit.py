@@ -325,7 +325,7 @@ class _Shooting:
 
     def _signature(self, shot: _Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)
-        return (shot.mode, *(jump.target for jump in arc.jumps))
+        return (shot.mode, *(jump.target for jump in arc.jumps if jump.target is not None))
 
     def _follow(self, point: _Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.arc import HybridArc
 from hybrid.errors import ArgumentError, unknown_name
-from hybrid.system import HybridSystem, Transition
+from hybrid.system import END, HybridSystem, Transition
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -121,7 +121,7 @@ def plot_graph(system: HybridSystem, ax: Axes | None = None) -> Axes:
     """Draw the mode graph: modes as boxes, transitions as arrows that say how their guard crosses zero.
 
     An upward arrow marks a guard that rises through zero, a downward one a guard that falls; dashed edges
-    reset the state. Modes have the colours they have in the other pictures.
+    reset the state. Modes have the colours they have in the other pictures; a dot is the end of a run.
 
     Parameters
     ----------
@@ -138,18 +138,30 @@ def plot_graph(system: HybridSystem, ax: Axes | None = None) -> Axes:
     crowd = len(graph)
     (ax,) = _axes(ax, 1, figsize=((4.0, 2.6), (6.0, 2.8), (7.0, 6.0))[min(crowd, 3) - 1])
     where = _places(graph)
-    boxes = {mode: _draw_mode(ax, mode, where[mode], _colour(system.mode_index(mode))) for mode in graph}
+    boxes = {
+        mode: _draw_mode(ax, mode, where[mode], _colour(system.mode_index(mode)))
+        for mode in system.mode_names
+    }
+    if END in graph:
+        boxes[END] = _draw_end(ax, where[END])
     parallel: Counter[tuple[str, str]] = Counter()
     loops: defaultdict[str, list[Transition]] = defaultdict(list)
     for transition in system.transitions:
-        ends = (transition.source, transition.target)
+        ends = (transition.source, END if transition.target is None else transition.target)
         if ends[0] == ends[1]:
             loops[ends[0]].append(transition)
             continue
         bend = 0.28 + 0.3 * parallel[ends]
         parallel[ends] += 1
         # Among many modes edges cross near their middles, so their labels stand before.
-        _draw_edge(ax, transition, where, bend, 0.5 if crowd <= 2 else 0.38, boxes)
+        _draw_edge(
+            ax,
+            transition,
+            [where[end] for end in ends],
+            bend,
+            0.5 if crowd <= 2 else 0.38,
+            [boxes[end] for end in ends],
+        )
     for mode, around in loops.items():
         outward = where[mode] if crowd > 2 else np.array([0.0, 1.0])
         middle = np.degrees(np.arctan2(outward[1], outward[0]))
@@ -185,21 +197,26 @@ def _draw_mode(ax: Axes, mode: str, place: np.ndarray, colour: str) -> Any:
     return text.get_bbox_patch()
 
 
+def _draw_end(ax: Axes, place: np.ndarray) -> Any:
+    style = {"boxstyle": "circle,pad=0.25", "fc": "black", "ec": "black"}
+    return ax.text(place[0], place[1], " ", ha="center", va="center", zorder=4, bbox=style).get_bbox_patch()
+
+
 def _draw_edge(
     ax: Axes,
     transition: Transition,
-    where: Mapping[str, np.ndarray],
+    places: Sequence[np.ndarray],
     bend: float,
     along: float,
-    boxes: Mapping[str, Any],
+    boxes: Sequence[Any],
 ) -> None:
     """A bent arrow between two boxes, with its label at the part ``along`` of its Bezier curve."""
-    start, end = where[transition.source], where[transition.target]
+    start, end = places
     style = {
         **_arrow(transition),
         "connectionstyle": f"arc3,rad={bend}",
-        "patchA": boxes[transition.source],
-        "patchB": boxes[transition.target],
+        "patchA": boxes[0],
+        "patchB": boxes[1],
         "shrinkA": 1,
         "shrinkB": 1,
     }

@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.derivative import check_derivative
 from hybrid.errors import ModelError
 from hybrid.names import parameter_view, state_values
-from hybrid.roles import Role, roles
+from hybrid.roles import CONDITION, Role, roles
 
 if TYPE_CHECKING:
     from hybrid.system import HybridSystem
@@ -120,6 +120,13 @@ def _check_arity(
 
 def _check_value(system: HybridSystem, role: Role, value: Any) -> None:
     if role.size is None:
+        if role.name == CONDITION:
+            if not _is_number(value):
+                raise ModelError(
+                    f"{role.title} must return one number, positive where the guard may fire, or a truth "
+                    f"value; got {value!r}."
+                )
+            return
         # A truth value has no side to cross from and no slope to cross with.
         if isinstance(value, bool | np.bool_) or not _is_number(value):
             raise ModelError(f"{role.title} must return one number that changes sign; got {value!r}.")

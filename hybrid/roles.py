@@ -11,9 +11,12 @@ if TYPE_CHECKING:
     from hybrid.system import HybridSystem, Mode, Transition
 
 
+CONDITION = "when"
+
+
 @attrs.frozen
 class Role:
-    """One model function: a field, a guard or a reset.
+    """One model function: a field, a guard, the condition of a guard, or a reset.
 
     Parameters
     ----------
@@ -22,7 +25,8 @@ class Role:
     name, derivative_name
         What the function and its derivative are called: ``"field"`` and ``"jacobian"``.
     function, derivative
-        The user's functions of ``(t, x, p)``; ``derivative`` is None where it is to be derived.
+        The user's functions of ``(t, x, p)``; ``derivative`` is None where it is to be derived. A condition
+        has none.
     size
         Number of values, or None for a scalar.
     """
@@ -61,6 +65,13 @@ def guard_role(transition: Transition) -> Role:
     return Role(f"Transition {transition.name!r}", "guard", guard.function, "gradient", guard.gradient, None)
 
 
+def condition_role(transition: Transition) -> Role | None:
+    """The condition of a guard, None if it has none."""
+    if transition.guard.when is None:
+        return None
+    return Role(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
+
+
 def reset_role(system: HybridSystem, transition: Transition) -> Role | None:
     """The reset of a transition, None if that is the identity."""
     reset = transition.reset
@@ -76,6 +87,9 @@ def roles(system: HybridSystem) -> Iterator[Role]:
         yield field_role(system, mode)
     for transition in system.transitions:
         yield guard_role(transition)
+        condition = condition_role(transition)
+        if condition is not None:
+            yield condition
         reset = reset_role(system, transition)
         if reset is not None:
             yield reset

@@ -408,7 +408,7 @@ def _guards_beyond(
     from hybrid.kernels.jump import enter
 
     phase = run.clock[codes.PHASE]
-    values = np.zeros(len(system.transitions))
+    values = np.ones(2 * len(system.transitions))
     guard_values(model, phase, run.y, values)
     run.count[codes.MODE] = index
     enter(model, run, work)
@@ -422,6 +422,7 @@ def _guards_beyond(
                 f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}. "
                 "A guard must be finite wherever its mode runs."
             )
-        if transition.guard.direction == run.side[i] and not transition.is_marker:
+        allowed = values[i + len(system.transitions)] > 0.0
+        if transition.guard.direction == run.side[i] and allowed and not transition.is_marker:
             beyond.append((transition.name, bool(run.on_guard[i])))
     return beyond

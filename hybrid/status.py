@@ -19,6 +19,7 @@ class StatusCode(IntEnum):
     NON_FINITE = codes.NON_FINITE
     ACCUMULATION = codes.ACCUMULATION
     STUCK = codes.STUCK
+    TERMINAL = codes.TERMINAL
     AMBIGUOUS_ORDER = 99
     SINGULAR_SALTATION = 100
     NOT_CONVERGED = 101
@@ -79,6 +80,10 @@ def run_status(code: int, t: float, mode: str, transition: str | None) -> Status
             f"Jumps follow one another without end {where}, last {last}: "
             "the fields on both sides point at the guard.",
             "Add a sliding mode, or derive one with hybrid.filippov.",
+        ),
+        StatusCode.TERMINAL: (
+            f"Ended by {last} {where}.",
+            "The model goes no further: that transition has no target.",
         ),
     }
     kind = StatusCode(code)

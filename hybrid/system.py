@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import networkx as nx
 
 ModelFunction = Callable[..., Any]
+# Node of the graph that stands for the end of a run.
+END = "(end)"
 
 
 def _callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
@@ -31,6 +33,11 @@ def _callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> 
 def _optional_callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
     if value is not None:
         _callable(instance, attribute, value)
+
+
+def _optional_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if value is not None:
+        _nonempty_name(instance, attribute, value)
 
 
 def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
@@ -53,16 +60,21 @@ class Guard:
     gradient
         Optional ``(D_x g, D_t g)`` as a function of ``(t, x, p)`` that returns ``n + 1`` values, or
         ``n`` if the guard does not depend on time. Derived from ``function`` when left out.
+    when
+        Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if it is positive
+        (or true) there, and is passed as if there were no guard if not. It is asked at crossings and at the
+        entry of the mode only, and need not be continuous.
 
     Raises
     ------
     ModelError
-        If ``function`` is not callable or ``direction`` is none of -1, 0, +1.
+        If a given function is not callable or ``direction`` is none of -1, 0, +1.
     """
 
     function: ModelFunction = attrs.field(validator=_callable)
     direction: int = attrs.field(default=0)
     gradient: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+    when: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
 
     @direction.validator
     def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:
@@ -145,7 +157,8 @@ class Transition:
     Parameters
     ----------
     source, target
-        Names of modes.
+        Names of modes; without a target (``None``) the run ends where the transition fires, with the status
+        ``TERMINAL``.
     guard
         When it fires.
     reset
@@ -155,20 +168,28 @@ class Transition:
         this transition leads from a mode to itself and its jumps can accumulate. Without it a run ends at the
         limit.
     name
-        Defaults to ``"source->target"``.
+        Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
 
     Raises
     ------
     ModelError
-        If guard or reset are of the wrong type or a name is empty.
+        If guard or reset are of the wrong type, a name is empty, or there is a reset but no target.
     """
 
     source: str = attrs.field(validator=_nonempty_name)
-    target: str = attrs.field(validator=_nonempty_name)
+    target: str | None = attrs.field(validator=_optional_name)
     guard: Guard = attrs.field(converter=_as_guard)
     reset: Reset | None = attrs.field(default=None, converter=_as_reset)
     accumulates_to: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(kw_only=True, validator=_nonempty_name)
+
+    @reset.validator
+    def _check_reset(self, attribute: attrs.Attribute[Reset | None], value: object) -> None:
+        if value is not None and self.target is None:
+            raise ModelError(
+                f"Transition {self.source}->{END}: nothing follows a reset where there is no target. "
+                "Leave the reset out, or name a target mode."
+            )
 
     @accumulates_to.validator
     def _check_limit(self, attribute: attrs.Attribute[str | None], value: object) -> None:
@@ -180,7 +201,7 @@ class Transition:
 
     @name.default
     def _default_name(self) -> str:
-        return f"{self.source}->{self.target}"
+        return f"{self.source}->{END if self.target is None else self.target}"
 
     @property
     def is_marker(self) -> bool:
@@ -307,7 +328,8 @@ class HybridSystem:
     def graph(self) -> nx.MultiDiGraph:
         """The modes and transitions as a networkx graph, for looking at, checking and drawing.
 
-        Nodes carry ``mode``, edges are keyed by the transition's name and carry ``transition``.
+        Nodes carry ``mode``, edges are keyed by the transition's name and carry ``transition``. Transitions
+        that end the run lead to the node ``"(end)"``, which carries no mode.
         """
         import networkx as nx
 
@@ -315,7 +337,8 @@ class HybridSystem:
         for mode in self.modes:
             graph.add_node(mode.name, mode=mode)
         for transition in self.transitions:
-            graph.add_edge(transition.source, transition.target, key=transition.name, transition=transition)
+            target = END if transition.target is None else transition.target
+            graph.add_edge(transition.source, target, key=transition.name, transition=transition)
             if transition.accumulates_to is not None:
                 limit = f"limit of {transition.name}"
                 graph.add_edge(transition.source, transition.accumulates_to, key=limit, transition=transition)
@@ -365,6 +388,10 @@ class HybridSystem:
                 if not isinstance(item, kind):
                     raise ModelError(f"HybridSystem: each {what} must be a {kind.__name__}; got {item!r}.")
             names = [item.name for item in items]
+            if END in names:
+                raise ModelError(
+                    f"HybridSystem: {what} name {END!r} stands for the end of a run. Choose another name."
+                )
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise ModelError(

@@ -8,6 +8,7 @@ STEP_TOO_SMALL = 4
 NON_FINITE = 5
 ACCUMULATION = 6
 STUCK = 7
+TERMINAL = 8
 
 # What the next call of the driver has to do before it can step: nothing, evaluate the rates anew
 # (the tangent vectors were changed from outside), or take its sides at every guard of a new mode.
@@ -63,6 +64,7 @@ TRANSVERSE = 0
 GRAZING = 1
 LIMIT_OF_CHATTER = 2
 
+# Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 
 # Propagators of a mode.

@@ -3,13 +3,17 @@
 from numba import int64, njit
 
 from hybrid.kernels.codes import (
+    ENTERING,
     MODE,
+    NO_MODE,
     NO_TRANSITION,
     ORDER_MATTERED,
     PHASE,
+    PHASE_OF_RUN,
+    PREVIOUS_MODE,
     SIMULTANEOUS,
 )
-from hybrid.kernels.guards import guard_speed, guard_value, rounding_band
+from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, sides_at_point
 from hybrid.kernels.layout import KERNEL, MODEL, PART, RUN, WORK
 
 MOST_JUMPS = 50
@@ -19,22 +23,23 @@ SAME = 1e-9
 
 @njit(**KERNEL)
 def is_due(model, run, transition, mode, t, x, work):
-    """Whether a guard is zero, up to rounding, and moving to where its transition fires."""
+    """Whether a guard is zero, up to rounding, and moving to where its transition fires, as it may."""
     value = guard_value(model, transition, t, x, work.scalar)
     model.flow(mode, t, x, model.parameters, work.field)
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-    if abs(value) > rounding_band(model, run, t, work.gradient) or model.marker[transition] == 1:
+    if abs(value) > rounding_band(model, run, t, work.gradient):
         return False
-    return speed * model.direction[transition] > 0.0
+    return speed * model.direction[transition] > 0.0 and allowed(model, transition, t, x, work.scalar)
 
 
 @njit(**KERNEL)
-def companion(model, run, fired, work):
-    """Another transition due at the very point where ``fired`` has landed, or none."""
-    mode = run.count[MODE]
+def companion(model, run, mode, t, x, fired, markers, work):
+    """Another transition due at the very point of ``fired``, or none; ``markers`` says whether they count."""
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
-        if other != fired and is_due(model, run, other, mode, run.clock[PHASE], run.y, work):
+        if other == fired or (model.marker[other] == 1 and not markers):
+            continue
+        if is_due(model, run, other, mode, t, x, work):
             return other
     return NO_TRANSITION
 
@@ -51,15 +56,11 @@ def settle(model, run, first, out, work):
         for i in range(n):
             out[i] = work.state[i]
         mode = model.target[fired]
-        following = NO_TRANSITION
-        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-            other = model.outgoing[slot]
-            if other != fired and is_due(model, run, other, mode, t, out, work):
-                following = other
-                break
-        if following == NO_TRANSITION:
+        if mode == NO_MODE:
             break
-        fired = following
+        fired = companion(model, run, mode, t, out, fired, False, work)
+        if fired == NO_TRANSITION:
+            break
     return mode
 
 
@@ -79,8 +80,20 @@ def order_matters(model, run, one, other, work):
 
 @njit(int64(MODEL, RUN, int64, WORK), **PART)
 def first_in_order(model, run, fired, work):
-    """Of the transitions due where the run landed, the one listed first; notes whether order matters."""
-    other = companion(model, run, fired, work)
+    """Of the transitions due where the run landed, the one listed first; notes whether order matters.
+
+    None if ``fired`` may not fire and no other is due: the run then takes its sides anew at this point, with
+    the crossing behind it.
+    """
+    mode, t = run.count[MODE], run.clock[PHASE]
+    if not allowed(model, fired, t, run.y, work.scalar):
+        other = companion(model, run, mode, t, run.y, fired, True, work)
+        if other == NO_TRANSITION:
+            sides_at_point(model, run, work)
+            run.count[PREVIOUS_MODE] = mode
+            run.count[PHASE_OF_RUN] = ENTERING
+        return other
+    other = companion(model, run, mode, t, run.y, fired, False, work)
     if other == NO_TRANSITION:
         return fired
     run.count[SIMULTANEOUS] += 1

@@ -38,9 +38,11 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
     STUCK,
+    TERMINAL,
 )
 from hybrid.kernels.guards import (
     NOT_THERE,
+    allowed,
     earliest_crossing,
     guard_acceleration,
     guard_speed,
@@ -85,7 +87,8 @@ def arrived(model, run, work):
         if run.on_guard[transition] == 0 and abs(value) <= rounding_band(model, run, t, work.gradient):
             after = 1 if speed > 0.0 else -1
             direction = model.direction[transition]
-            if speed != 0.0 and after != run.side[transition] and direction in (0, after):
+            crossed = speed != 0.0 and after != run.side[transition] and direction in (0, after)
+            if crossed and allowed(model, transition, t, run.y, work.scalar):
                 return transition
     return NO_TRANSITION
 
@@ -147,14 +150,16 @@ def time_left(model, run, stop_cycle, stop_phase):
 @njit(**KERNEL)
 def remember_grazing(model, method, run, record, t, h, work):
     """Count the grazing found on the attempted step, and write it into the record if that keeps any."""
-    run.count[GRAZINGS] += 1
-    slot = record.used[2]
-    if slot == record.grazing_time.shape[0]:
-        return
     mode, transition = run.count[MODE], run.count[GRAZING_GUARD]
     theta = run.clock[GRAZING_PLACE]
     interpolate(method, h, run.y, model.dimension, work)
     value_on_interpolant(model, transition, t, h, theta, work)
+    if not allowed(model, transition, t + theta * h, work.state, work.scalar):
+        return
+    run.count[GRAZINGS] += 1
+    slot = record.used[2]
+    if slot == record.grazing_time.shape[0]:
+        return
     for i in range(model.dimension):
         record.grazing_state[slot, i] = work.state[i]
     place = record.grazing_state[slot]
@@ -270,6 +275,8 @@ def advance(
             fired = run.count[PENDING]
             run.count[PENDING] = NO_TRANSITION
             parts.jump(model, method, run, record, fired, tangents, orthonormal, work)
+            if model.target[fired] == NO_MODE:
+                return TERMINAL
             remaining = time_left(model, run, stop_cycle, stop_phase)
             if (
                 parts.finish_chatter(

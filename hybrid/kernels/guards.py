@@ -11,6 +11,7 @@ from hybrid.kernels.codes import (
     GRAZING_VALUE,
     MODE,
     NO_TRANSITION,
+    PHASE,
 )
 from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MODEL, VECTOR
 from hybrid.kernels.step import attempt_again
@@ -39,11 +40,21 @@ def guard_value(model, transition, t, x, scalar):
     return scalar[0]
 
 
+@njit(**KERNEL)
+def allowed(model, transition, t, x, scalar):
+    """Whether the condition of a transition holds; one without a condition always does."""
+    scalar[0] = 1.0
+    return guard_value(model, transition + model.target.shape[0], t, x, scalar) > 0.0
+
+
 @njit(void(MODEL, float64, VECTOR, VECTOR), **ENTRY)
 def guard_values(model, t, x, out):
-    """Value of every guard of the system, in whichever mode, into ``out (transitions,)``."""
-    for transition in range(out.shape[0]):
-        model.guard(transition, t, x, model.parameters, out[transition : transition + 1])
+    """Every guard of the system, in whichever mode, and then every condition, into ``out (2 transitions,)``.
+
+    What has no condition keeps the value that is in ``out``.
+    """
+    for index in range(out.shape[0]):
+        model.guard(index, t, x, model.parameters, out[index : index + 1])
 
 
 @njit(**INLINE)
@@ -78,6 +89,26 @@ def widen_scale(model, run, work):
         size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
     for i in range(model.dimension if pace > 0.0 else 0):
         run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
+
+
+@njit(**KERNEL)
+def sides_at_point(model, run, work):
+    """Bring the sides of the mode's guards, known at the ends of a step only, to where the run has landed.
+
+    A guard that is zero there has not been crossed yet: it keeps the side it had before. A guard that
+    fires both ways is followed no further than that: its side is 0 away from the guard.
+    """
+    mode, t = run.count[MODE], run.clock[PHASE]
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        direction = model.direction[transition]
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        beyond = value * direction > 0.0
+        if abs(value) > rounding_band(model, run, t, work.gradient):
+            run.side[transition] = direction if beyond else -direction
+        elif direction != 0:
+            run.side[transition] = -direction
 
 
 @njit(**INLINE)

@@ -41,37 +41,19 @@ from hybrid.kernels.codes import (
     TRANSVERSE,
 )
 from hybrid.kernels.guards import (
+    allowed,
     error_band,
     guard_acceleration,
     guard_speed,
     guard_value,
     rounding_band,
+    sides_at_point,
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
 
 EPSILON = 2.220446049250313e-16
-
-
-@njit(**KERNEL)
-def sides_at_jump(model, run, work):
-    """Bring the sides of the guards of the mode, known at the ends of a step only, to the point of the jump.
-
-    A guard on which the jump happens has not been crossed yet: it keeps the side it had before. A guard that
-    fires both ways is followed no further than that: its side is 0 away from the guard.
-    """
-    mode, t = run.count[MODE], run.clock[PHASE]
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        transition = model.outgoing[slot]
-        direction = model.direction[transition]
-        value = guard_value(model, transition, t, run.y, work.scalar)
-        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        beyond = value * direction > 0.0
-        if abs(value) > rounding_band(model, run, t, work.gradient):
-            run.side[transition] = direction if beyond else -direction
-        elif direction != 0:
-            run.side[transition] = -direction
 
 
 @njit(**KERNEL)
@@ -96,7 +78,8 @@ def enter(model, run, work):
     acceleration where the speed vanishes too. A guard that the state has come to lie on or beyond fires at
     once, except the transition that has just fired: if the state moves on through its guard the crossing is
     done, and if it rests there the answer is ``RESTING``: the transition would fire for ever. A guard that
-    fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump.
+    fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump. A
+    transition whose condition does not hold here does not fire: its guard has then been crossed.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     landed = run.count[JUMPS] > 0
@@ -125,6 +108,8 @@ def enter(model, run, work):
         inbound = side == direction or (direction == 0 and on_guard and side * before < 0)
         if not inbound or model.marker[transition] == 1:
             continue
+        if not allowed(model, transition, t, run.y, work.scalar):
+            continue
         if landed and transition == run.count[LAST_FIRED]:
             against = direction != 0 and run.clock[LAST_TRANSVERSALITY] * direction <= 0.0
             stuck = stuck or (on_guard and (resting or against))
@@ -143,14 +128,18 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
 
     ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
     (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
-    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities.
+    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities. After a transition
+    that ends the run the state stays where it is, ``f_plus = 0``.
     """
     n = model.dimension
     model.flow(mode, t, x_minus, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, x_minus, work.field, work.gradient)
     model.reset(transition, t, x_minus, model.parameters, x_plus)
     model.reset_jacobian(transition, t, x_minus, model.parameters, work.reset_jacobian)
-    model.flow(model.target[transition], t, x_plus, model.parameters, work.field_after)
+    for i in range(n):
+        work.field_after[i] = 0.0
+    if model.target[transition] != NO_MODE:
+        model.flow(model.target[transition], t, x_plus, model.parameters, work.field_after)
     for i in range(n):
         difference = work.field_after[i] - work.reset_jacobian[i, n]
         for j in range(n):
@@ -257,7 +246,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING
         run.count[ILL_CONDITIONED] += 1
-    sides_at_jump(model, run, work)
+    sides_at_point(model, run, work)
     remember_jump(model, run, record, transition, transversality, kind, work.new, work)
     if tangents > 0:
         before = run.growth[0]
@@ -266,7 +255,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
             run.clock[ILL_CONDITIONED_GROWTH] += run.growth[0] - before
     if mode == target and model.direction[transition] != 0:
         remember_impulse(model, run, transition, transversality, work)
-    move(model, run, transition, target, work.new)
+    move(model, run, transition, mode if target == NO_MODE else target, work.new)
 
 
 @njit(**KERNEL)

@@ -21,8 +21,10 @@ MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 class Model(NamedTuple):
     """The roles of a compiled system, its parameters and its graph as index arrays.
 
-    ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the transitions that leave mode ``m``, in the
-    order they were listed. ``boundary`` is 1 for a transition that a state on the far side of its guard
+    ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
+    which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
+    transitions that leave mode ``m``, in the order they were listed; ``target`` is -1 for one that ends the
+    run. ``boundary`` is 1 for a transition that a state on the far side of its guard
     must take at once, 0 for one that only crossings fire; ``accumulates_to`` the mode after a complete
     chatter, or -1. ``period`` is 0 without a forcing period.
     """
