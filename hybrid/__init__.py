@@ -12,7 +12,7 @@ from hybrid.orbit import PeriodicOrbit, periodic_orbit
 from hybrid.saltation import saltation_matrix
 from hybrid.section import Section, poincare_section, stroboscopic_section
 from hybrid.simulate import simulate
-from hybrid.solvers import DOP853, RadauIIA, Tsit5
+from hybrid.solvers import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
 
@@ -34,6 +34,7 @@ __all__ = [
     "Section",
     "Status",
     "StatusCode",
+    "Taylor",
     "Transition",
     "Tsit5",
     "compile_system",

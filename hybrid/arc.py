@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import comb
 from typing import Any, overload
 
 import attrs
@@ -148,7 +149,8 @@ class Pieces:
     mode, j
         Mode index and jump count of each, ``(S,)``.
     coefficients
-        ``(S, d + 1, n)``.
+        ``(S, d + 1, n + 1)`` of the state and, last, of the time since the start of the step. The variable
+        of a desingularised mode is not proportional to time.
     """
 
     t: np.ndarray
@@ -160,11 +162,45 @@ class Pieces:
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(len(times), n)`` and the index of the step each was taken from; at a jump, after it."""
         index = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, None)
-        theta = ((times - self.t[index]) / self.h[index])[:, None]
-        rows = self.coefficients[index].copy()
-        for level in range(rows.shape[1] - 1, 0, -1):
-            rows[:, :level] += theta[:, :, None] * (rows[:, 1 : level + 1] - rows[:, :level])
-        return rows[:, 0], index
+        coefficients = self.coefficients[index]
+        theta = _places(coefficients[:, :, -1], times - self.t[index], self.h[index])
+        return bernstein_values(coefficients[:, :, :-1], theta), index
+
+
+def bernstein_values(coefficients: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Values ``(N, ...)`` of polynomials ``(N, d + 1, ...)`` at one place of ``[0, 1]`` each."""
+    degree = coefficients.shape[1] - 1
+    theta = theta.reshape(-1, *[1] * (coefficients.ndim - 2))
+    total, power, rest = np.zeros_like(coefficients[:, 0]), np.ones_like(theta), 1.0 - theta
+    # Of the form of Horner's rule, with the binomials along the way; all terms of one sign stay so.
+    for j in range(degree + 1):
+        total = total * rest + comb(degree, j) * power * coefficients[:, j]
+        power = power * theta
+    return total
+
+
+def _places(clock: np.ndarray, since: np.ndarray, span: np.ndarray) -> np.ndarray:
+    """Place on ``[0, 1]`` where each clock ``(N, d + 1)`` shows the time ``since`` the start of its step."""
+    theta = np.clip(since / span, 0.0, 1.0)
+    degree = clock.shape[1] - 1
+    even = np.arange(degree + 1) / degree
+    uneven = np.flatnonzero(np.max(np.abs(clock - span[:, None] * even), axis=1) > 1e-12 * span)
+    if not uneven.size:
+        return theta
+    clock, since = clock[uneven], since[uneven]
+    low, high = np.zeros(uneven.size), np.ones(uneven.size)
+    place, slopes = theta[uneven], degree * np.diff(clock, axis=1)
+    for _ in range(60):
+        misfit = bernstein_values(clock, place) - since
+        low, high = np.where(misfit <= 0.0, place, low), np.where(misfit >= 0.0, place, high)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = place - misfit / bernstein_values(slopes, place)
+        newton = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+        moved, place = np.max(np.abs(newton - place)), newton
+        if moved <= 1e-16:
+            break
+    theta[uneven] = place
+    return theta
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -247,7 +283,7 @@ def hybrid_points(
     t_end, x_end, mode_end = end
     t = np.concatenate([pieces.t, jumps.t, [t_end]])
     j = np.concatenate([pieces.j, np.arange(len(jumps)), [len(jumps)]])
-    x = np.concatenate([pieces.coefficients[:, 0], jumps.x_minus, [x_end]])
+    x = np.concatenate([pieces.coefficients[:, 0, :-1], jumps.x_minus, [x_end]])
     mode = np.concatenate([pieces.mode, sources[jumps.transition], [mode_end]])
     kind = np.concatenate([np.zeros(len(pieces.t)), np.ones(len(jumps)), [1]])
     order = np.lexsort((kind, j))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybrid.emit import Emitted
     from hybrid.system import HybridSystem
 
-ROLES = ("flow", "flow_jacobian", "variational_flow", "guard", "guard_gradient", "reset", "reset_jacobian")
+ROLES = ("flow", "flow_jacobian", "variational_flow", "guard", "guard_gradient", "reset", "reset_jacobian", "series")
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -46,13 +46,22 @@ class CompiledSystem:
     def __repr__(self) -> str:
         system = self.system
         lines = [f"CompiledSystem of {system.name or 'a system'}: {system.dimension} states"]
-        for name, affine in zip(system.mode_names, self.emitted.affine_mode, strict=True):
-            lines.append(f"  mode {name}: {'affine' if affine else 'nonlinear'} in the state")
+        for name, propagator in zip(system.mode_names, self.emitted.propagators, strict=True):
+            lines.append(f"  mode {name}: {propagator}")
         for name, affine in zip(system.transition_names, self.emitted.affine_guard, strict=True):
             lines.append(
                 f"  transition {name}: {'affine guard' if affine else 'guard fitted along each step'}"
             )
         return "\n".join(lines)
+
+    @property
+    def series_columns(self) -> int:
+        """Columns that the series of any mode need besides state and tangent vectors."""
+        sources = [transition.source for transition in self.system.transitions]
+        return max(
+            each.columns + sources.count(name)
+            for name, each in zip(self.system.mode_names, self.emitted.propagators, strict=True)
+        )
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
         """What the kernels are given: roles, parameter values, graph."""
@@ -78,6 +87,8 @@ class CompiledSystem:
             accumulates_to=_indices(
                 _index_or_none(system, transition.accumulates_to) for transition in transitions
             ),
+            propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
+            degree=_indices(propagator.degree for propagator in self.emitted.propagators),
             period=system.forcing_period(parameters) or 0.0,
         )
 
@@ -134,14 +145,11 @@ def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
 def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
     from numba import cfunc
 
-    from hybrid.kernels.layout import MATRIX_ROLE, VECTOR_ROLE
+    from hybrid.kernels.layout import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE
 
+    types = {"flow_jacobian": MATRIX_ROLE, "reset_jacobian": MATRIX_ROLE, "series": SERIES_ROLE}
     return tuple(
-        cfunc(
-            (MATRIX_ROLE if role.endswith("jacobian") else VECTOR_ROLE).signature,
-            cache=cached,
-            error_model="numpy",
-        )(namespace[role])
+        cfunc(types.get(role, VECTOR_ROLE).signature, cache=cached, error_model="numpy")(namespace[role])
         for role in ROLES
     )
 

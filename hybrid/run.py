@@ -13,7 +13,8 @@ from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
 from hybrid.load import address, load_kernels
-from hybrid.solvers import DOP853, RungeKutta
+from hybrid.solvers import RungeKutta, Taylor
+from hybrid.solvers.taylor import HIGHEST_ORDER
 from hybrid.status import Status, StatusCode, run_status
 from hybrid.system import HybridSystem
 
@@ -38,6 +39,7 @@ def method_tuple(solver: RungeKutta) -> Any:
         tableau.quadrature,
         tableau.interpolant,
         int(tableau.implicit),
+        solver.order if isinstance(solver, Taylor) else 0,
         1.0 / tableau.error_order,
         solver.rtol,
         solver.atol,
@@ -46,17 +48,22 @@ def method_tuple(solver: RungeKutta) -> Any:
 
 
 @cache
-def driver_parts(implicit: bool) -> Any:
-    """The pieces that the driver is handed; the implicit step is loaded only for a solver that needs it."""
-    from hybrid.kernels.layout import Parts
+def driver_parts(series_only: bool, implicit: bool) -> Any:
+    """The pieces that the driver is handed; steps that the run does not take are not loaded."""
+    from hybrid.kernels.layout import Attempts, Parts
 
     jumps, corners = load_kernels("hybrid.kernels.jump"), load_kernels("hybrid.kernels.corner")
     if implicit:
         attempt = load_kernels("hybrid.kernels.radau").attempt_radau
     else:
         attempt = load_kernels("hybrid.kernels.step").no_attempt
+    if series_only:
+        step = load_kernels("hybrid.kernels.step").no_step
+    else:
+        step = load_kernels("hybrid.kernels.runge_kutta").runge_kutta_step
     return Parts(
-        attempt_implicit=address(attempt),
+        attempts=Attempts(address(attempt)),
+        runge_kutta_step=address(step),
         enter=address(jumps.enter),
         jump=address(jumps.jump),
         finish_chatter=address(jumps.finish_chatter),
@@ -65,8 +72,13 @@ def driver_parts(implicit: bool) -> Any:
     )
 
 
-def workspace(method: Any, dimension: int, tangents: int) -> Any:
-    """Scratch memory for one run."""
+def dense_degree(method: Any) -> int:
+    """Degree of the polynomials that a record of steps holds."""
+    return max(len(method.interpolant) - 1, HIGHEST_ORDER if method.order else 0)
+
+
+def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
+    """Scratch memory for one run; ``columns`` are those of series besides state and tangent vectors."""
     from hybrid.kernels.layout import Work
 
     n, length = dimension, dimension * (1 + tangents)
@@ -75,7 +87,7 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
     systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
     systems[-1:] = -1.0
     nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
-    width = max(degree, FIT_DEGREE) + 4
+    width = max(dense_degree(method), FIT_DEGREE) + 4
     return Work(
         stages=np.zeros((stages, length + 1)),
         speeds=np.zeros(stages),
@@ -100,6 +112,7 @@ def workspace(method: Any, dimension: int, tangents: int) -> Any:
         fit=np.linalg.inv(_bernstein_basis(nodes)),
         systems=systems,
         pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
+        series=np.zeros((HIGHEST_ORDER + 1, length + columns) if method.order else (0, 0)),
     )
 
 
@@ -120,7 +133,7 @@ def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) ->
         used=np.zeros(3, dtype=np.int64),
         step_time=np.zeros((steps, 2)),
         step_place=np.zeros((steps, 3), dtype=np.int64),
-        step_coefficients=np.zeros((steps, degree + 1, n)),
+        step_coefficients=np.zeros((steps, degree + 1, n + 1)),
         jump_time=np.zeros((jumps, 2)),
         jump_place=np.zeros((jumps, 3), dtype=np.int64),
         jump_states=np.zeros((jumps, 2, n)),
@@ -157,7 +170,7 @@ def check_count(name: str, value: object, least: int) -> None:
 def check_solver(solver: object) -> RungeKutta:
     """The solver, or the default one; ArgumentError for anything else."""
     if solver is None:
-        return DOP853()
+        return Taylor()
     if isinstance(solver, RungeKutta) and hasattr(solver, "tableau"):
         return solver
     raise ArgumentError(
@@ -278,7 +291,7 @@ class Trajectory:
 
     def no_record(self) -> Any:
         """A record that keeps nothing."""
-        return empty_record(self.model.dimension, len(self.method.interpolant) - 1)
+        return empty_record(self.model.dimension, dense_degree(self.method))
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
@@ -322,11 +335,13 @@ def start(
     state = check_state(system, x0)
     solver = check_solver(solver)
     model = compiled.model(parameters)
+    if not isinstance(solver, Taylor):
+        model = model._replace(propagator=np.full_like(model.propagator, codes.RUNGE_KUTTA))
     method = method_tuple(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
     y = state if tangent is None else np.concatenate([state, tangent.T.ravel()])
     run = _fresh_run(system, model, y, tangents, t0)
-    work = workspace(method, system.dimension, tangents)
+    work = workspace(method, system.dimension, tangents, compiled.series_columns)
     run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
     phase0 = split_time(t0, model.period)[1]
     return Trajectory(
@@ -336,7 +351,7 @@ def start(
         run,
         work,
         tangents,
-        driver_parts(bool(solver.tableau.implicit)),
+        driver_parts(codes.RUNGE_KUTTA not in model.propagator, bool(solver.tableau.implicit)),
         solver.max_steps,
         phase0,
     )

@@ -58,7 +58,7 @@ def saltation_matrix(
     index = system.transition_index(transition)
     state = check_state(system, x)
     model = compiled.model(parameters)
-    work = workspace(method_tuple(Tsit5()), system.dimension, 0)
+    work = workspace(method_tuple(Tsit5()), system.dimension, 0, 0)
     phase = split_time(finite_number("t", t), model.period)[1]
     source = system.mode_index(system.transitions[index].source)
     from hybrid.kernels.jump import saltation

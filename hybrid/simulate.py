@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.run import Trajectory, empty_record, start
+from hybrid.run import Trajectory, dense_degree, empty_record, start
 from hybrid.solvers import RungeKutta
 from hybrid.system import HybridSystem
 
@@ -130,7 +130,7 @@ class _Recorder:
         self.trajectory = trajectory
         self.times = times
         n = trajectory.model.dimension
-        degree = len(trajectory.method.interpolant) - 1
+        degree = dense_degree(trajectory.method)
         self.record = empty_record(n, degree, STEPS_AT_ONCE, JUMPS_AT_ONCE)
         self.steps = [_step_columns(empty_record(n, degree), 0.0)]
         self.jumps = [_jump_columns(empty_record(n, degree), 0.0)]

@@ -9,6 +9,8 @@ NON_FINITE = 5
 ACCUMULATION = 6
 STUCK = 7
 TERMINAL = 8
+# No end yet.
+GO_ON = -1
 
 # What the next call of the driver has to do before it can step: nothing, evaluate the rates anew
 # (the tangent vectors were changed from outside), or take its sides at every guard of a new mode.

@@ -51,6 +51,7 @@ from hybrid.kernels.guards import (
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.record import start_record
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
 
 EPSILON = 2.220446049250313e-16
@@ -261,17 +262,14 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
 @njit(**KERNEL)
 def remember_flight(run, record, n, span, x_limit):
     """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
-    slot = record.used[0]
-    if slot == record.step_time.shape[0]:
+    if record.used[0] == record.step_time.shape[0]:
         return
-    record.step_time[slot, 0], record.step_time[slot, 1] = run.clock[PHASE], span
-    record.step_place[slot, 0], record.step_place[slot, 1] = run.count[CYCLE], run.count[MODE]
-    record.step_place[slot, 2] = run.count[JUMPS]
-    rows = record.step_coefficients.shape[1]
-    for j in range(rows):
+    slot = start_record(run, record, run.clock[PHASE], span)
+    degree = record.step_coefficients.shape[1] - 1
+    for j in range(degree + 1):
         for i in range(n):
-            record.step_coefficients[slot, j, i] = run.y[i] + (x_limit[i] - run.y[i]) * j / (rows - 1)
-    record.used[0] = slot + 1
+            record.step_coefficients[slot, j, i] = run.y[i] + (x_limit[i] - run.y[i]) * j / degree
+        record.step_coefficients[slot, j, n] = span * j / degree
 
 
 @njit(**KERNEL)

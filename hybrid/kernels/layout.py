@@ -15,6 +15,7 @@ CUBE = float64[:, :, ::1]
 INDICES = int64[::1]
 
 VECTOR_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, VECTOR))
+SERIES_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, int64, MATRIX))
 MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 
 
@@ -26,7 +27,8 @@ class Model(NamedTuple):
     transitions that leave mode ``m``, in the order they were listed; ``target`` is -1 for one that ends the
     run. ``boundary`` is 1 for a transition that a state on the far side of its guard
     must take at once, 0 for one that only crossings fire; ``accumulates_to`` the mode after a complete
-    chatter, or -1. ``period`` is 0 without a forcing period.
+    chatter, or -1. ``propagator`` says how each mode is advanced; ``degree`` is that of its solutions in time
+    where they are polynomials, else 0. ``period`` is 0 without a forcing period.
     """
 
     flow: object
@@ -36,6 +38,7 @@ class Model(NamedTuple):
     guard_gradient: object
     reset: object
     reset_jacobian: object
+    series: object
     parameters: np.ndarray
     dimension: int
     first_outgoing: np.ndarray
@@ -46,6 +49,8 @@ class Model(NamedTuple):
     boundary: np.ndarray
     marker: np.ndarray
     accumulates_to: np.ndarray
+    propagator: np.ndarray
+    degree: np.ndarray
     period: float
 
 
@@ -58,8 +63,11 @@ MODEL = types.NamedTuple(
         VECTOR_ROLE,
         VECTOR_ROLE,
         MATRIX_ROLE,
+        SERIES_ROLE,
         VECTOR,
         int64,
+        INDICES,
+        INDICES,
         INDICES,
         INDICES,
         INDICES,
@@ -83,6 +91,7 @@ class Method(NamedTuple):
     ``interpolant (d + 1, S)`` gives the Bernstein coefficients of the step's interpolant: ``y0 + h *
     interpolant @ stages``. With ``implicit`` 1, row 0 is the derivative at the start, rows 1 to ``s`` are
     coupled and have the weights ``b``, and ``error[0]`` is also the coefficient of the estimate's filter.
+    ``order`` is that of Taylor series.
     """
 
     a: np.ndarray
@@ -93,6 +102,7 @@ class Method(NamedTuple):
     quadrature: np.ndarray
     interpolant: np.ndarray
     implicit: int
+    order: int
     exponent: float
     rtol: float
     atol: float
@@ -100,7 +110,7 @@ class Method(NamedTuple):
 
 
 METHOD = types.NamedTuple(
-    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, int64, float64, float64, float64, float64),
+    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, int64, int64, float64, float64, float64, float64),
     Method,
 )
 
@@ -145,6 +155,8 @@ class Work(NamedTuple):
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
     the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
     One array for all, since each one more is paid for wherever this tuple is passed.
+
+    For Taylor series, else empty: ``series (order + 1, columns)``.
     """
 
     stages: np.ndarray
@@ -170,6 +182,7 @@ class Work(NamedTuple):
     fit: np.ndarray
     systems: np.ndarray
     pivots: np.ndarray
+    series: np.ndarray
 
 
 WORK = types.NamedTuple(
@@ -197,6 +210,7 @@ WORK = types.NamedTuple(
         MATRIX,  # fit
         MATRIX,  # systems
         INDICES,  # pivots
+        MATRIX,  # series
     ),
     Work,
 )
@@ -206,7 +220,7 @@ class Record(NamedTuple):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
     ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
-    mode, jump count)`` and the Bernstein coefficients ``(d + 1, n)``. A jump: its phase and transversality,
+    mode, jump count)`` and the Bernstein coefficients ``(d + 1, n + 1)`` of the state and of the time since. A jump: its phase and transversality,
     ``(cycle, transition, kind)``, the states ``(2, n)`` before and after, and the saltation matrix ``(n,
     n)``. A grazing: ``(phase, value, acceleration)`` of the guard, ``(cycle, transition, jump count)`` and
     the state.
@@ -232,14 +246,26 @@ RECORD = types.NamedTuple(
 )
 
 
+class Attempts(NamedTuple):
+    """The step of an implicit method, which need not be compiled where the method is explicit."""
+
+    attempt_implicit: object
+
+
+ATTEMPTS = types.NamedUniTuple(
+    types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK)), 1, Attempts
+)
+
+
 class Parts(NamedTuple):
     """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
 
-    What is linked into a kernel is optimised again with it; what comes as an argument is not, and the
-    implicit step need not even be compiled where the method is explicit.
+    What is linked into a kernel is optimised again with it; what comes as an argument is not, and the step of
+    a Runge-Kutta method need not even be compiled where every mode has a series.
     """
 
-    attempt_implicit: object
+    attempts: Attempts
+    runge_kutta_step: object
     enter: object
     jump: object
     finish_chatter: object
@@ -249,7 +275,10 @@ class Parts(NamedTuple):
 
 PARTS = types.NamedTuple(
     (
-        types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK)),
+        ATTEMPTS,
+        types.FunctionType(
+            types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK)
+        ),
         types.FunctionType(int64(MODEL, RUN, WORK)),
         types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK)),
         types.FunctionType(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK)),

@@ -31,7 +31,7 @@ from hybrid.kernels.record import remember_grazing, start_record
 
 EPSILON = 2.220446049250313e-16
 # Series that can be trusted to the last digit are taken to this order, and cut off below rounding.
-EXACT_ORDER = 24
+EXACT_ORDER = 28
 EXACT_TOLERANCE = 1e-17
 # Share of the largest component that is an absolute tolerance for the others.
 SHARE = 1e-3
@@ -121,6 +121,27 @@ def time_of(series, clock, order, h, span):
             return newton
         s = newton
     return s
+
+
+@njit(**KERNEL)
+def step_until(series, clock, order, h, remaining, work):
+    """Shorten a step on the clock of a desingularised mode so that it does not pass the end of the run.
+
+    Beyond a zero of the root, where the mode ends, that clock would run backwards.
+    """
+    power, latest = 1.0, 0.0
+    for o in range(order + 1):
+        latest += abs(series[o, clock]) * power
+        power *= h
+    if latest < remaining:
+        return h
+    degree, _ = powers_on_step(series, clock + 2, order, h, 0, work.polynomial)
+    to_bernstein(work.polynomial, degree)
+    theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
+    longest = min(theta, 1.0) * h
+    if value_at(series, clock, order, longest) < remaining:
+        return h
+    return time_of(series, clock, order, longest, remaining)
 
 
 @njit(**INLINE)
@@ -289,18 +310,13 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock >= 0:
-        h = min(h, 1e100)
-        span = value_at(series, clock, order, h)
-        if span >= remaining:
-            h = time_of(series, clock, order, h, remaining)
-            span = remaining
+        h = step_until(series, clock, order, min(h, 1e100), remaining, work)
+        span = math.inf
     else:
         h = min(h, method.max_step, remaining)
         if not h < 1e100:
             h = unhurried(series, n, run)
         span = h
-    if not span > 4.0 * EPSILON * abs(t) and span < remaining:
-        return STEP_TOO_SMALL if span >= 0.0 else NON_FINITE, 0.0
     fired = NO_TRANSITION
     if guards > 0:
         theta, place, fired = earliest_on_series(model, method, run, order, t, h, length, kind, work)
@@ -311,8 +327,12 @@ def series_step(model, method, run, record, tangents, remaining, work):
             remember_grazing(model, run, record, t + since, work)
         if fired != NO_TRANSITION:
             h = refined(series, length + place, order, theta * h, h)
-            span = h if clock < 0 else value_at(series, clock, order, h)
+            span = h
             run.count[PENDING] = fired
+    if clock >= 0:
+        span = min(value_at(series, clock, order, h), remaining)
+    if fired == NO_TRANSITION and not span > 4.0 * EPSILON * abs(t) and span < remaining:
+        return STEP_TOO_SMALL, 0.0
     if record.step_time.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)

@@ -2,9 +2,22 @@
 
 import math
 
-from numba import float64, int64, njit, void
+from numba import float64, int64, njit, types, void
 
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MATRIX, METHOD, MODEL, PART, VECTOR, WORK
+from hybrid.kernels.layout import (
+    ATTEMPTS,
+    ENTRY,
+    INLINE,
+    KERNEL,
+    MATRIX,
+    METHOD,
+    MODEL,
+    PART,
+    RECORD,
+    RUN,
+    VECTOR,
+    WORK,
+)
 
 
 @njit(**INLINE)
@@ -168,6 +181,12 @@ def attempt(parts, model, method, mode, t, h, y, tangents, work):
 def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
     """``attempt``, for the places where a step is taken again: compiled once, not into each of them."""
     return attempt(parts, model, method, mode, t, h, y, tangents, work)
+
+
+@njit(types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK), **PART)
+def no_step(parts, model, method, run, record, tangents, remaining, work):
+    """Stands in for the step of a Runge-Kutta method where every mode has a series."""
+    return math.nan, 0.0
 
 
 @njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
