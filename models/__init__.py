@@ -1,5 +1,7 @@
 """Models ready to simulate, one file each; every factory returns a :class:`hybrid.HybridSystem`."""
 
 from models.bouncing_ball import bouncing_ball as bouncing_ball
+from models.buck_converter import buck_converter as buck_converter
 from models.impact_oscillator import impact_oscillator as impact_oscillator
+from models.solvable_oscillator import solvable_oscillator as solvable_oscillator
 from models.vibroimpact import vibroimpact as vibroimpact
