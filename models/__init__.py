@@ -5,4 +5,5 @@ from models.buck_converter import buck_converter as buck_converter
 from models.chua_circuit import chua_circuit as chua_circuit
 from models.impact_oscillator import impact_oscillator as impact_oscillator
 from models.solvable_oscillator import solvable_oscillator as solvable_oscillator
+from models.switched_arrival import switched_arrival as switched_arrival
 from models.vibroimpact import vibroimpact as vibroimpact
