@@ -1,5 +1,6 @@
 """Models ready to simulate, one file each; every factory returns a :class:`hybrid.HybridSystem`."""
 
+from models.ball_chain import ball_chain as ball_chain
 from models.bouncing_ball import bouncing_ball as bouncing_ball
 from models.buck_converter import buck_converter as buck_converter
 from models.chua_circuit import chua_circuit as chua_circuit
