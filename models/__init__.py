@@ -7,4 +7,5 @@ from models.chua_circuit import chua_circuit as chua_circuit
 from models.impact_oscillator import impact_oscillator as impact_oscillator
 from models.solvable_oscillator import solvable_oscillator as solvable_oscillator
 from models.switched_arrival import switched_arrival as switched_arrival
+from models.three_disk_billiard import three_disk_billiard as three_disk_billiard
 from models.vibroimpact import vibroimpact as vibroimpact
