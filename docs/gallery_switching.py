@@ -124,7 +124,7 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     ),
     (
         "three_disk_billiard",
-        "Seven particles that start within half a milliradian leave three disks in all directions.",
+        "Seven particles that start within a milliradian leave three disks in all directions.",
         scattering_by_three_disks,
     ),
 ]
