@@ -1,5 +1,11 @@
 """Models ready to simulate, one file each; every factory returns a :class:`hybrid.HybridSystem`."""
 
+from models.ball_chain import ball_chain as ball_chain
 from models.bouncing_ball import bouncing_ball as bouncing_ball
+from models.buck_converter import buck_converter as buck_converter
+from models.chua_circuit import chua_circuit as chua_circuit
 from models.impact_oscillator import impact_oscillator as impact_oscillator
+from models.solvable_oscillator import solvable_oscillator as solvable_oscillator
+from models.switched_arrival import switched_arrival as switched_arrival
+from models.three_disk_billiard import three_disk_billiard as three_disk_billiard
 from models.vibroimpact import vibroimpact as vibroimpact

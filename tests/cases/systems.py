@@ -7,29 +7,6 @@ import numpy as np
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 
-def solvable_oscillator() -> HybridSystem:
-    """``u'' - 2 b u' + (w^2 + b^2)(u - s) = 0``, ``w = 2 pi``; ``s = sgn(u)`` whenever ``u' = 0``.
-
-    In mode ``plus`` the sign must change where the velocity rises through zero at negative ``u``. There, and
-    only there, the smaller of ``v`` and ``-u`` rises through zero, since ``u`` cannot fall through zero while
-    ``v`` is positive. A turning point at which ``s`` already has the sign of ``u``, such as the start, is no
-    zero of it.
-    """
-
-    def field(s):
-        return lambda t, x, p: (x.v, 2 * p.b * x.v - ((2 * np.pi) ** 2 + p.b**2) * (x.u - s))
-
-    return HybridSystem(
-        state=("u", "v"),
-        parameters={"b": 0.5},
-        modes=[Mode("plus", field(1.0)), Mode("minus", field(-1.0))],
-        transitions=[
-            Transition("plus", "minus", Guard(lambda t, x, p: np.minimum(x.v, -x.u), direction=+1)),
-            Transition("minus", "plus", Guard(lambda t, x, p: np.maximum(x.v, -x.u), direction=-1)),
-        ],
-    )
-
-
 def rimless_wheel() -> HybridSystem:
     """Rimless wheel of leg length ``l`` on a slope ``gamma``, ``2 alpha`` between its legs."""
     return HybridSystem(
@@ -46,37 +23,6 @@ def rimless_wheel() -> HybridSystem:
             )
         ],
     )
-
-
-def buck_converter() -> HybridSystem:
-    """Voltage-mode buck converter whose ramp is driven by a clock, a state: ``tau`` runs from 0 to 1.
-
-    The ramp jumps back at the end of its period. With the clock a state and its return a reset, that is an
-    event like any other and every model function is smooth; a ramp made a function of time would be neither.
-    """
-
-    def error(x, p):
-        return p.gain * (x.v - p.reference) - (p.low + (p.high - p.low) * x.tau)
-
-    def field(on):
-        return lambda t, x, p: ((x.i - x.v / p.R) / p.C, (on * p.E - x.v) / p.L, 1 / p.T)
-
-    ramp_ends = Guard(lambda t, x, p: x.tau - 1, direction=+1)
-    clock = Reset(lambda t, x, p: (x.v, x.i, 0.0))
-    return HybridSystem(
-        state=("v", "i", "tau"),
-        parameters={
-            "E": 25.0, "L": 20e-3, "C": 47e-6, "R": 22.0, "T": 400e-6,
-            "reference": 11.3, "gain": 8.4, "low": 3.8, "high": 8.2,
-        },
-        modes=[Mode("off", field(0.0)), Mode("on", field(1.0))],
-        transitions=[
-            Transition("off", "on", Guard(lambda t, x, p: error(x, p), direction=-1), name="close"),
-            Transition("on", "off", Guard(lambda t, x, p: error(x, p), direction=+1), name="open"),
-            Transition("on", "off", ramp_ends, clock, name="ramp ends"),
-            Transition("off", "off", ramp_ends, clock, name="skipped"),
-        ],
-    )  # fmt: skip
 
 
 def switched_linear() -> HybridSystem:

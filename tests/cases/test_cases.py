@@ -8,58 +8,20 @@ import pytest
 import hybrid
 import lyapunov
 from tests.cases import systems
-from tests.reference.load import complex_pairs, reference
+from tests.reference.load import reference
 
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
 
-OSCILLATOR = reference("solvable_oscillator")
 WHEEL = reference("rimless_wheel")
-BUCK = reference("buck_converter")
 SWITCHED = reference("switched_linear")
 FRICTION = reference("stick_slip")
 SALTATION = reference("saltation")
 
-converters = pytest.mark.parametrize("converter", BUCK, ids=lambda converter: f"{converter['E']:g} V")
 runs = pytest.mark.parametrize("run", SWITCHED, ids=lambda run: str(run["x0"]))
 
 
 def in_order(multipliers):
     return sorted(map(complex, multipliers), key=lambda m: (round(m.real, 9), m.imag))
-
-
-@pytest.fixture(scope="module")
-def flips():
-    """Ten time units of the solvable oscillator."""
-    start = (OSCILLATOR["u"][0], 0.0)
-    arc = hybrid.simulate(systems.solvable_oscillator(), start, (0.0, 10.5), mode="plus", solver=TIGHT)
-    return arc.jumps
-
-
-class TestSolvableOscillator:
-    WHOLE_TIMES = tuple(n for n in OSCILLATOR["flips"] if n <= 10)
-
-    def test_flips_come_at_whole_times(self, flips):
-        np.testing.assert_allclose([jump.t for jump in flips], self.WHOLE_TIMES, atol=1e-9)
-
-    def test_orbit_follows_the_map(self, flips):
-        expected = [OSCILLATOR["u"][n] for n in self.WHOLE_TIMES]
-        np.testing.assert_allclose([jump.x_minus[0] for jump in flips], expected, atol=1e-8)
-
-    def test_saltation(self, flips):
-        for jump, expected in zip(flips, OSCILLATOR["saltation"], strict=False):
-            np.testing.assert_allclose(jump.saltation, expected, atol=1e-7)
-
-    def test_a_start_on_the_guard_neither_fires_nor_is_lost(self):
-        """The start is a turning point where the sign of ``u`` is already that of ``s``."""
-        for mode, sign in (("plus", 1.0), ("minus", -1.0)):
-            arc = hybrid.simulate(systems.solvable_oscillator(), (0.9 * sign, 0.0), (0.0, 0.9), mode=mode)
-            assert not arc.jumps
-
-    def test_spectrum(self):
-        result = lyapunov.lyapunov_spectrum(
-            systems.solvable_oscillator(), (0.3, 0.0), mode="plus", interval=1.0, intervals=400
-        )
-        np.testing.assert_allclose(result.exponents, OSCILLATOR["exponents"], atol=0.02)
 
 
 class TestRimlessWheel:
@@ -82,44 +44,6 @@ class TestRimlessWheel:
         orbit = hybrid.periodic_orbit(system, (theta, omega + 0.01), period=1.0)
         assert orbit.period == pytest.approx(WHEEL["period"], rel=1e-8)
         np.testing.assert_allclose(in_order(orbit.multipliers), sorted(WHEEL["multipliers"]), atol=1e-7)
-
-
-class TestBuckConverter:
-    """State ``(v, i, tau)``: the clock adds the multiplier 1 of an autonomous flow."""
-
-    T = 400e-6
-
-    @converters
-    def test_one_ramp(self, converter):
-        arc = hybrid.simulate(
-            systems.buck_converter(),
-            (*converter["x0"], 0.0),
-            (0.0, 1.2 * self.T),
-            mode="off",
-            parameters={"E": converter["E"]},
-            solver=TIGHT,
-        )
-        close, ramp_ends = arc.jumps[:2]
-        assert close.t / self.T == pytest.approx(converter["off_fraction"], abs=1e-10)
-        assert ramp_ends.t == pytest.approx(self.T, rel=1e-12)
-        np.testing.assert_allclose(ramp_ends.x_plus, [*converter["x0"], 0.0], atol=1e-9)
-        # With the clock left out this is the matrix of the converter driven by time.
-        np.testing.assert_allclose(close.saltation[:2, :2], converter["saltation"], atol=1e-9)
-
-    @converters
-    def test_orbit(self, converter):
-        v, i = converter["x0"]
-        start = (v + 1e-4, i + 1e-5, 0.0)
-        mid = hybrid.simulate(
-            systems.buck_converter(), start, (0.0, 0.1 * self.T), mode="off", parameters={"E": converter["E"]}
-        ).x[-1]
-        orbit = hybrid.periodic_orbit(
-            systems.buck_converter(), mid, mode="off", parameters={"E": converter["E"]}, period=self.T
-        )
-        assert orbit.period == pytest.approx(self.T, rel=1e-9)
-        expected = in_order([*complex_pairs(converter["multipliers"]), 1.0])
-        np.testing.assert_allclose(in_order(orbit.multipliers), expected, atol=1e-6)
-        assert np.prod(orbit.multipliers) == pytest.approx(converter["determinant"], rel=1e-7)
 
 
 class TestSwitchedLinear:

@@ -7,7 +7,7 @@ import pytest
 
 import hybrid
 from hybrid import HybridSystem, Mode, StatusCode, periodic_orbit, simulate
-from models import bouncing_ball, impact_oscillator, vibroimpact
+from models import bouncing_ball, buck_converter, impact_oscillator, vibroimpact
 from models.impact_oscillator import one_impact_orbits
 from tests.cases import systems
 from tests.reference.load import complex_pairs, reference
@@ -90,7 +90,7 @@ class TestAutonomous:
         """Unstable at 25 V. The start is the clock's own event, with the ramp just begun."""
         parameters = {"E": converter["E"]}
         orbit = periodic_orbit(
-            systems.buck_converter(), (*converter["x0"], 0.0), mode="off", parameters=parameters, period=4e-4
+            buck_converter(), (*converter["x0"], 0.0), mode="off", parameters=parameters, period=4e-4
         )
         assert orbit.status.ok
         expected = in_order([*complex_pairs(converter["multipliers"]), 1.0])

@@ -135,7 +135,7 @@ def covered(exact, runs):
 
 def test_error_bars_hold_the_exact_exponent_of_the_solvable_oscillator():
     """Over whole times its growth is exactly b, with no error to estimate; over others it fluctuates."""
-    system = systems.solvable_oscillator()
+    system = models.solvable_oscillator()
     runs = [
         lyapunov.lyapunov_spectrum(
             system, (u, 0.0), mode="plus", k=1, interval=0.37, intervals=400, transient=50, solver=SOLVER

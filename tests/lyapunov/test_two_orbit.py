@@ -82,7 +82,7 @@ def test_renormalised_companion_of_the_founding_system():
 def test_renormalised_companion_of_an_autonomous_chaotic_system():
     """Solvable chaotic oscillator, exponent b = 0.5: the two-orbit estimate follows the spectrum's."""
     where = {"mode": "plus", "interval": 1.0, "transient": 20}
-    system, x0 = systems.solvable_oscillator(), (0.3, 0.0)
+    system, x0 = models.solvable_oscillator(), (0.3, 0.0)
     result = lyapunov.two_orbit_exponents(system, x0, intervals=500, solver=TIGHT, **where)
     assert result.renormalised_exponent == pytest.approx(0.5, abs=0.02)
 

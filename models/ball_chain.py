@@ -1,0 +1,66 @@
+"""Three balls in a line that collide: Newton's cradle, many collisions, inelastic collapse."""
+
+from __future__ import annotations
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def ball_chain() -> HybridSystem:
+    r"""Three balls in a line that move freely and collide with Newton's law of restitution.
+
+    .. math::
+
+        v_k \mapsto v_k - \frac{(1 + e)\, m_{k+1}}{m_k + m_{k+1}} (v_k - v_{k+1}), \quad
+        v_{k+1} \mapsto v_{k+1} + \frac{(1 + e)\, m_k}{m_k + m_{k+1}} (v_k - v_{k+1})
+        \quad \text{at } q_k = q_{k+1}
+
+    Returns
+    -------
+    HybridSystem
+        State ``q1 <= q2 <= q3``, positions less the diameters of the balls before, and velocities ``v1``,
+        ``v2``, ``v3``; mode ``flight``; transitions ``left`` (balls 1 and 2) and ``right`` (2 and 3).
+        Parameters: masses ``m1 = m2 = m3 = 1``, restitution ``e = 1``, ``0 <= e <= 1``; any consistent units.
+
+    Notes
+    -----
+    - Elastic balls are a billiard of ``sqrt(m_k) q_k``: with the motion of the centre of mass left out, a
+      point in a wedge of the angle ``phi``, ``cos(phi)^2 = m1 m3 / ((m1 + m2) (m2 + m3))``. Unfolded, its
+      path is a straight line through copies of the wedge. It crosses at most ``ceil(pi / phi)`` sides, each
+      a collision.
+    - Where ``pi / phi`` is whole, as for equal masses, a collision of all three has one outcome in
+      either order. Elsewhere, or with ``e < 1``, the order matters, and the status says ``AMBIGUOUS_ORDER``.
+    - Equal balls with ``e < 7 - 4 sqrt(3) = 0.0718`` can collapse: infinitely many collisions, ``left`` and
+      ``right`` in turn, in finite time. A run follows them down to rounding; from there the balls
+      move as one.
+
+    References
+    ----------
+    S. McNamara, W. R. Young, "Inelastic collapse and clumping in a one-dimensional granular medium",
+    Physics of Fluids A 4, 496-504, 1992. doi:10.1063/1.858323
+    """
+
+    def left(t, x, p):
+        v1, v2 = collided(p.m1, x.v1, p.m2, x.v2, p.e)
+        return x.q1, x.q2, x.q3, v1, v2, x.v3
+
+    def right(t, x, p):
+        v2, v3 = collided(p.m2, x.v2, p.m3, x.v3, p.e)
+        return x.q1, x.q2, x.q3, x.v1, v2, v3
+
+    def collided(m, v, M, V, e):
+        change = (1 + e) * (v - V) / (m + M)
+        return v - M * change, V + m * change
+
+    def transition(name, gap, collision):
+        return Transition("flight", "flight", Guard(gap, direction=-1), Reset(collision), name=name)
+
+    return HybridSystem(
+        name="three balls in a line",
+        state=("q1", "q2", "q3", "v1", "v2", "v3"),
+        parameters={"m1": 1.0, "m2": 1.0, "m3": 1.0, "e": 1.0},
+        modes=[Mode("flight", lambda t, x, p: (x.v1, x.v2, x.v3, 0.0, 0.0, 0.0))],
+        transitions=[
+            transition("left", lambda t, x, p: x.q2 - x.q1, left),
+            transition("right", lambda t, x, p: x.q3 - x.q2, right),
+        ],
+    )

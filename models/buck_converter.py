@@ -1,0 +1,75 @@
+"""Voltage-mode buck converter: a linear filter switched where the control voltage meets a ramp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def buck_converter() -> HybridSystem:
+    r"""Buck converter in continuous conduction, its duty cycle set by proportional control of the voltage.
+
+    .. math::
+
+        C \dot v = i - v / R, \quad L \dot\imath = s E - v, \quad T \dot\tau = 1, \qquad
+        s = 1 \text{ while } a (v - V_{ref}) < V_L + (V_U - V_L)\, \tau, \text{ else } 0
+
+    The ramp is driven by a clock ``tau``, a state that goes back to 0 where it reaches 1: so its return is an
+    event, and every field and reset is smooth.
+
+    Returns
+    -------
+    HybridSystem
+        State ``v`` (output voltage, V), ``i`` (inductor current, A), ``tau`` (phase of the ramp, 0 to 1);
+        modes ``off`` and ``on`` of the switch; transitions ``close`` and ``open``, where control voltage and
+        ramp meet, and where the ramp ends ``reopen``, ``saturate`` (the switch stays closed, the control
+        voltage being below the new ramp) and ``skip`` (it stays open). Parameters: input voltage
+        ``E = 25`` V; inductor ``L = 20e-3`` H, capacitor ``C = 47e-6`` F, load ``R = 22`` Ohm; ramp from
+        ``V_L = 3.8`` V to ``V_U = 8.2`` V in the period ``T = 400e-6`` s; reference ``V_ref = 11.3`` V and
+        gain ``a = 8.4`` of the control voltage ``a (v - V_ref)``.
+
+    Notes
+    -----
+    - With ``g = a dv/dt - (V_U - V_L) / T``, the guard's speed, the saltation matrix where the switch closes
+      is the identity plus ``a E / (L g)`` in row ``i``, column ``v``, and a term in column ``tau``.
+    - No switching changes volumes, so on any orbit the exponents sum to ``-1 / (R C)``.
+    - The orbit of period ``T`` loses its stability in a period doubling at ``E = 24.5166`` V. A cascade to
+      chaos follows, and near 32.34 V the attractor grows suddenly.
+
+    References
+    ----------
+    E. Fossas, G. Olivar, "Study of chaos in the buck converter", IEEE Transactions on Circuits and Systems I
+    43(1), 13-25, 1996. doi:10.1109/81.481457
+    """
+
+    def field(s):
+        return lambda t, x, p: ((x.i - x.v / p.R) / p.C, (s * p.E - x.v) / p.L, 1 / p.T)
+
+    def control(x, p):
+        return p.a * (x.v - p.V_ref)
+
+    def excess(t, x, p):
+        return control(x, p) - p.V_L - (p.V_U - p.V_L) * x.tau
+
+    # The smaller of two terms rises through zero where one does so while the other is positive.
+    ramp_ends = Guard(lambda t, x, p: x.tau - 1, direction=+1)
+    ends_above = Guard(lambda t, x, p: np.minimum(x.tau - 1, control(x, p) - p.V_L), direction=+1)
+    ends_below = Guard(lambda t, x, p: np.minimum(x.tau - 1, p.V_L - control(x, p)), direction=+1)
+    restart = Reset(lambda t, x, p: (x.v, x.i, 0.0))
+    return HybridSystem(
+        name="buck converter",
+        state=("v", "i", "tau"),
+        parameters={
+            "E": 25.0, "L": 20e-3, "C": 47e-6, "R": 22.0, "T": 400e-6,
+            "V_L": 3.8, "V_U": 8.2, "V_ref": 11.3, "a": 8.4,
+        },
+        modes=[Mode("off", field(0.0)), Mode("on", field(1.0))],
+        transitions=[
+            Transition("off", "on", Guard(excess, direction=-1), name="close"),
+            Transition("on", "off", Guard(excess, direction=+1), name="open"),
+            Transition("on", "off", ends_above, restart, name="reopen"),
+            Transition("on", "on", ends_below, restart, name="saturate"),
+            Transition("off", "off", ramp_ends, restart, name="skip"),
+        ],
+    )  # fmt: skip

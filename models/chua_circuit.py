@@ -1,0 +1,64 @@
+"""Chua's circuit: a resonator and a piecewise-linear resistor, chaotic in three affine regions."""
+
+from __future__ import annotations
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+
+
+def chua_circuit() -> HybridSystem:
+    r"""Chua's circuit with its piecewise-linear resistor, in dimensionless form.
+
+    .. math::
+
+        \dot x = \alpha (y - x - f(x)), \quad \dot y = x - y + z, \quad \dot z = -\beta y, \qquad
+        f(x) = m_1 x + \tfrac12 (m_0 - m_1) (|x + 1| - |x - 1|)
+
+    Returns
+    -------
+    HybridSystem
+        State ``x``, ``y`` (voltages of the capacitors over the breakpoint of the resistor), ``z`` (scaled
+        current of the inductor); modes ``left`` (``x < -1``), ``inner`` and ``right`` (``x > 1``).
+        Dimensionless parameters: ``alpha = 9``, ``beta = 100/7``, slopes ``m0 = -8/7`` of the resistor in the
+        inner region and ``m1 = -5/7`` in the outer ones.
+
+    Notes
+    -----
+    - Field and state are continuous at the transitions: their saltation matrices are the identity.
+    - Equilibria are the origin and ``(x, 0, -x)`` with ``x = +-(m1 - m0) / (1 + m1)``, +-1.5. With ``m`` the
+      slope and ``a = alpha (1 + m)`` the eigenvalues there are the roots of
+      ``s^3 + (1 + a) s^2 + (beta + a - alpha) s + beta a``.
+    - The divergence is ``-1 - a``. So with the share ``nu`` of time spent in the inner region the exponents
+      sum to ``-1 - alpha (1 + m1 + nu (m0 - m1))``.
+    - The defaults give the double scroll, with the exponents 0.327, 0, -2.520 (Sprott 2003), so of the
+      Kaplan-Yorke dimension 2.13.
+
+    References
+    ----------
+    T. Matsumoto, L. O. Chua, M. Komuro, "The double scroll", IEEE Transactions on Circuits and Systems
+    32(8), 797-818, 1985. doi:10.1109/TCS.1985.1085791; J. C. Sprott, Chaos and Time-Series Analysis, Oxford
+    University Press 2003, appendix A.
+    """
+
+    def region(side):
+        def field(t, x, p):
+            # In a mode the resistor is a straight line, through the breakpoint at x = side if there is one.
+            resistor = p.m1 * x.x + (p.m0 - p.m1) * (side if side else x.x)
+            return p.alpha * (x.y - x.x - resistor), x.x - x.y + x.z, -p.beta * x.y
+
+        return field
+
+    def breakpoint_at(side, direction):
+        return Guard(lambda t, x, p: x.x - side, direction=direction)
+
+    return HybridSystem(
+        name="Chua's circuit",
+        state=("x", "y", "z"),
+        parameters={"alpha": 9.0, "beta": 100 / 7, "m0": -8 / 7, "m1": -5 / 7},
+        modes=[Mode("left", region(-1.0)), Mode("inner", region(0.0)), Mode("right", region(1.0))],
+        transitions=[
+            Transition("left", "inner", breakpoint_at(-1.0, +1)),
+            Transition("inner", "left", breakpoint_at(-1.0, -1)),
+            Transition("inner", "right", breakpoint_at(1.0, +1)),
+            Transition("right", "inner", breakpoint_at(1.0, -1)),
+        ],
+    )

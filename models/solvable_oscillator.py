@@ -1,0 +1,56 @@
+"""An oscillator of negative damping about a switched set point: chaos with an exact solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+
+
+def solvable_oscillator() -> HybridSystem:
+    r"""Solvable chaotic oscillator of Corron, Blakely and Stahl.
+
+    .. math::
+
+        \ddot u - 2 b\, \dot u + (w^2 + b^2)(u - s) = 0, \quad w = 2 \pi, \qquad
+        s \mapsto \operatorname{sgn}(u) \text{ at } \dot u = 0
+
+    In mode ``plus`` the sign must change where the velocity rises through zero at negative ``u``. There, and
+    only there, the smaller of ``v`` and ``-u`` rises through zero, since ``u`` cannot fall through zero while
+    ``v`` is positive. A turning point at which ``s`` already has the sign of ``u``, such as the start, is no
+    zero of it.
+
+    Returns
+    -------
+    HybridSystem
+        State ``u``, ``v`` (its velocity); modes ``plus`` (``s = 1``) and ``minus`` (``s = -1``).
+        Dimensionless parameter: ``b = 0.5``, the negative damping, ``0 < b < ln(2)``.
+
+    Notes
+    -----
+    From ``v = 0``, ``abs(u0) < 1``, ``s = sgn(u0)``:
+
+    - turning points come at whole and half times, flips only at whole ones, where the map is
+      ``u -> exp(b) u - (exp(b) - 1) s``, an expanding shift; the exponents are ``b`` and 0, exactly;
+    - from one whole time to the next ``u = s + (u_n - s) exp(b t) (cos(w t) - (b / w) sin(w t))``;
+    - a flip from ``s`` to ``-s`` has the saltation matrix ``diag(1, (s + u) / (u - s))``.
+
+    References
+    ----------
+    N. J. Corron, J. N. Blakely, M. T. Stahl, "A matched filter for chaos", Chaos 20, 023123, 2010.
+    doi:10.1063/1.3432557
+    """
+
+    def field(s):
+        return lambda t, x, p: (x.v, 2 * p.b * x.v - ((2 * np.pi) ** 2 + p.b**2) * (x.u - s))
+
+    return HybridSystem(
+        name="solvable chaotic oscillator",
+        state=("u", "v"),
+        parameters={"b": 0.5},
+        modes=[Mode("plus", field(1.0)), Mode("minus", field(-1.0))],
+        transitions=[
+            Transition("plus", "minus", Guard(lambda t, x, p: np.minimum(x.v, -x.u), direction=+1)),
+            Transition("minus", "plus", Guard(lambda t, x, p: np.maximum(x.v, -x.u), direction=-1)),
+        ],
+    )

@@ -1,0 +1,64 @@
+"""Buffers that drain, and one server that fills whichever has just run empty: chaos of constant fields."""
+
+from __future__ import annotations
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+
+
+def switched_arrival() -> HybridSystem:
+    r"""Switched arrival system of three buffers.
+
+    .. math::
+
+        \dot x_i = -\rho_i + \delta_{ij} \, (\rho_1 + \rho_2 + \rho_3)
+            \text{ while buffer } j \text{ is filled}, \qquad j \mapsto i \text{ at } x_i = 0
+
+    Returns
+    -------
+    HybridSystem
+        State ``x1``, ``x2``, ``x3``, the work in the buffers; modes ``fill1``, ``fill2``, ``fill3``, one a
+        buffer. Parameters: ``rho1 = rho2 = rho3 = 1/3``, the rates at which they drain (work per unit of
+        time). The server's rate is their sum, so the total of the work is constant.
+
+    Notes
+    -----
+    Exact answers for a total of 1 and rates that sum to 1:
+
+    - Equal rates: at a switch one buffer is empty, one holds ``a <= 1/2`` and one ``1 - a``. The next switch
+      comes after ``3 a`` and finds them with ``2 a``, 0 and ``1 - 2 a``: a doubling map of the sides of
+      the triangle of states. Its exponent is ln 2 a switch, and a switch comes every 3/4 on average.
+    - Any rates: the fields are constant, so a density that is uniform on the triangle in each mode, with the
+      share ``rho_j`` of time in mode ``j``, is invariant. It gives
+      ``2 rho_j (1 - rho_j)`` switches to ``j`` per unit of time.
+    - The saltation matrix of a switch to ``j`` has the determinant ``1 - 1 / rho_j``. The other two exponents
+      are zero, along the flow and by the total, so the largest is
+      ``sum_j 2 rho_j (1 - rho_j) ln((1 - rho_j) / rho_j)``; for equal rates ``(4/3) ln 2 = 0.924196``.
+    - Two buffers that run empty together leave no time between switches: the run is ``STUCK``.
+
+    References
+    ----------
+    C. Chase, J. Serrano, P. J. Ramadge, "Periodicity and chaos from switched flow systems: contrasting
+    examples of discretely controlled continuous systems", IEEE Transactions on Automatic Control 38(1),
+    70-83, 1993. doi:10.1109/9.186313
+    """
+    buffers = (1, 2, 3)
+
+    def filling(j):
+        def field(t, x, p):
+            inflow = p.rho1 + p.rho2 + p.rho3
+            return tuple(inflow * (i == j) - rho for i, rho in zip(buffers, p, strict=True))
+
+        return field
+
+    def empties(i):
+        return Guard(lambda t, x, p: x[i - 1], direction=-1)
+
+    return HybridSystem(
+        name="switched arrival system",
+        state=("x1", "x2", "x3"),
+        parameters={"rho1": 1 / 3, "rho2": 1 / 3, "rho3": 1 / 3},
+        modes=[Mode(f"fill{j}", filling(j)) for j in buffers],
+        transitions=[
+            Transition(f"fill{j}", f"fill{i}", empties(i)) for j in buffers for i in buffers if i != j
+        ],
+    )

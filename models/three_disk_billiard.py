@@ -1,0 +1,69 @@
+"""A particle among three disks: the scatterer with a chaotic repeller, or a closed dispersing billiard."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def three_disk_billiard() -> HybridSystem:
+    r"""Point particle among three hard disks at the corners of an equilateral triangle.
+
+    .. math::
+
+        \ddot q = 0, \quad |q - c_k| \ge a, \qquad
+        \dot q \mapsto \dot q - 2 (\dot q \cdot n)\, n, \; n = (q - c_k) / a \text{ at } |q - c_k| = a
+
+    Returns
+    -------
+    HybridSystem
+        State ``x``, ``y``, ``vx``, ``vy``; mode ``flight``; transitions ``disk1`` (above), ``disk2`` (left),
+        ``disk3`` (right). Parameters: radius ``a = 1``, distance of the centres ``R = 6``, both lengths.
+
+    Notes
+    -----
+    With ``sigma = R / a``:
+
+    - A reflection of the orbit between two disks stretches by ``sigma - 1 + sqrt(sigma (sigma - 2))``.
+    - One of the triangular orbit does by ``s - 1 + s sqrt(1 - sqrt(3) / sigma)``, ``s = 2 sigma / sqrt(3)``;
+      its multiplier is minus the cube, since three reflections turn the plane over.
+    - Nearly all particles escape; those that stay, forwards and backwards, form a chaotic repeller.
+    - For ``sqrt(3) < sigma < 2`` the disks overlap, and a particle between them is caught: a closed
+      dispersing billiard with the exponents ``lambda, 0, 0, -lambda``. In a pocket of the area ``A`` and the
+      perimeter ``P`` the mean free path is ``pi A / P``.
+
+    References
+    ----------
+    P. Gaspard, S. A. Rice, "Scattering from a classically chaotic repellor", Journal of Chemical Physics 90,
+    2225-2241, 1989. doi:10.1063/1.456017
+    """
+
+    def from_centre(k, x, p):
+        angle = np.pi / 2 + 2 * np.pi * k / 3
+        return x.x - p.R / np.sqrt(3) * np.cos(angle), x.y - p.R / np.sqrt(3) * np.sin(angle)
+
+    def reaches(k):
+        def gap(t, x, p):
+            dx, dy = from_centre(k, x, p)
+            return dx**2 + dy**2 - p.a**2
+
+        return Guard(gap, direction=-1)
+
+    def reflects(k):
+        def reset(t, x, p):
+            dx, dy = from_centre(k, x, p)
+            twice = 2 * (x.vx * dx + x.vy * dy) / (dx**2 + dy**2)
+            return x.x, x.y, x.vx - twice * dx, x.vy - twice * dy
+
+        return Reset(reset)
+
+    return HybridSystem(
+        name="three-disk billiard",
+        state=("x", "y", "vx", "vy"),
+        parameters={"a": 1.0, "R": 6.0},
+        modes=[Mode("flight", lambda t, x, p: (x.vx, x.vy, 0.0, 0.0))],
+        transitions=[
+            Transition("flight", "flight", reaches(k), reflects(k), name=f"disk{k + 1}") for k in range(3)
+        ],
+    )
