@@ -30,24 +30,6 @@ def solvable_oscillator() -> HybridSystem:
     )
 
 
-def rimless_wheel() -> HybridSystem:
-    """Rimless wheel of leg length ``l`` on a slope ``gamma``, ``2 alpha`` between its legs."""
-    return HybridSystem(
-        state=("theta", "omega"),
-        parameters={"g": 9.8, "l": 1.0, "alpha": np.pi / 8, "gamma": 0.08},
-        modes=[Mode("stance", lambda t, x, p: (x.omega, p.g / p.l * np.sin(x.theta)))],
-        transitions=[
-            Transition(
-                "stance",
-                "stance",
-                Guard(lambda t, x, p: x.theta - p.gamma - p.alpha, direction=+1),
-                Reset(lambda t, x, p: (p.gamma - p.alpha, np.cos(2 * p.alpha) * x.omega)),
-                name="step",
-            )
-        ],
-    )
-
-
 def buck_converter() -> HybridSystem:
     """Voltage-mode buck converter whose ramp is driven by a clock, a state: ``tau`` runs from 0 to 1.
 

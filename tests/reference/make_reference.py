@@ -12,6 +12,7 @@ from pathlib import Path
 import founding_system
 import impacts
 import switched
+import walking
 
 ANSWERS = {
     "founding_system": founding_system.answers,
@@ -23,6 +24,8 @@ ANSWERS = {
     "switched_linear": switched.switched_linear,
     "stick_slip": switched.stick_slip,
     "saltation": switched.saltation,
+    "simplest_walker": walking.simplest_walker,
+    "slip_hopper": walking.slip_hopper,
 }
 
 if __name__ == "__main__":
