@@ -34,8 +34,8 @@ def dry_friction_oscillator() -> HybridSystem:
     ----------
     J. P. Den Hartog, "Forced vibrations with combined Coulomb and viscous friction", Transactions of the ASME
     53, 107-115, 1931.
-    S. W. Shaw, "On the dynamic response of a system with dry friction", Journal of Sound and Vibration 108(2),
-    305-325, 1986. doi:10.1016/S0022-460X(86)80058-X
+    S. W. Shaw, "On the dynamic response of a system with dry friction", Journal of Sound and Vibration
+    108(2), 305-325, 1986. doi:10.1016/S0022-460X(86)80058-X
     """
 
     def field(sign):
@@ -59,8 +59,9 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
 
         X^2 = \left(\frac{A}{1 - w^2}\right)^2 - \left(\frac{f \tan(\pi / 2 w)}{w}\right)^2
 
-    From the turning point at ``X`` the velocity is ``f sin(s) + D (cos(s) - cos(w s)) - X w sin(w s)`` for half
-    a period, with ``D = -f tan(pi / 2 w)``; the motion exists if that is negative throughout.
+    For half a period from the turning point at ``X`` the velocity is
+    ``f sin(s) + D (cos(s) - cos(w s)) - X w sin(w s)``, with ``D = -f tan(pi / 2 w)``; the motion exists if
+    that is negative throughout.
 
     Parameters
     ----------

@@ -27,19 +27,20 @@ def simplest_walker() -> HybridSystem:
     HybridSystem
         State ``theta`` (rad, of the stance leg from the slope's normal, uphill positive), ``phi`` (rad,
         between the legs) and the rates ``dtheta``, ``dphi``; modes ``behind`` and ``ahead``, where the swing
-        foot is; transitions ``passing`` and ``heelstrike``. Parameter: the slope ``gamma = 0.009`` rad. Time is
-        in units of ``sqrt(l / g)``.
+        foot is; transitions ``passing`` and ``heelstrike``. Parameter: the slope ``gamma = 0.009`` rad. Time
+        is in units of ``sqrt(l / g)``.
 
     Notes
     -----
     - The swing foot meets the ground twice a step, where ``phi - 2 theta`` falls through zero near mid-stance
       and where it rises. As in the paper it may pass the first time (no foot scuffing).
-    - At ``gamma = 0.009`` there are two gaits of period one. The long one, with ``theta = 0.200310900544`` and
-      ``dtheta = -0.199832473005`` after heelstrike and the multipliers
-      ``{1, -0.190099841066 +- 0.557598776682i, 0}``, is stable; the short one, ``theta = 0.193937369810``,
-      ``dtheta = -0.203866927442``, with ``{4.003864358930, 1, 0.459589589798, 0}``, is not.
-    - The long gait is stable for slopes below 0.015, then doubles its period again and again, and the walker
-      falls from about ``gamma = 0.019`` on.
+    - At ``gamma = 0.009`` there are two gaits of period one. The long one is stable: after heelstrike
+      ``theta = 0.200310900544``, ``dtheta = -0.199832473005``; multipliers
+      ``{1, -0.190099841066 +- 0.557598776682i, 0}``. The short one is not: ``theta = 0.193937369810``,
+      ``dtheta = -0.203866927442``; multipliers ``{4.003864358930, 1, 0.459589589798, 0}``.
+    - The long gait is stable for slopes below 0.015, then doubles its period again and again, and becomes
+      chaotic. From about ``gamma = 0.019`` on the walker falls. So it does from most starts at any slope;
+      there is no ground for its hip to fall on, and the run means nothing from there.
 
     References
     ----------

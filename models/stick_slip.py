@@ -6,7 +6,7 @@ from hybrid import Guard, HybridSystem, Mode, Reset, Transition, filippov
 
 
 def stick_slip() -> HybridSystem:
-    r"""Block of unit mass and stiffness on a belt, with friction that falls with the sliding speed (Stribeck).
+    r"""Block of unit mass and stiffness on a belt, with friction that falls with sliding speed (Stribeck).
 
     .. math::
 
@@ -22,7 +22,8 @@ def stick_slip() -> HybridSystem:
 
     Notes
     -----
-    - The block breaks loose at ``x = Fs``, without acceleration: the release has the saltation ``I``.
+    - The block breaks loose at ``x = Fs``, where the spring takes all the friction there is, so without
+      acceleration.
     - The limit cycle slips for 4.295999525 and sticks for 7.705031769, with the period 12.001031295; its
       largest displacement is 1.133944674. A stick forgets how fast the block slipped: the multipliers are
       ``{1, 0}``, and the second exponent is minus infinity, exactly.
@@ -57,8 +58,8 @@ def coulomb_stick_slip() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``x`` (displacement), ``v`` (velocity); modes ``stick`` and ``slip``; transitions ``release`` and
-        ``catch``. Dimensionless parameters: speed of the ``belt = 0.2``, static friction ``Fs = 1`` and
+        State ``x`` (displacement), ``v`` (velocity); modes ``stick`` and ``slip``; transitions ``release``
+        and ``catch``. Dimensionless parameters: speed of the ``belt = 0.2``, static friction ``Fs = 1`` and
         kinetic friction ``Fk = 0.5``.
 
     Notes
@@ -67,8 +68,8 @@ def coulomb_stick_slip() -> HybridSystem:
       ``hypot(x - Fk, v) < Fs + Fk``. The model knows no other slips.
     - With ``D = Fs - Fk`` the slip is ``x = Fk + D cos(s) + belt sin(s)``, lasts
       ``2 (pi - arctan(D / belt))`` and ends at ``Fk - D``; the stick lasts ``2 D / belt``.
-    - The saltation of the release is ``[[1, 0], [-D / belt, 1]]``, that of the catch ``[[1, 0], [0, 0]]``; the
-      multipliers of the limit cycle are ``{1, 0}``.
+    - The saltation of the release is ``[[1, 0], [-D / belt, 1]]``, that of the catch ``[[1, 0], [0, 0]]``;
+      the multipliers of the limit cycle are ``{1, 0}``.
 
     References
     ----------

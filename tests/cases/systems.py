@@ -77,7 +77,7 @@ def switched_linear() -> HybridSystem:
 
 
 def stick_slip() -> HybridSystem:
-    """Block on a belt with friction that falls with speed; the block never outruns the belt.
+    """``models.stick_slip`` with its stick written by hand; the block never outruns the belt.
 
     The release is a fold: at ``x = Fs`` the slip begins with ``v = belt`` and no acceleration, on the guard
     of the next sticking, which it leaves with ``v'' = -belt``.

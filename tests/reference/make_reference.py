@@ -10,6 +10,7 @@ import json
 from pathlib import Path
 
 import founding_system
+import friction
 import impacts
 import switched
 import walking
@@ -24,6 +25,7 @@ ANSWERS = {
     "switched_linear": switched.switched_linear,
     "stick_slip": switched.stick_slip,
     "saltation": switched.saltation,
+    "dry_friction_oscillator": friction.dry_friction_oscillator,
     "simplest_walker": walking.simplest_walker,
     "slip_hopper": walking.slip_hopper,
 }

@@ -63,9 +63,8 @@ def _until(flow, guard, state, skip=0):
         after = flow(state, STEP)
         falls += guard(state) > 0 >= guard(after)
         if falls >= skip and guard(state) < 0 <= guard(after):
-            h = mp.findroot(
-                lambda h: guard(flow(state, h)), (0, STEP), solver="anderson", tol=mp.mpf(10) ** -70
-            )
+            on_guard = lambda h, state=state: guard(flow(state, h))  # noqa: E731
+            h = mp.findroot(on_guard, (0, STEP), solver="anderson", tol=mp.mpf(10) ** -70)
             return t + h, flow(state, h)
         t, state = t + STEP, after
 
