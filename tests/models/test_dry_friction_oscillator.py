@@ -102,6 +102,17 @@ def test_without_friction_a_linear_resonance():
     assert den_hartog_amplitude(0.0, 2.0, 0.5) == pytest.approx(2.0 / 0.75, rel=1e-14)
 
 
+def test_one_of_a_family_at_half_the_natural_frequency():
+    """``X = 4/3`` turns at the forcing's extremes, where the acceleration falls to a quarter of itself."""
+    start, parameters = (4 / 3, 0.0), {"f": 0.2, "w": 0.5}
+    assert den_hartog_amplitude(0.2, 1.0, 0.5) == pytest.approx(4 / 3, rel=1e-14)
+    half = hybrid.simulate(
+        SYSTEM, start, (0.0, 2 * math.pi), parameters=parameters, solver=TIGHT, samples=[math.pi]
+    ).x[0]
+    orbit = hybrid.periodic_orbit(SYSTEM, half, parameters=parameters, t0=math.pi)
+    np.testing.assert_allclose(orbit.multipliers, [1.0, 1 / 16], atol=1e-8)
+
+
 def test_viscous_damping_contracts_with_the_friction():
     """An orbit that crosses contracts areas by ``exp(-c T)`` and by each turn's ratio of accelerations."""
     c, period = 0.2, SYSTEM.forcing_period()
