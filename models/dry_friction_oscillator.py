@@ -29,7 +29,7 @@ def dry_friction_oscillator() -> HybridSystem:
       friction or slower forcing it stops twice a period or oftener, and one multiplier is exactly zero.
     - A turning point without a stop multiplies areas by ``a_plus / a_minus``, the ratio of the accelerations
       after and before it, so that friction contracts only there; a stop loses a direction.
-    - At ``w = 1/2`` and ``c = 0`` the motion without stops is one of a family, the others unsymmetric, and one
+    - At ``w = 1/2`` and ``c = 0`` the motion without stops is one of a family, the others unsymmetric; one
       multiplier is 1: half a forcing period is a whole one of the free oscillator.
 
     References
