@@ -22,7 +22,16 @@ if TYPE_CHECKING:
     from hybrid.emit import Emitted
     from hybrid.system import HybridSystem
 
-ROLES = ("flow", "flow_jacobian", "variational_flow", "guard", "guard_gradient", "reset", "reset_jacobian", "series")
+ROLES = (
+    "flow",
+    "flow_jacobian",
+    "variational_flow",
+    "guard",
+    "guard_gradient",
+    "reset",
+    "reset_jacobian",
+    "series",
+)
 
 
 @attrs.frozen(eq=False, repr=False)

@@ -6,7 +6,7 @@ mode, ``max(x1 - x2, 0)`` is ``x1 - x2`` there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import attrs
 import sympy
@@ -216,7 +216,9 @@ def _write_desingularised(
     body = _Body(len(symbols.x), len(guards))
     clock, root = body.column(CLOCK), body.column(OTHERS)
     body.columns = OTHERS + 1
-    block = body.block({**{x: str(i) for i, x in enumerate(symbols.x)}, ROOT: root}, (symbols.t, f"out[o, {clock}]"))
+    block = body.block(
+        {**{x: str(i) for i, x in enumerate(symbols.x)}, ROOT: root}, (symbols.t, f"out[o, {clock}]")
+    )
     seeds = _seeds(symbols)
     slope = z.diff(symbols.t) + sympy.Add(
         *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
@@ -300,7 +302,12 @@ class _Body:
         """The number of columns and the statements: state and guards first, then what rests on them."""
         n = self.n
         vector = Recurrences(
-            {seed: f"v + {i}" for i, seed in enumerate(seeds.values())}, None, self.allot, "b", self.constants, block
+            {seed: f"v + {i}" for i, seed in enumerate(seeds.values())},
+            None,
+            self.allot,
+            "b",
+            self.constants,
+            block,
         )
         along = [f"v + {i}" for i in range(n)]
         carried = loop(along, tangents, [f"x[{column}]" for column in along], vector)

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Sequence
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
-from sympy.core.parameters import distribute
 
 from hybrid.printer import MATH_FUNCTIONS, assignments
 from hybrid.symbolic import ZERO
@@ -237,9 +236,7 @@ class Recurrences:
     def _power(self, expression: sympy.Expr) -> str:
         base, exponent = expression.args
         if not self._is_constant(exponent):
-            return self._bind(
-                expression, *2 * (self.coefficient(sympy.exp(exponent * sympy.log(base))),)
-            )
+            return self._bind(expression, *2 * (self.coefficient(sympy.exp(exponent * sympy.log(base))),))
         if exponent.is_Integer and exponent.is_negative:
             return self._quotient(expression, None, base**-exponent)
         if exponent.is_Integer:
@@ -432,4 +429,3 @@ def loop(
             ]
         ),
     ]
-

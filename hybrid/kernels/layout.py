@@ -110,7 +110,21 @@ class Method(NamedTuple):
 
 
 METHOD = types.NamedTuple(
-    (MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX, int64, int64, float64, float64, float64, float64),
+    (
+        MATRIX,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        VECTOR,
+        MATRIX,
+        int64,
+        int64,
+        float64,
+        float64,
+        float64,
+        float64,
+    ),
     Method,
 )
 

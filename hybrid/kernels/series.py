@@ -25,7 +25,7 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
 )
-from hybrid.kernels.guards import error_band, guard_value, note_grazing, rounding_band
+from hybrid.kernels.guards import error_band, note_grazing, rounding_band
 from hybrid.kernels.layout import INLINE, KERNEL
 from hybrid.kernels.record import remember_grazing, start_record
 

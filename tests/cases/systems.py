@@ -7,24 +7,6 @@ import numpy as np
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 
-def rimless_wheel() -> HybridSystem:
-    """Rimless wheel of leg length ``l`` on a slope ``gamma``, ``2 alpha`` between its legs."""
-    return HybridSystem(
-        state=("theta", "omega"),
-        parameters={"g": 9.8, "l": 1.0, "alpha": np.pi / 8, "gamma": 0.08},
-        modes=[Mode("stance", lambda t, x, p: (x.omega, p.g / p.l * np.sin(x.theta)))],
-        transitions=[
-            Transition(
-                "stance",
-                "stance",
-                Guard(lambda t, x, p: x.theta - p.gamma - p.alpha, direction=+1),
-                Reset(lambda t, x, p: (p.gamma - p.alpha, np.cos(2 * p.alpha) * x.omega)),
-                name="step",
-            )
-        ],
-    )
-
-
 def switched_linear() -> HybridSystem:
     """Hiskens and Pai's pair of linear systems, switched on two lines through the origin."""
     return HybridSystem(
@@ -41,7 +23,7 @@ def switched_linear() -> HybridSystem:
 
 
 def stick_slip() -> HybridSystem:
-    """Block on a belt with friction that falls with speed; the block never outruns the belt.
+    """``models.stick_slip`` with its stick written by hand; the block never outruns the belt.
 
     The release is a fold: at ``x = Fs`` the slip begins with ``v = belt`` and no acceleration, on the guard
     of the next sticking, which it leaves with ``v'' = -belt``.

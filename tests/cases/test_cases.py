@@ -12,7 +12,6 @@ from tests.reference.load import reference
 
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
 
-WHEEL = reference("rimless_wheel")
 SWITCHED = reference("switched_linear")
 FRICTION = reference("stick_slip")
 SALTATION = reference("saltation")
@@ -22,28 +21,6 @@ runs = pytest.mark.parametrize("run", SWITCHED, ids=lambda run: str(run["x0"]))
 
 def in_order(multipliers):
     return sorted(map(complex, multipliers), key=lambda m: (round(m.real, 9), m.imag))
-
-
-class TestRimlessWheel:
-    def test_saltation(self):
-        alpha, gamma = math.pi / 8, 0.08
-        before = (gamma + alpha, WHEEL["omega"] / math.cos(2 * alpha))
-        found = hybrid.saltation_matrix(systems.rimless_wheel(), "step", 0.0, before)
-        np.testing.assert_allclose(found, WHEEL["saltation"], rtol=1e-12, atol=1e-14)
-
-    def test_steps_settle_on_the_fixed_point(self):
-        arc = hybrid.simulate(systems.rimless_wheel(), (WHEEL["theta"], 1.3), (0.0, 60.0), solver=TIGHT)
-        last, previous = arc.jumps[-1], arc.jumps[-2]
-        np.testing.assert_allclose(last.x_plus, [WHEEL["theta"], WHEEL["omega"]], rtol=1e-10)
-        assert last.t - previous.t == pytest.approx(WHEEL["period"], rel=1e-9)
-
-    def test_orbit(self):
-        """From mid-step: the closing point is no event."""
-        system = systems.rimless_wheel()
-        theta, omega = hybrid.simulate(system, (WHEEL["theta"], WHEEL["omega"]), (0.0, 0.5)).x[-1]
-        orbit = hybrid.periodic_orbit(system, (theta, omega + 0.01), period=1.0)
-        assert orbit.period == pytest.approx(WHEEL["period"], rel=1e-8)
-        np.testing.assert_allclose(in_order(orbit.multipliers), sorted(WHEEL["multipliers"]), atol=1e-7)
 
 
 class TestSwitchedLinear:

@@ -11,6 +11,7 @@ import pytest
 import hybrid
 import lyapunov
 from hybrid.filippov import filippov
+from models import stick_slip
 from tests.reference.load import reference
 
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
@@ -30,25 +31,9 @@ def events(arc):
     return [jump.transition for jump in arc.jumps]
 
 
-def block_on_belt():
-    """Friction that falls with the speed of sliding; each law has a pole far on the other side."""
-
-    def friction(p, speed):
-        return p.Fs / (1 + p.delta * speed)
-
-    return filippov(
-        ("x", "v"),
-        {"belt": 0.2, "delta": 3.0, "Fs": 1.0},
-        below=lambda t, x, p: (x.v, friction(p, p.belt - x.v) - x.x),
-        above=lambda t, x, p: (x.v, -friction(p, x.v - p.belt) - x.x),
-        switching=lambda t, x, p: x.v - p.belt,
-        name="block on a belt",
-    )
-
-
 @pytest.fixture(scope="module")
 def block():
-    return block_on_belt()
+    return stick_slip()
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
+import models
 from hybrid import HybridSystem, Mode, StatusCode, periodic_orbit, simulate
 from models import bouncing_ball, buck_converter, impact_oscillator, vibroimpact
 from models.impact_oscillator import one_impact_orbits
@@ -71,7 +72,7 @@ class TestAutonomous:
     def test_rimless_wheel_from_the_state_after_a_step(self):
         exact = reference("rimless_wheel")
         guess = (exact["theta"], exact["omega"] + 0.02)
-        orbit = periodic_orbit(systems.rimless_wheel(), guess, period=1.0)
+        orbit = periodic_orbit(models.rimless_wheel(), guess, period=1.0)
         assert orbit.status.ok
         assert orbit.period == pytest.approx(exact["period"], rel=1e-9)
         np.testing.assert_allclose(in_order(orbit.multipliers), sorted(exact["multipliers"]), atol=1e-7)

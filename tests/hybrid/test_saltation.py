@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid
+import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, saltation_matrix, simulate
 from models import bouncing_ball, impact_oscillator
 from tests.cases import systems
@@ -139,7 +140,7 @@ class TestIdentities:
         ("system", "transition", "x"),
         [
             (BALL, "bounce", (0.0, -3.0)),
-            (systems.rimless_wheel(), "step", (0.08 + np.pi / 8, 1.4)),
+            (models.rimless_wheel(), "step", (0.08 + np.pi / 8, 1.4)),
             (systems.constant_fields(), "left->right", (0.0, 0.3)),
             (systems.switched_linear(), "first->second", (1.0, 2.75)),
             (systems.incline(), "landing", (0.0, 0.0, 1.0, -2.0)),

@@ -10,8 +10,10 @@ import json
 from pathlib import Path
 
 import founding_system
+import friction
 import impacts
 import switched
+import walking
 
 ANSWERS = {
     "founding_system": founding_system.answers,
@@ -23,6 +25,9 @@ ANSWERS = {
     "switched_linear": switched.switched_linear,
     "stick_slip": switched.stick_slip,
     "saltation": switched.saltation,
+    "dry_friction_oscillator": friction.dry_friction_oscillator,
+    "simplest_walker": walking.simplest_walker,
+    "slip_hopper": walking.slip_hopper,
 }
 
 if __name__ == "__main__":

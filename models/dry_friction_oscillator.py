@@ -1,0 +1,82 @@
+"""A harmonically forced oscillator with dry friction, and the closed form of its motion without stops."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import HybridSystem, filippov
+
+
+def dry_friction_oscillator() -> HybridSystem:
+    r"""Forced linear oscillator of unit mass and stiffness on a support with Coulomb's friction.
+
+    .. math::
+
+        \ddot x + c\, \dot x + x + f \operatorname{sgn}(\dot x) = A \cos(w t)
+
+    Returns
+    -------
+    HybridSystem
+        State ``x`` (displacement), ``v`` (velocity). The modes are those of :func:`hybrid.filippov` with the
+        switching function ``v``: ``below`` and ``above`` slide backwards and forwards, ``sliding`` is the
+        stop, which lasts while ``abs(A cos(w t) - x) <= f``. Forcing period ``2 pi / w``. Dimensionless
+        parameters: viscous damping ``c = 0``, friction ``f = 0.5``, forcing amplitude ``A = 1`` and frequency
+        ``w = 0.8``.
+
+    Notes
+    -----
+    - With the defaults the motion has no stops; :func:`den_hartog_amplitude` has its amplitude. With more
+      friction or slower forcing it stops twice a period or oftener, and one multiplier is exactly zero.
+    - A turning point without a stop multiplies areas by ``a_plus / a_minus``, the ratio of the accelerations
+      after and before it, so that friction contracts only there; a stop loses a direction.
+    - At ``w = 1/2`` and ``c = 0`` the motion without stops is one of a family, the others unsymmetric; one
+      multiplier is 1: half a forcing period is a whole one of the free oscillator.
+
+    References
+    ----------
+    J. P. Den Hartog, "Forced vibrations with combined Coulomb and viscous friction", Transactions of the ASME
+    53, 107-115, 1931.
+    S. W. Shaw, "On the dynamic response of a system with dry friction", Journal of Sound and Vibration
+    108(2), 305-325, 1986. doi:10.1016/S0022-460X(86)80058-X
+    """
+
+    def field(sign):
+        return lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - x.x - p.c * x.v - sign * p.f)
+
+    return filippov(
+        name="dry-friction oscillator",
+        state=("x", "v"),
+        parameters={"c": 0.0, "f": 0.5, "A": 1.0, "w": 0.8},
+        below=field(-1),
+        above=field(+1),
+        switching=lambda t, x, p: x.v,
+        period=lambda p: 2 * np.pi / p.w,
+    )
+
+
+def den_hartog_amplitude(f: float, A: float, w: float) -> float:
+    r"""Amplitude of the symmetric motion of :func:`dry_friction_oscillator` without stops, at ``c = 0``.
+
+    .. math::
+
+        X^2 = \left(\frac{A}{1 - w^2}\right)^2 - \left(\frac{f \tan(\pi / 2 w)}{w}\right)^2
+
+    For half a period from the turning point at ``X`` the velocity is
+    ``f sin(s) + D (cos(s) - cos(w s)) - X w sin(w s)``, with ``D = -f tan(pi / 2 w)``; the motion exists if
+    that is negative throughout.
+
+    Parameters
+    ----------
+    f, A, w
+        As in :func:`dry_friction_oscillator`; ``w`` is none of ``1, 1/3, 1/5, ...``.
+
+    Returns
+    -------
+    float
+        ``nan`` if there is no such motion.
+    """
+    D = -f * np.tan(np.pi / (2 * w))
+    X = np.sqrt(np.maximum((A / (1 - w**2)) ** 2 - (D / w) ** 2, 0.0))
+    s = np.linspace(0.0, np.pi / w, 4001)[1:-1]
+    v = f * np.sin(s) + D * (np.cos(s) - np.cos(w * s)) - X * w * np.sin(w * s)
+    return float(X) if v.max() < 0 else np.nan

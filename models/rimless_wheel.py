@@ -1,0 +1,67 @@
+"""A wheel without a rim that rolls down a slope on its spokes: the simplest passive walking."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def rimless_wheel() -> HybridSystem:
+    r"""Massless spokes around a point mass, ``2 alpha`` apart, on a slope ``gamma``; impacts are plastic.
+
+    .. math::
+
+        \ddot\theta = (g / l) \sin\theta, \qquad
+        (\theta, \omega) \mapsto (\theta \mp 2 \alpha,\ \omega \cos 2 \alpha)
+        \text{ at } \theta = \gamma \pm \alpha, \ \pm\omega > 0
+
+    Returns
+    -------
+    HybridSystem
+        State ``theta`` (rad, of the stance spoke from the vertical, downhill positive), ``omega`` (rad/s);
+        mode ``stance``; transitions ``step``, onto the next spoke downhill, and ``step back``. Parameters:
+        ``g = 9.8`` m/s^2, spoke ``l = 1`` m, half angle between spokes ``alpha = pi / 8`` and slope
+        ``gamma = 0.08``, in rad.
+
+    Notes
+    -----
+    - An impact conserves the angular momentum about the new foot: saltation
+      ``[[c, 0], [(g / l) (sin(theta_plus) - c sin(theta_minus)) / omega_minus, c]]``, ``c = cos(2 alpha)``.
+    - Between steps ``omega^2 + 2 (g / l) cos(theta)`` is constant. The speeds after steps obey
+      ``omega^2 -> c^2 (omega^2 + 4 (g / l) sin(alpha) sin(gamma))``, with the fixed point
+      ``cot(2 alpha) sqrt(4 (g / l) sin(alpha) sin(gamma))`` and the multipliers ``{1, c^2}``.
+    - It rolls if that speed carries it over the top, ``omega^2 > 2 (g / l) (1 - cos(gamma - alpha))``. A
+      slower wheel rocks between two spokes, its steps to and fro accumulating where it stands.
+
+    References
+    ----------
+    T. McGeer, "Passive dynamic walking", International Journal of Robotics Research 9(2), 62-82, 1990.
+    doi:10.1177/027836499000900206
+    """
+
+    def onto(side: int) -> Reset:
+        return Reset(lambda t, x, p: (p.gamma - side * p.alpha, np.cos(2 * p.alpha) * x.omega))
+
+    return HybridSystem(
+        name="rimless wheel",
+        state=("theta", "omega"),
+        parameters={"g": 9.8, "l": 1.0, "alpha": np.pi / 8, "gamma": 0.08},
+        modes=[Mode("stance", lambda t, x, p: (x.omega, p.g / p.l * np.sin(x.theta)))],
+        transitions=[
+            Transition(
+                "stance",
+                "stance",
+                Guard(lambda t, x, p: x.theta - p.gamma - p.alpha, direction=+1),
+                onto(+1),
+                name="step",
+            ),
+            Transition(
+                "stance",
+                "stance",
+                Guard(lambda t, x, p: x.theta - p.gamma + p.alpha, direction=-1),
+                onto(-1),
+                name="step back",
+            ),
+        ],
+    )

@@ -1,0 +1,72 @@
+"""Two straight legs that walk down a slope by themselves: the simplest walking model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def simplest_walker() -> HybridSystem:
+    r"""Point mass on two massless legs with feet of vanishing mass, walking down a slope ``gamma``.
+
+    .. math::
+
+        \ddot\theta &= \sin(\theta - \gamma) \\
+        \ddot\phi &= \ddot\theta + \dot\theta^2 \sin\phi - \cos(\theta - \gamma) \sin\phi
+
+    and at heelstrike, ``phi = 2 theta``, the legs exchange their names:
+
+    .. math::
+
+        \theta \mapsto -\theta, \quad \dot\theta \mapsto \cos(2 \theta)\, \dot\theta, \quad
+        \phi \mapsto -2 \theta, \quad \dot\phi \mapsto \cos(2 \theta) (1 - \cos(2 \theta))\, \dot\theta
+
+    Returns
+    -------
+    HybridSystem
+        State ``theta`` (rad, of the stance leg from the slope's normal, uphill positive), ``phi`` (rad,
+        between the legs) and the rates ``dtheta``, ``dphi``; modes ``behind`` and ``ahead``, where the swing
+        foot is; transitions ``passing`` and ``heelstrike``. Parameter: the slope ``gamma = 0.009`` rad. Time
+        is in units of ``sqrt(l / g)``.
+
+    Notes
+    -----
+    - The swing foot meets the ground twice a step, where ``phi - 2 theta`` falls through zero near mid-stance
+      and where it rises. As in the paper it may pass the first time (no foot scuffing).
+    - At ``gamma = 0.009`` there are two gaits of period one. The long one is stable: after heelstrike
+      ``theta = 0.200310900544``, ``dtheta = -0.199832473005``; multipliers
+      ``{1, -0.190099841066 +- 0.557598776682i, 0}``. The short one is not: ``theta = 0.193937369810``,
+      ``dtheta = -0.203866927442``; multipliers ``{4.003864358930, 1, 0.459589589798, 0}``.
+    - The long gait is stable for slopes below 0.015, then doubles its period again and again, and becomes
+      chaotic. From about ``gamma = 0.019`` on the walker falls. So it does from most starts at any slope;
+      there is no ground for its hip to fall on, and the run means nothing from there.
+
+    References
+    ----------
+    M. Garcia, A. Chatterjee, A. Ruina, M. Coleman, "The simplest walking model: stability, complexity, and
+    scaling", Journal of Biomechanical Engineering 120(2), 281-288, 1998, equations 1 to 4.
+    doi:10.1115/1.2798313
+    """
+
+    def swing(t, x, p):
+        turn = np.sin(x.theta - p.gamma)
+        return x.dtheta, x.dphi, turn, turn + (x.dtheta**2 - np.cos(x.theta - p.gamma)) * np.sin(x.phi)
+
+    def height(t, x, p):
+        return x.phi - 2 * x.theta
+
+    def exchange(t, x, p):
+        c = np.cos(2 * x.theta)
+        return -x.theta, -2 * x.theta, c * x.dtheta, c * (1 - c) * x.dtheta
+
+    return HybridSystem(
+        name="simplest walker",
+        state=("theta", "phi", "dtheta", "dphi"),
+        parameters={"gamma": 0.009},
+        modes=[Mode("behind", swing), Mode("ahead", swing)],
+        transitions=[
+            Transition("behind", "ahead", Guard(height, direction=-1), name="passing"),
+            Transition("ahead", "behind", Guard(height, direction=+1), Reset(exchange), name="heelstrike"),
+        ],
+    )

@@ -1,0 +1,76 @@
+"""The spring-loaded inverted pendulum: a point mass that runs or hops on a springy leg."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def slip_hopper() -> HybridSystem:
+    r"""Point mass on a massless spring leg that touches down at a fixed angle of attack.
+
+    .. math::
+
+        \text{flight: } \ddot x = 0, \ \ddot y = -g; \qquad
+        \text{stance: } (\ddot x, \ddot y) = \frac{k}{m} \left(\frac{l_0}{l} - 1\right) (x, y) - (0, g),
+        \quad l = \sqrt{x^2 + y^2}
+
+    Returns
+    -------
+    HybridSystem
+        State ``x``, ``y`` (m, of the mass from the last foothold on level ground), ``vx``, ``vy`` (m/s);
+        modes ``descent``, ``stance`` and ``ascent``; transitions ``touchdown``, where ``y`` falls to
+        ``l0 sin(alpha)`` and the foot is set down anew, so that ``x -> -l0 cos(alpha)``, ``takeoff``, where
+        the leg is ``l0`` long again, and ``apex``. Parameters: mass ``m = 80`` kg, leg stiffness
+        ``k = 20000`` N/m, its length at rest ``l0 = 1`` m, angle of attack ``alpha = 68 deg`` (in rad),
+        ``g = 9.81`` m/s^2.
+
+    Notes
+    -----
+    - Energy is conserved. Runs from one apex to the next are a map of the apex height alone, whose slope is
+      the one multiplier of a running gait besides ``{1, 1, 0}``, those of time, energy and ``x``.
+    - ``alpha = pi / 2`` with ``vx = 0`` hops in place. With ``w = sqrt(k / m)`` and landing at the speed
+      ``v``, a stance lasts ``2 (pi - arctan(w v / g)) / w`` and a flight ``2 v / g``.
+    - With the energy of 5 m/s at the height 1 m running is stable: apex 0.940267144380 m, period
+      0.252532613818 s, multiplier -0.161307631037.
+    - The runner has fallen, and the run means nothing from there, if it takes off downwards or its apex is
+      below ``l0 sin(alpha)``.
+
+    References
+    ----------
+    R. Blickhan, "The spring-mass model for running and hopping", Journal of Biomechanics 22, 1217-1227, 1989.
+    doi:10.1016/0021-9290(89)90224-8
+    A. Seyfarth, H. Geyer, M. Günther, R. Blickhan, "A movement criterion for running", Journal of
+    Biomechanics 35(5), 649-655, 2002. doi:10.1016/S0021-9290(01)00245-7
+    """
+
+    def flight(t, x, p):
+        return x.vx, x.vy, 0.0, -p.g
+
+    def stance(t, x, p):
+        push = p.k / p.m * (p.l0 / np.hypot(x.x, x.y) - 1)
+        return x.vx, x.vy, push * x.x, push * x.y - p.g
+
+    return HybridSystem(
+        name="SLIP hopper",
+        state=("x", "y", "vx", "vy"),
+        parameters={"m": 80.0, "k": 20e3, "l0": 1.0, "alpha": np.radians(68.0), "g": 9.81},
+        modes=[Mode("descent", flight), Mode("stance", stance), Mode("ascent", flight)],
+        transitions=[
+            Transition(
+                "descent",
+                "stance",
+                Guard(lambda t, x, p: x.y - p.l0 * np.sin(p.alpha), direction=-1),
+                Reset(lambda t, x, p: (-p.l0 * np.cos(p.alpha), x.y, x.vx, x.vy)),
+                name="touchdown",
+            ),
+            Transition(
+                "stance",
+                "ascent",
+                Guard(lambda t, x, p: np.hypot(x.x, x.y) - p.l0, direction=+1),
+                name="takeoff",
+            ),
+            Transition("ascent", "descent", Guard(lambda t, x, p: x.vy, direction=-1), name="apex"),
+        ],
+    )

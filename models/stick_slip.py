@@ -1,0 +1,96 @@
+"""A block on a spring, carried along by a moving belt until it breaks loose: friction-induced vibration."""
+
+from __future__ import annotations
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition, filippov
+
+
+def stick_slip() -> HybridSystem:
+    r"""Block of unit mass and stiffness on a belt, with friction that falls with sliding speed (Stribeck).
+
+    .. math::
+
+        \ddot x + x = -F_s \frac{\operatorname{sgn}(\dot x - b)}{1 + \delta |\dot x - b|}
+
+    Returns
+    -------
+    HybridSystem
+        State ``x`` (displacement), ``v`` (velocity). The modes are those of :func:`hybrid.filippov` with the
+        switching function ``v - belt``: ``below`` slips behind the belt, ``above`` ahead of it, ``sliding``
+        sticks to it. Dimensionless parameters: speed of the ``belt = 0.2``, friction at rest ``Fs = 1``, its
+        decay with speed ``delta = 3``.
+
+    Notes
+    -----
+    - The block breaks loose at ``x = Fs``, where the spring takes all the friction there is, so without
+      acceleration.
+    - The limit cycle slips for 4.295999525 and sticks for 7.705031769, with the period 12.001031295; its
+      largest displacement is 1.133944674. A stick forgets how fast the block slipped: the multipliers are
+      ``{1, 0}``, and the second exponent is minus infinity, exactly.
+
+    References
+    ----------
+    R. I. Leine, D. H. van Campen, A. de Kraker, L. van den Steen, "Stick-slip vibrations induced by alternate
+    friction models", Nonlinear Dynamics 16(1), 41-54, 1998. doi:10.1023/A:1008289604683
+    """
+
+    def friction(p, speed):
+        return p.Fs / (1 + p.delta * speed)
+
+    return filippov(
+        name="stick-slip",
+        state=("x", "v"),
+        parameters={"belt": 0.2, "delta": 3.0, "Fs": 1.0},
+        below=lambda t, x, p: (x.v, friction(p, p.belt - x.v) - x.x),
+        above=lambda t, x, p: (x.v, -friction(p, x.v - p.belt) - x.x),
+        switching=lambda t, x, p: x.v - p.belt,
+    )
+
+
+def coulomb_stick_slip() -> HybridSystem:
+    r"""Block of unit mass and stiffness on a belt, its friction larger at rest than in motion (Coulomb).
+
+    .. math::
+
+        \text{stick: } \dot x = b \text{ until } x = F_s; \qquad
+        \text{slip: } \ddot x + x = F_k \text{ until } \dot x = b
+
+    Returns
+    -------
+    HybridSystem
+        State ``x`` (displacement), ``v`` (velocity); modes ``stick`` and ``slip``; transitions ``release``
+        and ``catch``. Dimensionless parameters: speed of the ``belt = 0.2``, static friction ``Fs = 1`` and
+        kinetic friction ``Fk = 0.5``.
+
+    Notes
+    -----
+    - After a stick the block never slips ahead of the belt; neither does any that slips with
+      ``hypot(x - Fk, v) < Fs + Fk``. The model knows no other slips.
+    - With ``D = Fs - Fk`` the slip is ``x = Fk + D cos(s) + belt sin(s)``, lasts
+      ``2 (pi - arctan(D / belt))`` and ends at ``Fk - D``; the stick lasts ``2 D / belt``.
+    - The saltation of the release is ``[[1, 0], [-D / belt, 1]]``, that of the catch ``[[1, 0], [0, 0]]``;
+      the multipliers of the limit cycle are ``{1, 0}``.
+
+    References
+    ----------
+    As for :func:`stick_slip`.
+    """
+    return HybridSystem(
+        name="stick-slip with Coulomb's friction",
+        state=("x", "v"),
+        parameters={"belt": 0.2, "Fs": 1.0, "Fk": 0.5},
+        modes=[
+            Mode("stick", lambda t, x, p: (p.belt, 0.0)),
+            Mode("slip", lambda t, x, p: (x.v, p.Fk - x.x)),
+        ],
+        transitions=[
+            Transition("stick", "slip", Guard(lambda t, x, p: x.x - p.Fs, direction=+1), name="release"),
+            Transition(
+                "slip",
+                "stick",
+                Guard(lambda t, x, p: x.v - p.belt, direction=+1),
+                Reset(lambda t, x, p: (x.x, p.belt)),
+                name="catch",
+            ),
+        ],
+    )

@@ -1,0 +1,226 @@
+"""Recurrences of Taylor coefficients, run as plain Python, against derivatives to forty digits."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid.emit import emit
+from hybrid.kernels.codes import DESINGULARISED, EXACT, RUNGE_KUTTA, TAYLOR
+
+ORDER = 9
+A = 1.375
+
+FUNCTIONS = {
+    "sin": (lambda u: np.sin(u), mp.sin),
+    "cos": (lambda u: np.cos(u), mp.cos),
+    "tan": (lambda u: np.tan(u), mp.tan),
+    "exp": (lambda u: np.exp(u), mp.exp),
+    "log": (lambda u: np.log(u), mp.log),
+    "sqrt": (lambda u: np.sqrt(u), mp.sqrt),
+    "sinh": (lambda u: np.sinh(u), mp.sinh),
+    "cosh": (lambda u: np.cosh(u), mp.cosh),
+    "tanh": (lambda u: np.tanh(u), mp.tanh),
+    "arctan": (lambda u: np.arctan(u), mp.atan),
+    "arcsin": (lambda u: np.arcsin(u / 3), lambda u: mp.asin(u / 3)),
+    "arccos": (lambda u: np.arccos(u / 3), lambda u: mp.acos(u / 3)),
+    "arcsinh": (lambda u: np.arcsinh(u), mp.asinh),
+    "arccosh": (lambda u: np.arccosh(u + 1), lambda u: mp.acosh(u + 1)),
+    "arctanh": (lambda u: np.arctanh(u / 3), lambda u: mp.atanh(u / 3)),
+    "log1p": (lambda u: np.log1p(u), mp.log1p),
+    "expm1": (lambda u: np.expm1(u), mp.expm1),
+    "log2": (lambda u: np.log2(u), lambda u: mp.log(u, 2)),
+    "log10": (lambda u: np.log10(u), mp.log10),
+    "exp2": (lambda u: np.exp2(u), lambda u: mp.mpf(2) ** u),
+    "hypot": (lambda u: np.hypot(u, 2.0), lambda u: mp.hypot(u, 2)),
+    "square": (lambda u: u**2, lambda u: u**2),
+    "cube": (lambda u: u**3, lambda u: u**3),
+    "seventh": (lambda u: u**7, lambda u: u**7),
+    "reciprocal": (lambda u: 1 / u, lambda u: 1 / u),
+    "inverse square": (lambda u: u**-2, lambda u: u**-2),
+    "quotient": (lambda u: (1 + u**2) / (2 + u), lambda u: (1 + u**2) / (2 + u)),
+    "quotient of two": (lambda u: u / ((2 + u) * (3 + u)), lambda u: u / ((2 + u) * (3 + u))),
+    "power": (lambda u: u**2.3, lambda u: u ** mp.mpf(2.3)),
+    "variable power": (lambda u: u**u, lambda u: u**u),
+    "nested": (lambda u: np.exp(np.sin(u) * u), lambda u: mp.exp(mp.sin(u) * u)),
+    "shared": (lambda u: np.sin(u) * np.cos(u) + np.sin(u) ** 2, lambda u: mp.sin(u) * mp.cos(u) + mp.sin(u) ** 2),
+}  # fmt: skip
+
+
+def series_of(system, x, *, t=0.0, mode=0, tangents=0, parameters=()):
+    """The role ``series`` of a system as a matrix ``(ORDER + 1, columns)``."""
+    scope = {}
+    emitted = emit(system)
+    exec(emitted.source, scope)
+    n = system.dimension
+    y = np.concatenate([x, *np.eye(n)[:tangents]])
+    out = np.full((ORDER + 1, 80), np.nan)
+    scope["series"](mode, t, y, np.array(parameters), ORDER, out)
+    return out
+
+
+def system_of(field, *transitions, state=("x", "y"), **options):
+    return HybridSystem(state=state, modes=[Mode("a", field)], transitions=transitions, **options)
+
+
+def kinds(system):
+    return [each.kind for each in emit(system).propagators]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions_of_the_state(name):
+    """With ``x' = 1, y' = F(x)`` the coefficients of y are those of the integral of F."""
+    function, exact = FUNCTIONS[name]
+    system = system_of(lambda t, x, p: (1.0, function(x.x)))
+    out = series_of(system, [A, 0.0], tangents=1)
+    with mp.workdps(40):
+        expected = [0.0, *(float(c / (k + 1)) for k, c in enumerate(mp.taylor(exact, mp.mpf(A), ORDER - 1)))]
+        slope = [0.0, *(float(c * (k + 1) / (k + 1)) for k, c in enumerate(mp.taylor(lambda u: mp.diff(exact, u), mp.mpf(A), ORDER - 1)))]  # fmt: skip
+    np.testing.assert_allclose(out[:, 1], expected, rtol=1e-12, atol=1e-15)
+    # The tangent vector that starts along x stays (1, y'(x)): its second component integrates F'.
+    slope = [value / max(k, 1) for k, value in enumerate(slope)]
+    np.testing.assert_allclose(out[:, 3], slope, rtol=1e-10, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions_of_time(name):
+    function, exact = FUNCTIONS[name]
+    system = system_of(lambda t, x, p: (function(t), x.x))
+    out = series_of(system, [0.0, 0.0], t=A)
+    with mp.workdps(40):
+        expected = [0.0, *(float(c / (k + 1)) for k, c in enumerate(mp.taylor(exact, mp.mpf(A), ORDER - 1)))]
+    np.testing.assert_allclose(out[:, 0], expected, rtol=1e-12, atol=1e-15)
+
+
+def test_guards_have_series_of_their_own():
+    system = HybridSystem(
+        state=("x", "y"),
+        modes=[Mode("a", lambda t, x, p: (1.0, 2.0)), Mode("b", lambda t, x, p: (0.0, 0.0))],
+        transitions=[
+            Transition("a", "b", Guard(lambda t, x, p: x.x * x.y - t, +1)),
+            Transition("a", "b", Guard(lambda t, x, p: np.sin(x.x), -1), name="second"),
+            Transition("b", "a", Guard(lambda t, x, p: x.y - 1, -1)),
+        ],
+    )
+    out = series_of(system, [0.5, 3.0], t=0.25)
+    np.testing.assert_allclose(out[:3, 2], [1.5 - 0.25, 3.0 + 1.0 - 1.0, 2.0])
+    np.testing.assert_allclose(out[:3, 3], [np.sin(0.5), np.cos(0.5), -np.sin(0.5) / 2])
+
+
+def test_divergence_is_integrated():
+    system = system_of(lambda t, x, p: (-p.c * x.x, x.x * x.y), parameters={"c": 0.5})
+    out = series_of(system, [2.0, 1.0], tangents=2, parameters=[0.5])
+    decay = [(-0.5) ** k / mp.factorial(k) for k in range(ORDER)]
+    expected = [0.0] + [float((-0.5 * (k == 0) + 2.0 * decay[k]) / (k + 1)) for k in range(ORDER)]
+    np.testing.assert_allclose(out[:, 7], expected, rtol=1e-12)
+
+
+def test_what_is_exact_and_what_is_not():
+    oscillator = system_of(lambda t, x, p: (x.y, -x.x + np.cos(3 * t + 1) * np.exp(-t) + t**2))
+    assert kinds(oscillator) == [EXACT]
+    assert kinds(system_of(lambda t, x, p: (x.y, -x.x + np.cos(t**2)))) == [TAYLOR]
+    assert kinds(system_of(lambda t, x, p: (x.y, -x.x * np.cos(t)))) == [TAYLOR]
+    assert kinds(system_of(lambda t, x, p: (x.y, -np.sin(x.x)))) == [TAYLOR]
+    assert kinds(system_of(lambda t, x, p: (x.y, -np.sign(x.y)))) == [RUNGE_KUTTA]
+    assert kinds(system_of(lambda t, x, p: (x.y, -np.maximum(x.x, 0.0)))) == [RUNGE_KUTTA]
+
+
+@pytest.mark.parametrize(
+    ("field", "degree"),
+    [
+        (lambda t, x, p: (x.y, -9.81), 2),
+        (lambda t, x, p: (x.y, t**3), 5),
+        (lambda t, x, p: (1.0, 0.0), 1),
+        (lambda t, x, p: (0.0, 0.0), 1),
+        (lambda t, x, p: (x.y, -x.x), 0),
+        (lambda t, x, p: (x.y, np.exp(-t)), 0),
+    ],
+)
+def test_degree_of_polynomial_solutions(field, degree):
+    [propagator] = emit(system_of(field)).propagators
+    assert (propagator.kind, propagator.degree) == (EXACT, degree)
+
+
+def test_a_guard_says_what_holds_in_its_mode():
+    """max(x, 0) is x where the mode ends at x = 0, and zero on the other side."""
+
+    def field(t, x, p):
+        return x.y, -4.0 * np.maximum(x.x, 0.0) - np.abs(x.x)
+
+    system = HybridSystem(
+        state=("x", "y"),
+        modes=[Mode("free", field), Mode("contact", field)],
+        transitions=[
+            Transition("free", "contact", Guard(lambda t, x, p: x.x, +1)),
+            Transition("contact", "free", Guard(lambda t, x, p: x.x, -1)),
+        ],
+    )
+    assert kinds(system) == [EXACT, EXACT]
+    np.testing.assert_allclose(series_of(system, [-1.0, 0.0], mode=0)[2, 0], -1.0 / 2)
+    np.testing.assert_allclose(series_of(system, [1.0, 0.0], mode=1)[2, 0], -5.0 / 2)
+
+
+def test_a_guard_with_a_condition_says_nothing():
+    def field(t, x, p):
+        return x.y, -np.maximum(x.x, 0.0)
+
+    system = HybridSystem(
+        state=("x", "y"),
+        modes=[Mode("a", field), Mode("b", field)],
+        transitions=[
+            Transition("a", "b", Guard(lambda t, x, p: x.x, +1, when=lambda t, x, p: x.y - 1)),
+            Transition("b", "a", Guard(lambda t, x, p: x.x, -1)),
+        ],
+    )
+    assert kinds(system) == [RUNGE_KUTTA, EXACT]
+
+
+def contact(power, extra=lambda x: 0.0):
+    def field(t, x, p):
+        return x.y, np.cos(t) - p.K * np.maximum(x.x, 0.0) ** power + extra(x)
+
+    return HybridSystem(
+        state=("x", "y"),
+        parameters={"K": 100.0},
+        modes=[Mode("free", field), Mode("contact", field)],
+        transitions=[
+            Transition("free", "contact", Guard(lambda t, x, p: x.x, +1)),
+            Transition("contact", "free", Guard(lambda t, x, p: x.x, -1)),
+        ],
+    )
+
+
+@pytest.mark.parametrize(
+    ("power", "kind"), [(0.5, DESINGULARISED), (1.5, DESINGULARISED), (2.5, DESINGULARISED), (2, TAYLOR), (1.25, RUNGE_KUTTA)]
+)  # fmt: skip
+def test_powers_of_a_guard(power, kind):
+    assert kinds(contact(power)) == [EXACT, kind]
+
+
+def test_hunt_crossley_contact_is_desingularised():
+    damped = contact(1.5, lambda x: -x.y * np.maximum(x.x, 0.0) ** 1.5)
+    assert kinds(damped) == [EXACT, DESINGULARISED]
+
+
+@pytest.mark.parametrize("power", [0.5, 1.5, 2.5])
+def test_series_on_the_clock_of_a_contact(power):
+    """The coefficients satisfy ``y' = 2 w f`` and ``w^2 = z`` order by order, the tangents their own equation."""
+    out = series_of(contact(power), [0.04, 1.0], t=0.3, mode=1, tangents=2, parameters=[100.0])
+    s = 1e-3
+    values = np.polynomial.polynomial.polyval(s, out[:, :11])
+    rates = np.polynomial.polynomial.polyval(s, (np.arange(1, ORDER + 1)[:, None] * out[1:, :11]))
+    x, y, clock, w = values[0], values[1], values[7], values[9]
+    assert w == pytest.approx(np.sqrt(x), rel=1e-14)
+    assert rates[7] == pytest.approx(2 * w, rel=1e-14)
+    assert rates[0] == pytest.approx(2 * w * y, rel=1e-13)
+    assert rates[1] == pytest.approx(2 * w * (np.cos(0.3 + clock) - 100.0 * x**power), rel=1e-12)
+    stiffness = -100.0 * power * x ** (power - 1)
+    for v in (2, 4):
+        assert rates[v] == pytest.approx(2 * w * values[v + 1], rel=1e-12, abs=1e-15)
+        assert rates[v + 1] == pytest.approx(2 * w * stiffness * values[v], rel=1e-11, abs=1e-15)
+
+
+def test_the_reason_is_told():
+    reasons = [str(each) for each in emit(contact(1.25)).propagators]
+    assert reasons[0] == "exact (affine in the state)"
+    assert reasons[1].startswith("Runge-Kutta pair (it has the power 5/4 of a guard")

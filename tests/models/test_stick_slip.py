@@ -1,0 +1,83 @@
+"""The block on the belt: Leine's limit cycle, and the closed form of Coulomb's."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+import lyapunov
+from models import coulomb_stick_slip, stick_slip
+from tests.reference.load import reference
+
+TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
+CYCLE = reference("stick_slip")
+
+
+class TestStribeck:
+    def test_limit_cycle(self):
+        orbit = hybrid.periodic_orbit(stick_slip(), (0.5, 0.2), period=12.0)
+        assert orbit.status.ok
+        assert orbit.period == pytest.approx(CYCLE["period"], abs=1e-10)
+        np.testing.assert_allclose(sorted(np.abs(orbit.multipliers)), [0.0, 1.0], atol=1e-8)
+        exponents = lyapunov.floquet_exponents(orbit)
+        assert exponents[0] == pytest.approx(0.0, abs=1e-9)
+        assert exponents[1] == -math.inf
+
+    def test_largest_displacement(self):
+        """Where the velocity falls through zero."""
+        turning = hybrid.Guard(lambda t, x, p: x.v, direction=-1)
+        section = hybrid.poincare_section(stick_slip(), (0.5, 0.2), turning, points=2, solver=TIGHT)
+        np.testing.assert_allclose(section.x[:, 0], CYCLE["x_largest"], atol=1e-10)
+
+    def test_release(self):
+        """Carried from 0.5 to 1 at the belt's 0.2; the slip begins without acceleration."""
+        arc = hybrid.simulate(stick_slip(), (0.5, 0.2), (0.0, 3.0), solver=TIGHT)
+        [release] = arc.jumps
+        assert release.t == pytest.approx(2.5, abs=1e-12)
+        np.testing.assert_allclose(release.x_plus, [1.0, 0.2], atol=1e-12)
+        # v'' = F'(0) v' - v = -0.2, with F the friction.
+        assert arc(2.5 + 1e-3)[1] == pytest.approx(0.2 - 0.1e-6, abs=1e-9)
+
+
+BELTS = pytest.mark.parametrize(("belt", "Fs", "Fk"), [(0.2, 1.0, 0.5), (0.7, 1.2, 0.9), (0.05, 2.0, 0.3)])
+
+
+class TestCoulomb:
+    @BELTS
+    def test_limit_cycle(self, belt, Fs, Fk):
+        D = Fs - Fk
+        slip, stick = 2 * (math.pi - math.atan(D / belt)), 2 * D / belt
+        parameters = {"belt": belt, "Fs": Fs, "Fk": Fk}
+        orbit = hybrid.periodic_orbit(
+            coulomb_stick_slip(), (Fk, belt), mode="stick", period=slip + stick, parameters=parameters
+        )
+        assert orbit.period == pytest.approx(slip + stick, abs=1e-10)
+        np.testing.assert_allclose(sorted(np.abs(orbit.multipliers)), [0.0, 1.0], atol=1e-8)
+
+        arc = hybrid.simulate(
+            coulomb_stick_slip(), (Fk, belt), (0.0, 2 * orbit.period), mode="stick", parameters=parameters
+        )
+        release, catch = arc.jumps[:2]
+        assert release.t == pytest.approx(D / belt, rel=1e-12)
+        assert catch.t - release.t == pytest.approx(slip, abs=1e-9)
+        assert catch.x_plus[0] == pytest.approx(Fk - D, abs=1e-9)
+        np.testing.assert_allclose(release.saltation, [[1, 0], [-D / belt, 1]], rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(catch.saltation, [[1, 0], [0, 0]], atol=1e-9)
+
+    def test_slips_inside_the_grazing_circle_never_stick(self):
+        """Harmonic about ``Fk`` with an amplitude that leaves it slower than the belt."""
+        arc = hybrid.simulate(coulomb_stick_slip(), (0.69, 0.0), (0.0, 30.0), mode="slip", solver=TIGHT)
+        assert not arc.jumps
+        np.testing.assert_allclose(
+            arc.x[-1], [0.5 + 0.19 * math.cos(30.0), -0.19 * math.sin(30.0)], atol=1e-11
+        )
+
+    def test_the_block_waits_for_the_belt(self):
+        """However fast it slipped, it sticks again until ``x = Fs``."""
+        for x0 in (0.9, 1.3, 1.9):
+            arc = hybrid.simulate(coulomb_stick_slip(), (x0, 0.0), (0.0, 30.0), mode="slip")
+            catch, release = arc.jumps[:2]
+            assert release.x_minus[0] == pytest.approx(1.0, abs=1e-12)
+            left = 0.5 - math.sqrt((x0 - 0.5) ** 2 - 0.2**2)
+            assert release.t - catch.t == pytest.approx((1.0 - left) / 0.2, abs=1e-8)
