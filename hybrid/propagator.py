@@ -301,14 +301,8 @@ class _Body:
     ) -> tuple[int, tuple[str, ...]]:
         """The number of columns and the statements: state and guards first, then what rests on them."""
         n = self.n
-        vector = Recurrences(
-            {seed: f"v + {i}" for i, seed in enumerate(seeds.values())},
-            None,
-            self.allot,
-            "b",
-            self.constants,
-            block,
-        )
+        rows = {seed: f"v + {i}" for i, seed in enumerate(seeds.values())}
+        vector = Recurrences(rows, None, self.allot, "b", self.constants, block)
         along = [f"v + {i}" for i in range(n)]
         carried = loop(along, tangents, [f"x[{column}]" for column in along], vector)
         volume = Recurrences({}, None, self.allot, "d", self.constants, block)

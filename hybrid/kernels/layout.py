@@ -234,10 +234,10 @@ class Record(NamedTuple):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
     ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
-    mode, jump count)`` and the Bernstein coefficients ``(d + 1, n + 1)`` of the state and of the time since. A jump: its phase and transversality,
-    ``(cycle, transition, kind)``, the states ``(2, n)`` before and after, and the saltation matrix ``(n,
-    n)``. A grazing: ``(phase, value, acceleration)`` of the guard, ``(cycle, transition, jump count)`` and
-    the state.
+    mode, jump count)`` and the Bernstein coefficients ``(d + 1, n + 1)`` of the state and of the time since.
+    A jump: its phase and transversality, ``(cycle, transition, kind)``, the states ``(2, n)`` before and
+    after, and the saltation matrix ``(n, n)``. A grazing: ``(phase, value, acceleration)`` of the guard,
+    ``(cycle, transition, jump count)`` and the state.
     """
 
     used: np.ndarray

@@ -165,9 +165,7 @@ def powers_on_step(series, column, order, h, known_roots, coefficients):
     degree = order
     while degree > known_roots and series[degree, column] == 0.0:
         degree -= 1
-    power, reach = 1.0, 0.0
-    for k in range(known_roots):
-        power *= h
+    power, reach = h**known_roots, 0.0
     for k in range(known_roots, degree + 1):
         coefficients[k - known_roots] = series[k, column] * power
         power *= h

@@ -23,17 +23,18 @@ class Taylor(RungeKutta):
       exponential forcing, is advanced by its series to rounding, whatever the tolerances, in steps as long as
       the series allows: **exact**. Where the solutions are polynomials a step is a whole flight.
     - A mode whose field has half-integer powers of a guard, such as a Hertz contact, is advanced on a clock
-      of its own, ``dt = 2 w ds`` with ``w`` the square root of the guard. Everything is smooth there, entry and
-      exit included: **desingularised**.
+      of its own, ``dt = 2 w ds`` with ``w`` the square root of the guard. Everything is smooth there, entry
+      and exit included: **desingularised**.
     - Any other mode with an analytic field is advanced by its **Taylor series**, of an order and with steps
       that follow from the tolerances (Jorba and Zou 2005, section 3).
-    - What is left, fields that cannot be traced or have kinks inside the mode, by the **Runge-Kutta pair** DOP853.
+    - What is left, fields that cannot be traced or have kinks inside the mode, by the **Runge-Kutta pair**
+      DOP853.
 
-    ``print(hybrid.compile_system(system))`` says which mode got what, and why. Guards are isolated on their own
-    series; in exact modes no crossing can be missed that rounding does not hide.
+    ``print(hybrid.compile_system(system))`` says which mode got what, and why. Guards are isolated on their
+    own series; in exact modes no crossing can be missed that rounding does not hide.
 
-    The recurrences follow from the traced expressions. The tolerances bound the last terms of state and tangent
-    vectors as those of :class:`DOP853` bound its error estimate.
+    The recurrences follow from the traced expressions. The tolerances bound the last terms of state and
+    tangent vectors as those of :class:`DOP853` bound its error estimate.
 
     References
     ----------
