@@ -103,9 +103,9 @@ def restitution_curves() -> Curves:
             error = max(abs(arc.jumps[-1].t / limit - 1), LEAST) if rests else NEVER
             curves.setdefault(name, []).append((e, error))
         bounces = with_events([fall], [[ground(e)]], *run, most_events=MOST_EVENTS, **SCIPY).events
-        # The bounces go on for ever, or one is overlooked and the ball falls through the ground.
-        assert len(bounces) == MOST_EVENTS or bounces[-1] < limit
-        curves.setdefault(EVENTS, []).append((e, NEVER))
+        # Without a limit the bounces go on, and nothing but the last of them could be its time.
+        gone_on = len(bounces) == MOST_EVENTS
+        curves.setdefault(EVENTS, []).append((e, NEVER if gone_on else abs(bounces[-1] / limit - 1)))
     return curves
 
 
