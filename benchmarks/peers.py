@@ -9,8 +9,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 Field = Callable[[float, np.ndarray], Sequence[float]]
-# More right-hand sides than this and the run is given up.
-GIVE_UP = 1_000_000
+# More right-hand sides than this and the run is given up, if the caller has no other limit.
+MOST_EVALUATIONS = 1_000_000
 
 
 class GivenUp(Exception):
@@ -35,20 +35,27 @@ class Outcome(NamedTuple):
     mode: int
 
 
-def counted(field: Field, count: list[int]) -> Field:
+def counted(field: Field, count: list[int], most: int) -> Field:
     def evaluate(t: float, x: np.ndarray) -> Sequence[float]:
         count[0] += 1
-        if count[0] > GIVE_UP:
+        if count[0] > most:
             raise GivenUp
         return field(t, x)
 
     return evaluate
 
 
-def straight(field: Field, x0: Sequence[float], t_span: tuple[float, float], **options: Any) -> Outcome:
+def straight(
+    field: Field,
+    x0: Sequence[float],
+    t_span: tuple[float, float],
+    *,
+    most_evaluations: int = MOST_EVALUATIONS,
+    **options: Any,
+) -> Outcome:
     """One call, no events: the error control is left to cope with the discontinuity."""
     count = [0]
-    solution = solve_ivp(counted(field, count), t_span, x0, **options)
+    solution = solve_ivp(counted(field, count, most_evaluations), t_span, x0, **options)
     return Outcome(solution.y[:, -1], np.array([]), count[0], 0)
 
 
@@ -60,13 +67,15 @@ def with_events(
     *,
     mode: int = 0,
     most_events: int = 100_000,
+    most_evaluations: int = MOST_EVALUATIONS,
     **options: Any,
 ) -> Outcome:
     """Terminal events of the current mode, its reset, and a new call from there: the documented way."""
     (t, end), x, count, times = t_span, np.array(x0, dtype=float), [0], []
     while t < end and len(times) < most_events:
         events = [terminal(edge) for edge in edges[mode]]
-        solution = solve_ivp(counted(fields[mode], count), (t, end), x, events=events, **options)
+        field = counted(fields[mode], count, most_evaluations)
+        solution = solve_ivp(field, (t, end), x, events=events, **options)
         t, x = float(solution.t[-1]), solution.y[:, -1]
         if solution.status != 1:
             break

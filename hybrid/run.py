@@ -279,8 +279,7 @@ class Trajectory:
             )
         )
 
-    def _grazed(self) -> Status:
-        grazed = int(self.run.count[codes.ILL_CONDITIONED])
+    def _grazed(self, grazed: int) -> Status:
         largest = self.run.clock[codes.LARGEST_SALTATION]
         return Status(
             StatusCode.SUCCESS,
@@ -302,16 +301,18 @@ class Trajectory:
                 f"{singular} of {self.jumps} jumps had no saltation matrix: they grazed exactly.",
                 "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
             )
-        if self.tangents and code == codes.DONE and self.run.count[codes.ILL_CONDITIONED]:
-            return self._grazed()
         ambiguous = int(self.run.count[codes.ORDER_MATTERED])
+        grazed = int(self.run.count[codes.ILL_CONDITIONED]) if self.tangents else 0
         if code == codes.DONE and ambiguous:
+            also = f" Besides, {grazed} of {self.jumps} jumps grazed within the tolerances." if grazed else ""
             return Status(
                 StatusCode.AMBIGUOUS_ORDER,
                 f"{ambiguous} times two guards were reached together and the order of their transitions "
-                "mattered; the one listed first was fired first.",
+                f"mattered; the one listed first was fired first.{also}",
                 "Choose the order in which the transitions are listed, or add one for the corner.",
             )
+        if code == codes.DONE and grazed:
+            return self._grazed(grazed)
         last = self.run.count[codes.LAST_FIRED]
         name = self.system.transition_names[last] if last >= 0 else None
         return run_status(code, self.t, self.mode, name)

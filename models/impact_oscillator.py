@@ -98,18 +98,46 @@ def one_impact_orbits(
         V = float(V.real)
         theta = np.arctan2(b * V / w, d - a * V) + psi
         free = np.array([a * V, b * V - r * V])  # the state after impact, less the forced response
-        times = np.linspace(0.0, T, 4000 * n)
-        x = [(_free_flow(k, c, t) @ free)[0] for t in times] + R * np.cos(w * times + theta - psi)
-        if x.max() <= d * (1 + 1e-12) + 1e-12 * R:
+        flight = _Flight(k, c, w, R, theta - psi, free)
+        if _highest_top(flight, np.linspace(0.0, T, 1000 * n)) <= d + 1e-12 * (abs(d) + R):
             s = (1 + r) * (A * np.cos(theta) - k * d) / V
             M = phi_T @ np.array([[-r, 0.0], [s, -r]])
             orbits.append(OneImpactOrbit(V, float(np.angle(np.exp(1j * theta))), np.linalg.eigvals(M)))
     return sorted(orbits, key=lambda orbit: -orbit.V)
 
 
-def _free_flow(k: float, c: float, t: float) -> np.ndarray:
-    """``expm(t [[0, 1], [-k, -c]])`` for any damping, critical too: ``sinc`` has no pole there."""
+class _Flight(NamedTuple):
+    """Motion between impacts: the free flow of ``free`` and the response ``R cos(w t + phase)``."""
+
+    k: float
+    c: float
+    w: float
+    R: float
+    phase: float
+    free: np.ndarray
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """Displacement and velocity at the times, ``(2, len(t))``."""
+        turn = self.w * t + self.phase
+        response = np.array([self.R * np.cos(turn), -self.R * self.w * np.sin(turn)])
+        return (_free_flow(self.k, self.c, t) @ self.free).T + response
+
+
+def _highest_top(flight: _Flight, times: np.ndarray) -> float:
+    """Largest displacement where the velocity turns from up to down.
+
+    The tops are placed between the times by the secant: a grid alone would overlook a shallow one.
+    """
+    v = flight.at(times)[1]
+    i = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
+    tops = times[i] + (times[i + 1] - times[i]) * v[i] / (v[i] - v[i + 1])
+    return float(flight.at(tops)[0].max(initial=-np.inf))
+
+
+def _free_flow(k: float, c: float, t: float | np.ndarray) -> np.ndarray:
+    """``expm(t [[0, 1], [-k, -c]])``, ``t.shape + (2, 2)``; critically damped too: ``sinc`` has no pole."""
     w_d = np.sqrt(complex(k - c**2 / 4))
+    t = np.asarray(t)[..., None, None]
     sine = t * np.sinc(w_d * t / np.pi)
     traceless = np.array([[c / 2, 1.0], [-k, -c / 2]])
     return (np.exp(-c * t / 2) * (np.cos(w_d * t) * np.eye(2) + sine * traceless)).real

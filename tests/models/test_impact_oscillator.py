@@ -115,3 +115,17 @@ def test_exponents_of_the_published_orbit():
     result = lyapunov.lyapunov_spectrum(impact_oscillator(), (0.0, 0.0), intervals=2000)
     np.testing.assert_allclose(result.exponents, [exact, exact], atol=3e-3)
     assert result.exponents.sum() == pytest.approx(2 * exact, abs=1e-3)
+
+
+@pytest.mark.parametrize("beyond", [1e-3, 1e-5, 1e-7, 1e-8])
+def test_near_grazing_an_orbit_listed_has_no_impact_on_its_way(beyond):
+    """Just beyond grazing every top between two impacts comes close to the stop, and some pass it."""
+    p = {"k": 0.1, "c": 1.1, "w": 1.0, "d": 1.0, "r": 0.8}
+    p["A"] = (1 + beyond) * p["d"] * math.hypot(p["k"] - p["w"] ** 2, p["c"] * p["w"])
+    listed = [(n, orbit) for n in range(1, 19) for orbit in one_impact_orbits(**p, n=n)]
+    assert len(listed) >= 6
+    for n, orbit in listed:
+        t, end = orbit.theta / p["w"], 2 * math.pi * n / p["w"]
+        after = (p["d"], -p["r"] * orbit.V)
+        arc = hybrid.simulate(impact_oscillator(), after, (t, t + end + 1.0), parameters=p, solver=TIGHT)
+        assert arc.jumps[0].t - t == pytest.approx(end, abs=1e-3), n

@@ -1,0 +1,30 @@
+"""Systems that more than one file of tests runs."""
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+from models import bouncing_ball, impact_oscillator
+
+
+def pendulum(guard=lambda t, x, p: x.q - p.c, *, both=False, names=("left", "right"), order=1):
+    """A pendulum cut at ``q = c``, where nothing happens."""
+
+    def field(t, x, p):
+        return x.v, -np.sin(x.q)
+
+    left, right = names
+    transitions = [
+        Transition(left, right, Guard(guard, 0 if both else +1), name="forth"),
+        Transition(right, left, Guard(guard, 0 if both else -1), name="back"),
+    ]
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"c": 0.3},
+        modes=[Mode(left, field), Mode(right, field)],
+        transitions=transitions[::order],
+    )
+
+
+PENDULUM = pendulum()
+BALL_SYSTEM = bouncing_ball()
+OSCILLATOR_SYSTEM = impact_oscillator()
