@@ -182,7 +182,7 @@ class TestBall:
         assert "limit" not in [jump.kind for jump in arc.jumps]
 
     def test_elastic_balls_never_rest(self):
-        arc = run(1.0, t_end=100.5 * 2 * FALL)
+        arc = run(1.0, t_end=100.75 * 2 * FALL)
         assert arc.status.ok
         assert len(arc.jumps) == 101
         assert "limit" not in [jump.kind for jump in arc.jumps]
