@@ -1,5 +1,6 @@
 """Models ready to simulate, one file each; every factory returns a :class:`hybrid.HybridSystem`."""
 
+from models.bilinear_oscillator import bilinear_oscillator as bilinear_oscillator
 from models.bouncing_ball import bouncing_ball as bouncing_ball
 from models.bouncing_table import bouncing_table as bouncing_table
 from models.impact_oscillator import impact_oscillator as impact_oscillator
