@@ -366,6 +366,22 @@ class TestStartOnAGuard:
         system = polynomial_motion(lambda t: -2 * t, direction=-1)
         assert [jump.t for jump in simulate(system, (0.0, 0.0), (0.0, 1.0), mode="run").jumps] == [0.0]
 
+    @pytest.mark.parametrize("turns", range(1, 7))
+    def test_with_rounding_for_an_acceleration(self, turns):
+        """``sin(2 pi)`` is not quite zero, on either side of it; the third derivative of ``x`` decides."""
+        t0 = 2 * np.pi * turns
+        for sign, times in ((1.0, []), (-1.0, [t0])):
+            system = HybridSystem(
+                state=("x", "v"),
+                modes=[
+                    Mode("run", lambda t, x, p, s=sign: (x.v, s * np.sin(t))),
+                    Mode("beyond", lambda t, x, p: (x.v, 0.0)),
+                ],
+                transitions=[Transition("run", "beyond", Guard(lambda t, x, p: x.x, direction=-1))],
+            )
+            arc = simulate(system, (0.0, 0.0), (t0, t0 + 3.0), mode="run")
+            np.testing.assert_allclose(arc.jumps.t, times, atol=1e-12)
+
     @pytest.mark.parametrize("sign", [1.0, -1.0])
     def test_both_ways_never_fires_at_the_start(self, sign):
         for derivative in (lambda t: 1.0 + 0 * t, lambda t: 2 * t, lambda t: 3 * t**2):
