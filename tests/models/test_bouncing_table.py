@@ -67,8 +67,22 @@ def test_a_locked_ball_lifts_off_when_the_table_falls_as_fast():
     arc = hybrid.simulate(bouncing_table(), (0.001, 0.0), (0.0, 1.0), mode="flight", solver=TIGHT)
     liftoffs = [jump.t for jump in arc.jumps if jump.transition == "liftoff"]
     assert len(liftoffs) > 3
+    assert {jump.kind for jump in arc.jumps} == {"transverse", "limit"}
     exact = math.asin(G / (A * W**2)) / W
     np.testing.assert_allclose([t % PERIOD for t in liftoffs], exact, rtol=0, atol=1e-10)
+
+
+def test_a_ball_at_rest_lifts_off_once():
+    """It leaves with neither speed nor acceleration, on the guard of the next bounce."""
+    for e in (0.0, E):
+        start = math.asin(G / (A * W**2)) / W
+        arc = hybrid.simulate(
+            bouncing_table(), (0.0, 0.0), (0.0, start + PERIOD / 4), mode="rest", parameters={"e": e}
+        )
+        assert [jump.transition for jump in arc.jumps] == ["liftoff"]
+        flight = PERIOD / 4
+        velocity = A * W * (math.cos(W * start) - math.cos(W * start + math.pi / 2)) - G * flight
+        assert arc.x[-1, 1] == pytest.approx(velocity, abs=1e-10)
 
 
 def test_areas_contract_as_the_bounces_say():
