@@ -42,6 +42,20 @@ def _heaviside(a: sympy.Expr, at_zero: sympy.Expr) -> sympy.Expr:
     return Select(Less(a, ZERO), ZERO, Select(Less(ZERO, a), ONE, at_zero))
 
 
+def _of_parity(parity: int, function: Callable[[sympy.Expr], sympy.Expr]) -> Callable[..., sympy.Expr]:
+    """An even or odd function of SymPy's, with the sign of ``-a - b`` taken out before SymPy does.
+
+    It negates such a sum by distributing -1 over it, and tries for ever where distribution is off.
+    """
+
+    def rule(a: sympy.Expr) -> sympy.Expr:
+        if a.is_Add and a.could_extract_minus_sign():
+            return parity * function(sympy.Add(*(-term for term in a.args)))
+        return function(a)
+
+    return rule
+
+
 DEGREE = number(np.pi / 180.0)
 
 # By the name of the ufunc, which its aliases share.
@@ -71,19 +85,19 @@ RULES: dict[str, Callable[..., sympy.Expr]] = {
     "log2": log2,
     "log10": log10,
     "log1p": log1p,
-    "sin": sympy.sin,
-    "cos": sympy.cos,
-    "tan": sympy.tan,
-    "arcsin": sympy.asin,
+    "sin": _of_parity(-1, sympy.sin),
+    "cos": _of_parity(+1, sympy.cos),
+    "tan": _of_parity(-1, sympy.tan),
+    "arcsin": _of_parity(-1, sympy.asin),
     "arccos": sympy.acos,
-    "arctan": sympy.atan,
+    "arctan": _of_parity(-1, sympy.atan),
     "arctan2": Atan2,
-    "sinh": sympy.sinh,
-    "cosh": sympy.cosh,
-    "tanh": sympy.tanh,
-    "arcsinh": sympy.asinh,
+    "sinh": _of_parity(-1, sympy.sinh),
+    "cosh": _of_parity(+1, sympy.cosh),
+    "tanh": _of_parity(-1, sympy.tanh),
+    "arcsinh": _of_parity(-1, sympy.asinh),
     "arccosh": sympy.acosh,
-    "arctanh": sympy.atanh,
+    "arctanh": _of_parity(-1, sympy.atanh),
     "hypot": hypot,
     "deg2rad": lambda a: DEGREE * a,
     "radians": lambda a: DEGREE * a,

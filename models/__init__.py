@@ -14,4 +14,11 @@ from models.stick_slip import coulomb_stick_slip as coulomb_stick_slip
 from models.stick_slip import stick_slip as stick_slip
 from models.switched_arrival import switched_arrival as switched_arrival
 from models.three_disk_billiard import three_disk_billiard as three_disk_billiard
+from models.bilinear_oscillator import bilinear_oscillator as bilinear_oscillator
+from models.bouncing_ball import bouncing_ball as bouncing_ball
+from models.bouncing_table import bouncing_table as bouncing_table
+from models.impact_oscillator import impact_oscillator as impact_oscillator
+from models.impact_pair import impact_pair as impact_pair
+from models.rocking_block import rocking_block as rocking_block
+from models.stop_oscillator import stop_oscillator as stop_oscillator
 from models.vibroimpact import vibroimpact as vibroimpact

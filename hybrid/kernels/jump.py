@@ -71,12 +71,32 @@ def speed_rounding(model, run, mode, t, work):
     return 16 * EPSILON * size
 
 
+@njit(**KERNEL)
+def acceleration_rounding(model, run, t, work):
+    """How far from zero rounding of state and time alone can leave the acceleration of the same guard.
+
+    Its Jacobian and field are current: ``guard_acceleration`` has just been called.
+    """
+    n = model.dimension
+    size = 0.0
+    for i in range(n):
+        bend = abs(work.jacobian[i, n])
+        for j in range(n):
+            spread = abs(work.field[j]) + abs(work.jacobian[j, n] * t)
+            for k in range(n):
+                spread += abs(work.jacobian[j, k]) * run.scale[k]
+            bend += abs(work.jacobian[i, j]) * spread
+        size += abs(work.gradient[i]) * bend
+    return 16 * EPSILON * size
+
+
 @njit(int64(MODEL, RUN, WORK), **ENTRY)
 def enter(model, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
-    The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, and from its
-    acceleration where the speed vanishes too. A guard that the state has come to lie on or beyond fires at
+    The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, from its
+    acceleration where the speed vanishes too, and where that does as well the next step shows which way it
+    leaves: until then it counts as not crossed. A guard that the state has come to lie on or beyond fires at
     once, except the transition that has just fired: if the state moves on through its guard the crossing is
     done, and if it rests there the answer is ``RESTING``: the transition would fire for ever. A guard that
     fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump. A
@@ -94,18 +114,20 @@ def enter(model, run, work):
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
         band = rounding_band(model, run, t, work.gradient)
         on_guard = abs(value) <= band
-        resting = False
+        resting, order = False, 0
         trend = value
         if on_guard:
-            trend = speed
+            trend, order = speed, 1
             if abs(speed) <= speed_rounding(model, run, mode, t, work):
-                resting = True
+                resting, order = True, 2
                 trend = guard_acceleration(model, transition, mode, t, run.y, work)
+                if abs(trend) <= acceleration_rounding(model, run, t, work):
+                    trend, order = 0.0, 3
         direction = model.direction[transition]
         before = run.side[transition] if run.count[PREVIOUS_MODE] == mode else 0
         side = 1 if trend > 0.0 else (-1 if trend < 0.0 else -direction)
         run.side[transition] = side
-        run.on_guard[transition] = (2 if resting else 1) if on_guard else 0
+        run.on_guard[transition] = order
         inbound = side == direction or (direction == 0 and on_guard and side * before < 0)
         if not inbound or model.marker[transition] == 1:
             continue

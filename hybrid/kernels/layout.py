@@ -134,10 +134,10 @@ class Run(NamedTuple):
 
     ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
     the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
-    vanishes at the entry of the mode and has not been left since, 2 where its speed does too; ``first_step
-    (modes,)`` remembers the step a mode began with; ``scale (n,)`` the size of the components over the last
-    step, against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of
-    the tangent vectors by orthonormalisation.
+    vanishes at the entry of the mode and has not been left since, 2 where its speed does too, 3 where its
+    acceleration does as well; ``first_step (modes,)`` remembers the step a mode began with; ``scale (n,)``
+    the size of the components over the last step, against which rounding is judged; ``growth (k,)`` sums the
+    logarithms of the lengths taken out of the tangent vectors by orthonormalisation.
     ``trail (3, n + 1)`` follows the jumps of one transition to their limit.
     """
 

@@ -140,6 +140,20 @@ def test_a_stiff_difference_is_not_multiplied_out():
     assert evaluate([expression], 0.0, x, [])[0] == 3 * 2.0**-52
 
 
+PARITY = [np.sin, np.cos, np.tan, np.arcsin, np.arctan, np.sinh, np.cosh, np.tanh, np.arcsinh, np.arctanh]
+
+
+@pytest.mark.parametrize("ufunc", PARITY, ids=lambda ufunc: ufunc.__name__)
+def test_a_sum_of_negative_terms(ufunc):
+    """SymPy takes the sign out of it; that keeps every digit, those of a difference within it too."""
+    x = np.array([0.25, 0.125])
+    found = evaluate(traced_scalar(lambda a, b: ufunc(-a - b)), 0.0, x, [])
+    np.testing.assert_allclose(found, [ufunc(-0.375)], rtol=4e-16)
+    near = np.array([1.0 + 2.0**-52, 1.0])
+    found = evaluate(traced_scalar(lambda a, b: ufunc(-(2.0**-60) - 3 * (a - b))), 0.0, near, [])
+    np.testing.assert_allclose(found, [ufunc(-3 * 2.0**-52 - 2.0**-60)], rtol=4e-16)
+
+
 def fails(function, text, state=NAMES):
     with pytest.raises(TraceError, match=text) as caught:
         trace(function, state, ())

@@ -1,0 +1,124 @@
+"""Pictures of the models of impacts and stops for the gallery, each drawn on axes it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+
+import models
+from hybrid import DOP853, simulate, stroboscopic_section
+from hybrid.plot import COLOURS, plot_phase
+
+COARSE = DOP853(rtol=1e-7, atol=1e-9)
+DOTS = {"marker": ".", "markersize": 1.5, "mew": 0, "linestyle": "None", "color": COLOURS[0]}
+
+
+def bouncing_table(ax: Axes) -> None:
+    system = models.bouncing_table()
+    period, g, w = system.forcing_period(), 9.81, 36.0
+    accelerations = np.linspace(1.06, 1.76, 240)
+    # From the orbit with one bounce a period: at t = 0 the ball is about to land at its phase.
+    phase = np.arccos(np.pi / (3 * accelerations[0]))
+    V, left, A = np.pi * g / w, phase / w, accelerations[0] * g / w**2
+    x, mode = np.array([A * np.sin(phase) + V * left - g * left**2 / 2, g * left - V - A * w]), "flight"
+    for acceleration in accelerations:
+        parameters = {"A": acceleration * g / w**2}
+        for periods in (60, 60):  # the first are transient
+            end = periods * period
+            arc = simulate(
+                system, x, (0.0, end), mode=mode, parameters=parameters, samples=[end], solver=COARSE
+            )
+            x, mode = arc.x[-1], str(arc.mode[-1])
+        speeds = -arc.jumps.x_minus[:, 1]
+        ax.plot(np.full(len(speeds), acceleration), speeds, **DOTS)
+    ax.set_xlabel("acceleration of the table $A w^2 / g$")
+    ax.set_ylabel("impact speed (m/s)")
+
+
+def impact_pair(ax: Axes) -> None:
+    system = models.impact_pair()
+    parameters = {"d": 1.0}
+    end = 5000 * system.forcing_period()
+    arc = simulate(system, (0.1, 1.0), (0.0, end), parameters=parameters, samples=[end], solver=COARSE)
+    right = arc.jumps.x_minus[:, 1] > 0
+    ax.plot(arc.jumps.t[right] / (2 * np.pi) % 1, arc.jumps.x_minus[right, 1], **DOTS)
+    ax.set_xlabel("phase of the impact on the right wall")
+    ax.set_ylabel("relative velocity $v$")
+
+
+def bilinear_oscillator(ax: Axes) -> None:
+    system = models.bilinear_oscillator()
+    x, mode = (0.1, 0.0), "stiff"
+    for w in np.linspace(2.2, 5.2, 240):
+        section = stroboscopic_section(
+            system, x, mode=mode, parameters={"w": w, "k2": 50.0}, transient=60, periods=50, solver=COARSE
+        )
+        x, mode = section.x[-1], str(section.mode[-1])
+        ax.plot(np.full(len(section), w), section.x[:, 0], **DOTS)
+    ax.set_xlabel("forcing frequency $w$")
+    ax.set_ylabel("$x$ once a period")
+
+
+def stop_oscillator(ax: Axes) -> None:
+    system = models.stop_oscillator()
+    frequencies = np.linspace(0.7, 3.0, 80)
+    for colour, F0 in zip(COLOURS, (0.0, 2.0), strict=False):
+        for order, line in ((1, "-"), (-1, ":")):
+            x, mode, amplitudes = (0.1, 0.0), "free", []
+            for w in frequencies[::order]:
+                parameters = {"w": w, "F0": F0}
+                end = 30 * system.forcing_period(parameters)
+                last = np.linspace(29 / 30 * end, end, 100)
+                arc = simulate(
+                    system, x, (0.0, end), mode=mode, parameters=parameters, samples=last, solver=COARSE
+                )
+                x, mode = arc.x[-1], str(arc.mode[-1])
+                amplitudes.append(np.abs(arc.x[:, 0]).max())
+            label = f"$F_0 = {F0:g}$" if order == 1 else None
+            ax.plot(frequencies[::order], amplitudes, line, color=colour, label=label)
+    ax.set_xlabel("forcing frequency $w$, up (solid) and down (dotted)")
+    ax.set_ylabel("amplitude")
+    ax.legend(frameon=False)
+
+
+def rocking_block(ax: Axes) -> None:
+    system = models.rocking_block()
+    plot_phase(simulate(system, (0.22, 0.0), (0.0, 9.0)), "theta", "omega", ax=ax)
+    theta = np.linspace(-0.25, 0.25, 401)
+    separatrix = 2 * 2.0 * np.sin((0.25 - np.abs(theta)) / 2)
+    for sign in (1, -1):
+        ax.plot(theta, sign * separatrix, color="0.6", linewidth=0.9, zorder=0)
+    ax.set_xlabel(r"tilt $\theta$ (rad)")
+    ax.set_ylabel(r"angular velocity $\omega$ (rad/s)")
+
+
+PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+    (
+        "bouncing_table",
+        "A ball on a vibrating table: impact speeds over the acceleration, from one bounce a period through "
+        "its period doublings to chaos.",
+        bouncing_table,
+    ),
+    (
+        "impact_pair",
+        "A mass rattling in a shaken box: phase and velocity of its impacts on the right wall, in chaos.",
+        impact_pair,
+    ),
+    (
+        "bilinear_oscillator",
+        "Bilinear oscillator with the stiffnesses 1 and 50: subharmonics and the chaos between them.",
+        bilinear_oscillator,
+    ),
+    (
+        "stop_oscillator",
+        "Response of the oscillator between stops, with and without preload: the resonance bends and jumps.",
+        stop_oscillator,
+    ),
+    (
+        "rocking_block",
+        "A rocking block set free near the edge of overturning, which is the grey curve.",
+        rocking_block,
+    ),
+]

@@ -1,0 +1,77 @@
+"""A ball that bounces on a vibrating table: period doublings to chaos, chatter and locking."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def bouncing_table() -> HybridSystem:
+    r"""Ball on a heavy table at height ``A sin(w t)``, seen from the table.
+
+    .. math::
+
+        \ddot q = -g + A w^2 \sin(w t), \quad q \ge 0, \qquad v \mapsto -e\, v \text{ at } q = 0, v < 0
+
+    Where its bounces accumulate the ball locks onto the table, and lifts off when the table falls as fast as
+    it does, at :math:`A w^2 \sin(w t) = g`.
+
+    Returns
+    -------
+    HybridSystem
+        State ``q`` (height above the table, m), ``v`` (velocity relative to it, m/s); modes ``flight``,
+        ``rest``; transitions ``bounce``, ``liftoff``; forcing period ``2 pi / w``. Parameters: ``g = 9.81``
+        m/s^2; ``e = 0.5``, the coefficient of restitution; amplitude ``A = 0.01`` m and frequency ``w = 36``
+        rad/s of the table, at most 1.32 g.
+
+    Notes
+    -----
+    With :math:`\Gamma = A w^2 / g`, and no approximation of a high bounce:
+
+    - orbits with one bounce every ``n`` periods leave the table at the absolute velocity
+      :math:`\pi n g / w`, at the phase :math:`\cos \varphi = \pi n (1 - e) / (\Gamma (1 + e))`;
+    - their multipliers have the product :math:`e^2` and the sum
+      :math:`1 + e^2 - (1 + e)^2 \Gamma \sin \varphi`, so they are stable for
+      :math:`0 < \Gamma \sin \varphi < 2 (1 + e^2) / (1 + e)^2` and then double their period: for ``n = 1``
+      and the defaults from :math:`\Gamma = 1.047` to ``1.527``;
+    - for :math:`\Gamma \le 1` a ball at rest stays at rest.
+
+    References
+    ----------
+    P. J. Holmes, "The dynamics of repeated impacts with a sinusoidally vibrating table", Journal of Sound and
+    Vibration 84(2), 173-189, 1982. J. M. Luck, A. Mehta, "Bouncing ball with a finite restitution:
+    Chattering, locking, and chaos", Physical Review E 48(5), 3988-3997, 1993. doi:10.1103/PhysRevE.48.3988
+    """
+
+    def weight(t, x, p):
+        return p.g - p.A * p.w**2 * np.sin(p.w * t)
+
+    return HybridSystem(
+        name="bouncing ball on a vibrating table",
+        state=("q", "v"),
+        parameters={"g": 9.81, "e": 0.5, "A": 0.01, "w": 36.0},
+        modes=[
+            Mode("flight", lambda t, x, p: (x.v, -weight(t, x, p))),
+            Mode("rest", lambda t, x, p: (0.0, 0.0)),
+        ],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, direction=-1),
+                Reset(lambda t, x, p: (0.0, -p.e * x.v)),
+                accumulates_to="rest",
+                name="bounce",
+            ),
+            Transition(
+                "rest",
+                "flight",
+                Guard(weight, direction=-1),
+                # A chatter ends on the table up to rounding, and rounding must not bounce.
+                Reset(lambda t, x, p: (0.0, 0.0)),
+                name="liftoff",
+            ),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )

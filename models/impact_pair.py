@@ -1,0 +1,61 @@
+"""A mass that rattles between the two walls of a shaken box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def impact_pair() -> HybridSystem:
+    r"""Free mass between rigid walls ``d`` apart in a box at ``A cos(w t)``, seen from the box.
+
+    .. math::
+
+        \ddot x = A w^2 \cos(w t), \quad |x| \le d / 2, \qquad v \mapsto -r\, v \text{ at } x = \pm d / 2
+
+    Returns
+    -------
+    HybridSystem
+        State ``x`` (displacement from the middle of the box), ``v`` (velocity relative to it); mode
+        ``flight``; transitions ``left``, ``right``; forcing period ``2 pi / w``. Dimensionless parameters:
+        amplitude ``A = 1`` and frequency ``w = 1`` of the box, clearance ``d = 4``, restitution ``r = 0.8``.
+
+    Notes
+    -----
+    - Symmetric orbits with two impacts a period cross the box at the absolute speed ``u`` and hit the right
+      wall at the phase :math:`\varphi`:
+
+      .. math::
+
+          \left( \frac{\pi u / w - d}{2 A} \right)^2
+          + \left( \frac{u}{A w} \frac{1 - r}{1 + r} \right)^2 = 1, \quad
+          \cos \varphi = \frac{\pi u / w - d}{2 A}, \quad
+          \sin \varphi = \frac{u}{A w} \frac{1 - r}{1 + r}
+
+    - Their multipliers are the squares of two numbers with the product :math:`r^2` and the sum
+      :math:`2 r - \pi A w (1 + r)^2 \cos(\varphi) / (2 u)`.
+    - On any orbit the exponents (phase left out) sum to ``2 ln(r)`` times the impacts per unit time.
+    - Impacts that accumulate at a wall end the run: the mass would stay there a while.
+
+    References
+    ----------
+    C. N. Bapat, N. Popplewell, K. McLachlan, "Stable periodic motions of an impact-pair", Journal of Sound
+    and Vibration 87(1), 19-40, 1983.
+    """
+    rebound = Reset(lambda t, x, p: (x.x, -p.r * x.v))
+    return HybridSystem(
+        name="impact pair",
+        state=("x", "v"),
+        parameters={"A": 1.0, "w": 1.0, "d": 4.0, "r": 0.8},
+        modes=[Mode("flight", lambda t, x, p: (x.v, p.A * p.w**2 * np.cos(p.w * t)))],
+        transitions=[
+            Transition(
+                "flight", "flight", Guard(lambda t, x, p: x.x + p.d / 2, direction=-1), rebound, name="left"
+            ),
+            Transition(
+                "flight", "flight", Guard(lambda t, x, p: x.x - p.d / 2, direction=+1), rebound, name="right"
+            ),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )

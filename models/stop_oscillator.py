@@ -1,0 +1,75 @@
+"""A driven oscillator between two elastic stops, with gap, stiffness and preload."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+
+
+def stop_oscillator() -> HybridSystem:
+    r"""Forced oscillator of unit mass between elastic stops at ``x = d`` and ``x = -d``, preloaded by ``F0``.
+
+    .. math::
+
+        \ddot x + c\, \dot x + k\, x + s(x) = A \cos(w t), \qquad
+        s = \begin{cases} 0 & |x| < d \\ F_0 \operatorname{sgn} x + k_s (x - d \operatorname{sgn} x)
+        & |x| > d \end{cases}
+
+    Without preload the restoring force is trilinear. With it a stop is a spring set up against its seat,
+    which yields only to more than ``F0``.
+
+    Returns
+    -------
+    HybridSystem
+        State ``x`` (displacement), ``v`` (velocity); modes ``free``, ``right``, ``left``; transitions named
+        ``touch right``, ``leave right``, ``touch left``, ``leave left``; forcing period ``2 pi / w``.
+        Dimensionless parameters: stiffness ``k = 1``, damping ``c = 0.1``, gap ``d = 1``, stiffness
+        ``ks = 10`` and preload ``F0 = 0`` of a stop, forcing amplitude ``A = 1`` and frequency ``w = 1``.
+
+    Notes
+    -----
+    - The saltation matrix of touching and leaving is ``[[1, 0], [-F0 / abs(v), 1]]``, the identity without
+      preload. Exponents (phase left out) sum to ``-c`` in either case.
+    - Free undamped motion that crosses ``x = 0`` at the speed :math:`V > d \sqrt{k}` has the period
+
+      .. math::
+
+          T = \frac{4}{\omega} \arcsin \frac{\omega d}{V}
+          + \frac{4}{\Omega} \arctan \frac{\Omega\, v}{k d + F_0}, \quad
+          v = \sqrt{V^2 - k d^2}, \quad \omega^2 = k, \quad \Omega^2 = k + k_s
+
+    - A mass that comes to a preloaded stop and is pressed against it by less than ``F0`` rests at
+      ``x = d``, a point at which no mode of this model can stay.
+
+    References
+    ----------
+    S. W. Shaw, P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and
+    Vibration 90(1), 129-155, 1983. doi:10.1016/0022-460X(83)90407-8
+    """
+
+    def field(side):
+        def stop(x, p):
+            return side * p.F0 + p.ks * (x.x - side * p.d) if side else 0.0
+
+        return lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - p.c * x.v - p.k * x.x - stop(x, p))
+
+    def at_right(t, x, p):
+        return x.x - p.d
+
+    def at_left(t, x, p):
+        return x.x + p.d
+
+    return HybridSystem(
+        name="stop oscillator",
+        state=("x", "v"),
+        parameters={"k": 1.0, "c": 0.1, "d": 1.0, "ks": 10.0, "F0": 0.0, "A": 1.0, "w": 1.0},
+        modes=[Mode("free", field(0)), Mode("right", field(+1)), Mode("left", field(-1))],
+        transitions=[
+            Transition("free", "right", Guard(at_right, direction=+1), name="touch right"),
+            Transition("right", "free", Guard(at_right, direction=-1), name="leave right"),
+            Transition("free", "left", Guard(at_left, direction=-1), name="touch left"),
+            Transition("left", "free", Guard(at_left, direction=+1), name="leave left"),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
