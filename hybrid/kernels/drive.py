@@ -13,7 +13,6 @@ from hybrid.kernels.codes import (
     GRAZING_GUARD,
     GRAZING_PLACE,
     GRAZING_VALUE,
-    GRAZINGS,
     JUMPS,
     JUMPS_HERE,
     LAST_FIRED,
@@ -44,9 +43,9 @@ from hybrid.kernels.guards import (
     NOT_THERE,
     allowed,
     earliest_crossing,
-    guard_acceleration,
     guard_speed,
     guard_value,
+    keep_grazing,
     land,
     rounding_band,
     value_on_interpolant,
@@ -149,27 +148,14 @@ def time_left(model, run, stop_cycle, stop_phase):
 
 @njit(**KERNEL)
 def remember_grazing(model, method, run, record, t, h, work):
-    """Count the grazing found on the attempted step, and write it into the record if that keeps any."""
-    mode, transition = run.count[MODE], run.count[GRAZING_GUARD]
-    theta = run.clock[GRAZING_PLACE]
+    """Keep the grazing found on the attempted step, if its transition might have fired there."""
+    transition, theta = run.count[GRAZING_GUARD], run.clock[GRAZING_PLACE]
     interpolate(method, h, run.y, model.dimension, work)
     value_on_interpolant(model, transition, t, h, theta, work)
     if not allowed(model, transition, t + theta * h, work.state, work.scalar):
         return
-    run.count[GRAZINGS] += 1
-    slot = record.used[2]
-    if slot == record.grazing_time.shape[0]:
-        return
-    for i in range(model.dimension):
-        record.grazing_state[slot, i] = work.state[i]
-    place = record.grazing_state[slot]
-    model.flow(mode, t + theta * h, place, model.parameters, work.field)
-    guard_speed(model, transition, t + theta * h, place, work.field, work.gradient)
-    record.grazing_time[slot, 0], record.grazing_time[slot, 1] = t + theta * h, run.clock[GRAZING_VALUE]
-    record.grazing_time[slot, 2] = guard_acceleration(model, transition, mode, t + theta * h, place, work)
-    record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
-    record.grazing_place[slot, 2] = run.count[JUMPS]
-    record.used[2] = slot + 1
+    value = run.clock[GRAZING_VALUE]
+    keep_grazing(model, run, record, transition, t + theta * h, work.state, value, work)
 
 
 @njit(**INLINE)
@@ -357,6 +343,6 @@ def advance(
             run.count[CYCLE] = stop_cycle
             run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
-            run.count[PENDING] = parts.first_in_order(model, run, fired, work)
+            run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
         else:
             carry_rates(method, length, work)
