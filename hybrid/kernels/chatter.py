@@ -22,6 +22,9 @@ LIMIT = 1
 IMPULSE = 2
 # No limit is taken before this many jumps, so that the visible ones are there to be seen.
 FEWEST_JUMPS = 16
+# Unless a flight is no higher than this times rounding: what rounding does to its duration goes like the
+# reciprocal of its speed, and would spoil the limit.
+SHALLOW = 1e6
 # Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
 SHORT = 1e-5
 LONG = 1.0
@@ -123,14 +126,16 @@ def accumulation(model, method, run, transition, since_last, work):
         ratio = run.clock[RESTITUTION]
         # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
         height = 0.25 * speed * span * (1.0 - ratio)
-        drowned = height <= rounding_band(model, run, run.clock[PHASE], work.gradient)
+        band = rounding_band(model, run, run.clock[PHASE], work.gradient)
+        drowned = height <= band
+        shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
         follow_mean(model, run, transition, side * speed, span, work)
         shift = span - (run.trail[LIMIT, n] - since_last)
         misfit = change_of_limit(model, method, run, ratio, shift, span, work)
         # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
         # takes over.
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
-        found = drowned or (run.count[CHATTERING] >= FEWEST_JUMPS and (misfit <= 1.0 or floor))
+        found = drowned or (shallow and (misfit <= 1.0 or floor))
         run.trail[IMPULSE, n] = misfit
         run.trail[LIMIT, n] = span
         run.count[CHATTERING] += 1

@@ -89,14 +89,17 @@ def order_matters(model, run, one, other, work):
 
 @njit(**KERNEL)
 def turns_back(model, run, transition, work):
-    """Whether a guard only touches zero here: without speed, up to rounding, it turns to where it was."""
+    """Whether a guard only touches zero here: it moves to where it was, or turns there if it is at rest.
+
+    At the bottom of a dip that is no deeper than rounding either end may be found first.
+    """
     mode, t = run.count[MODE], run.clock[PHASE]
     model.flow(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    if abs(speed) > speed_rounding(model, run, mode, t, work):
-        return False
     direction = model.direction[transition]
     before = run.side[transition] if direction == 0 else -direction
+    if abs(speed) > speed_rounding(model, run, mode, t, work):
+        return speed * before > 0.0
     return guard_acceleration(model, transition, mode, t, run.y, work) * before > 0.0
 
 

@@ -269,6 +269,16 @@ def composed_crossing(model, method, run, transition, t, h, offset, on_guard, si
     return NO_ROOT, side
 
 
+@njit(**KERNEL)
+def leave_guard(model, run, transition, t, work):
+    """Put a guard on the side it has at the end of the attempted step, ``work.new``, whatever came before."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    if abs(value) > rounding_band(model, run, t, work.gradient):
+        run.side[transition] = 1 if value > 0.0 else -1
+        run.on_guard[transition] = 0
+
+
 @njit(**INLINE)
 def earliest_crossing(model, method, run, t, h, ignored, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
@@ -283,6 +293,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         if transition == ignored:
+            leave_guard(model, run, transition, t + h, work)
             continue
         value = guard_value(model, transition, t, run.y, work.scalar)
         on_guard = run.on_guard[transition]

@@ -26,6 +26,7 @@ from hybrid.kernels.codes import (
     LAST_FIRED,
     LAST_JUMP_CYCLE,
     LAST_JUMP_PHASE,
+    LAST_KIND,
     LAST_TRANSVERSALITY,
     LIMIT_OF_CHATTER,
     LOG_DETERMINANT,
@@ -187,7 +188,12 @@ def is_grazing(model, method, run, transition, transversality, work):
     """
     acceleration = guard_acceleration(model, transition, run.count[MODE], run.clock[PHASE], run.y, work)
     band = error_band(method, run, work.gradient, model.dimension)
-    return transversality * transversality <= 2.0 * abs(acceleration) * band
+    if transversality * transversality <= 2.0 * abs(acceleration) * band:
+        return True
+    # Inside such a dip the steps, and with them the sizes that the tolerances refer to, are those of the dip.
+    way_in = run.clock[LAST_TRANSVERSALITY]
+    grazed = run.count[LAST_KIND] == GRAZING and run.count[LAST_FIRED] == transition
+    return grazed and way_in * transversality < 0.0 and abs(transversality) <= 2.0 * abs(way_in)
 
 
 @njit(**KERNEL)
@@ -224,12 +230,12 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
     mode, target = run.count[MODE], model.target[transition]
     transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
-    run.clock[LAST_TRANSVERSALITY] = transversality
     judge(run, model.dimension, work)
     kind = TRANSVERSE
     if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING
         run.count[ILL_CONDITIONED] += 1
+    run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
     sides_at_point(model, run, work)
     remember_jump(model, run, record, transition, transversality, kind, work.new, work)
     if tangents > 0:
