@@ -8,6 +8,7 @@ columns, time last. The variational flow is the one role that reads all of ``x (
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -170,13 +171,15 @@ class _Writer:
         return _Written(value, self._complex_step(role))
 
     def _opaque_value(self, role: Role, targets: Sequence[str]) -> list[str]:
-        lines = [f"v = {self._opaque_name(role.function)}(t, {self._state()}, {self._parameters()})"]
+        lines = [
+            f"v = {self._opaque_name(role.title, role.function)}(t, {self._state()}, {self._parameters()})"
+        ]
         return lines + [
             f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)
         ]
 
     def _complex_step(self, role: Role) -> list[str]:
-        n, name = self.system.dimension, self._opaque_name(role.function)
+        n, name = self.system.dimension, self._opaque_name(role.title, role.function)
         lines = []
         if isinstance(self.system.state, int):
             lines.append(f"z = x[:{n}].astype(np.complex128)")
@@ -212,7 +215,8 @@ class _Writer:
 
     def _opaque_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
         n = self.system.dimension
-        lines = [f"v = {self._opaque_name(derivative)}(t, {self._state()}, {self._parameters()})"]
+        name = self._opaque_name(role.derivative_title, derivative)
+        lines = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
         width = n + 1 if derivative_has_time_column(self.system, role) else n
         cells = iter(self._cells(role))
         for i in range(role.rows):
@@ -226,10 +230,16 @@ class _Writer:
             return [f"out[{j}]" for j in columns]
         return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
 
-    def _opaque_name(self, function: Callable[..., Any]) -> str:
+    def _opaque_name(self, title: str, function: Callable[..., Any]) -> str:
         for name, known in self.opaque.items():
             if known is function:
                 return name
+        if not inspect.isfunction(function):
+            raise ModelError(
+                f"{title} cannot be traced, and is compiled as it is only if it is a plain function; got "
+                f"{function!r}. Write it with NumPy functions (np.sin, np.where), so that it can be traced, "
+                "or as a function (def or lambda) of (t, x, p) alone."
+            )
         name = f"model_{sum(key.startswith('model_') for key in self.opaque)}"
         self.opaque[name] = function
         return name

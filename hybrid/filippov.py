@@ -14,10 +14,11 @@ from hybrid.system import Guard, HybridSystem, Mode, ModelFunction, Reset, Trans
 # A state further from the surface than this share of its size does not slide, and is in the mode of its
 # side. What the integration lets the state drift while it slides is far less.
 SLIDING_BAND = 1e-6
-# Whether the surface is crossed or slid along is only asked this near it, in the same measure.
-NEAR = 1e-3
-# A field that moves through the surface slower than this share of the speed of both is tangent to it.
+# Two fields that both move through the surface slower than this share of their speeds are tangent to it.
 TANGENT = 1e-9
+# An orbit that would go no further than this beyond the surface before it turns back has not arrived there,
+# in the same measure.
+TOUCH = 1e-15
 
 
 def filippov(
@@ -45,8 +46,8 @@ def filippov(
     Modes are ``below``, ``above`` and ``sliding``; where ``L_b`` and ``L_a`` are the same everywhere nothing
     slides and there are only two. A start in the surface finds its mode by itself, unless both fields point
     away from it: then it may go either way, and ``below`` or ``above`` must be named. For the same reason a
-    run ends (status NON_FINITE, with the jump ``undecided`` last) where an orbit slides to a point at which
-    both fields are tangent to the surface, a two-fold.
+    run ends (status TERMINAL, with the jump ``two-fold`` last) where an orbit slides to a point at which both
+    fields are tangent to the surface.
 
     Parameters
     ----------
@@ -64,9 +65,9 @@ def filippov(
     Returns
     -------
     HybridSystem
-        Its transitions are named ``source->target``. The others are ``undecided``, and four that leave a mode
-        further than 1e-6 on the wrong side of the surface, relative to ``1 + |x|``: ``sliding too high``,
-        ``sliding too low``, ``below too high``, ``above too low``. They tell a start where it belongs.
+        Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run, and
+        ``sliding too high`` and ``sliding too low``, which a start in the sliding mode takes if it is further
+        than 1e-6 from the surface, relative to ``1 + |x|``.
 
     Raises
     ------
@@ -103,24 +104,24 @@ def filippov(
     for what, function in (("below", below), ("above", above), ("switching", switching)):
         if not callable(function):
             raise ModelError(f"filippov: {what} must be a function of (t, x, p); got {function!r}.")
-    surface = _Surface(
-        below, above, switching, _derived_gradient(below, above, switching, state, tuple(parameters))
-    )
+    surface = _surface(below, above, switching, state, tuple(parameters))
     modes = [Mode("below", below), Mode("above", above)]
     if surface.may_attract(state, tuple(parameters)):
         modes.append(Mode("sliding", surface.sliding_field))
         transitions = [
-            Transition("below", "sliding", Guard(surface.arrives_from_below, +1)),
-            Transition("below", "above", Guard(surface.crosses_up, +1)),
-            Transition("above", "sliding", Guard(surface.arrives_from_above, +1)),
-            Transition("above", "below", Guard(surface.crosses_down, +1)),
-            Transition("sliding", "above", Guard(surface.attraction, -1), Reset(_nowhere), name="undecided"),
-            Transition("sliding", "above", Guard(surface.above_tangent, +1), Reset(surface.projection)),
-            Transition("sliding", "below", Guard(surface.below_tangent, -1), Reset(surface.projection)),
-            Transition("sliding", "above", Guard(surface.excess_above, +1), name="sliding too high"),
-            Transition("sliding", "below", Guard(surface.excess_below, -1), name="sliding too low"),
-            Transition("below", "above", Guard(surface.excess_above, +1), name="below too high"),
-            Transition("above", "below", Guard(surface.excess_below, -1), name="above too low"),
+            Transition("below", "sliding", Guard(switching, +1, when=surface.arrives_from_below)),
+            Transition("below", "above", Guard(switching, +1, when=surface.crosses_up)),
+            Transition("above", "sliding", Guard(switching, -1, when=surface.arrives_from_above)),
+            Transition("above", "below", Guard(switching, -1, when=surface.crosses_down)),
+            Transition(
+                "sliding", "above", Guard(_at_entry, +1, when=surface.is_above), name="sliding too high"
+            ),
+            Transition(
+                "sliding", "below", Guard(_at_entry, +1, when=surface.is_below), name="sliding too low"
+            ),
+            Transition("sliding", None, Guard(surface.attraction, -1), name="two-fold"),
+            Transition("sliding", "above", Guard(surface.speed_above, +1), Reset(surface.projection)),
+            Transition("sliding", "below", Guard(surface.speed_below, -1), Reset(surface.projection)),
         ]
     else:
         transitions = [
@@ -137,6 +138,25 @@ def filippov(
     )
 
 
+def _surface(
+    below: ModelFunction,
+    above: ModelFunction,
+    switching: ModelFunction,
+    state: tuple[str, ...] | int,
+    parameters: tuple[str, ...],
+) -> _Surface:
+    n = state if isinstance(state, int) else len(state)
+    functions = (("below", below, n), ("above", above, n), ("switching", switching, 1))
+    _check_traceable(functions, state, parameters)
+    gradient = _derived_gradient(switching, state, parameters)
+    speeds = [_rate(gradient, field) for field in (below, above)]
+    turns = [
+        _rate(_derived_gradient(speed, state, parameters), field)
+        for speed, field in zip(speeds, (below, above), strict=True)
+    ]
+    return _Surface(below, above, switching, gradient, *speeds, *turns)
+
+
 @attrs.frozen(eq=False)
 class _Surface:
     """The model functions that follow from two fields and a switching function."""
@@ -145,6 +165,10 @@ class _Surface:
     above: ModelFunction
     switching: ModelFunction
     gradient: ModelFunction  # (D_x h, D_t h)
+    speed_below: ModelFunction  # L_b and L_a, the rates of h along the fields
+    speed_above: ModelFunction
+    turn_below: ModelFunction  # the rate of L_b along the field below, of L_a along that above
+    turn_above: ModelFunction
 
     def may_attract(self, state: tuple[str, ...] | int, parameters: tuple[str, ...]) -> bool:
         """Whether the two speeds are not proved to be the same everywhere."""
@@ -154,9 +178,8 @@ class _Surface:
         return (L_b - L_a).expand() != 0
 
     def speeds(self, t: Any, x: Any, p: Any) -> tuple[Any, ...]:
-        """``(L_b, L_a)``, the rates of ``h`` along the fields."""
-        *normal, rate = self.gradient(t, x, p)
-        return tuple(_dot(normal, field(t, x, p), rate) for field in (self.below, self.above))
+        """``(L_b, L_a)``."""
+        return self.speed_below(t, x, p), self.speed_above(t, x, p)
 
     def sliding_field(self, t: Any, x: Any, p: Any) -> list[Any]:
         L_b, L_a = self.speeds(t, x, p)
@@ -166,61 +189,54 @@ class _Surface:
             for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
         ]
 
-    # The conditional guards. In the mode below h < 0, so that the smaller of h and another function cannot
-    # be zero before h is, and is zero with h only where the other is positive. Of two equal ones the
-    # comparison takes h and its gradient. The condition is cut off at -band and so does not show before h
-    # itself is above it: the other field need not exist far from its own side. Above is the mirror image.
-    # No orbit arrives with a speed that is zero up to rounding: that one leaves the sliding mode at a fold.
-
-    def crosses_up(self, t: Any, x: Any, p: Any) -> Any:
-        L_b, L_a = self.speeds(t, x, p)
-        return self._conditional(t, x, p, self.switching(t, x, p), L_b, L_a)
+    # The conditions of the crossings of h = 0. Where one is asked far from the surface, the state has entered
+    # the mode of the other side; the other field need not exist there.
 
     def arrives_from_below(self, t: Any, x: Any, p: Any) -> Any:
-        L_b, L_a = self.speeds(t, x, p)
-        condition = np.where(L_a <= 0.0, L_b, -L_a)
-        return self._conditional(t, x, p, self.switching(t, x, p), L_b, condition)
-
-    def crosses_down(self, t: Any, x: Any, p: Any) -> Any:
-        L_b, L_a = self.speeds(t, x, p)
-        return self._conditional(t, x, p, -self.switching(t, x, p), -L_a, -L_b)
+        slides = self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) <= 0.0)
+        return slides & (self._height(t, x, p) <= SLIDING_BAND)
 
     def arrives_from_above(self, t: Any, x: Any, p: Any) -> Any:
-        L_b, L_a = self.speeds(t, x, p)
-        condition = np.where(L_b >= 0.0, -L_a, L_b)
-        return self._conditional(t, x, p, -self.switching(t, x, p), -L_a, condition)
+        slides = self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) >= 0.0)
+        return slides & (self._height(t, x, p) >= -SLIDING_BAND)
 
-    def _conditional(self, t: Any, x: Any, p: Any, h: Any, speed: Any, condition: Any) -> Any:
-        """A function that has the zero of a rising ``h`` if the condition is positive there, else none."""
-        faster = speed - self._hardly_moving(t, x, p)
-        both = np.where(faster <= condition, faster, condition)
-        band = NEAR * self._size(t, x, p)
-        cut = np.where(both >= -band, both, -band)
-        return np.where((h <= -band) | (h <= cut), h, cut)
+    def crosses_up(self, t: Any, x: Any, p: Any) -> Any:
+        crosses = self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) > 0.0)
+        return self.is_above(t, x, p) | crosses
 
-    def above_tangent(self, t: Any, x: Any, p: Any) -> Any:
-        return np.where(self._slides(t, x, p), self.speeds(t, x, p)[1], -1.0)
+    def crosses_down(self, t: Any, x: Any, p: Any) -> Any:
+        crosses = self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) < 0.0)
+        return self.is_below(t, x, p) | crosses
 
-    def below_tangent(self, t: Any, x: Any, p: Any) -> Any:
-        return np.where(self._slides(t, x, p), self.speeds(t, x, p)[0], 1.0)
+    def _goes_on(self, t: Any, x: Any, p: Any, side: float) -> Any:
+        """Whether an orbit that reaches the surface rising (side +1) or falling (-1) does more than touch it.
+
+        One that leaves the sliding mode at a fold starts on the surface, with a speed that is zero up to
+        rounding and an acceleration back to where it belongs: it has arrived nowhere.
+        """
+        rates = (self.speed_below, self.turn_below) if side > 0 else (self.speed_above, self.turn_above)
+        speed, turn = (rate(t, x, p) for rate in rates)
+        depth = TOUCH * self._size(t, x, p)
+        return (side * turn >= 0.0) | (speed * speed > -2.0 * depth * side * turn)
 
     def attraction(self, t: Any, x: Any, p: Any) -> Any:
         L_b, L_a = self.speeds(t, x, p)
-        return np.where(self._slides(t, x, p), L_b - L_a - self._hardly_moving(t, x, p), 1.0)
+        return L_b - L_a - self._hardly_moving(t, x, p)
 
     def _hardly_moving(self, t: Any, x: Any, p: Any) -> Any:
         """A speed through the surface that is next to none."""
         slope = _total(self.gradient(t, x, p)[:-1])
         return TANGENT * slope * (_total(self.below(t, x, p)) + _total(self.above(t, x, p)))
 
-    def excess_above(self, t: Any, x: Any, p: Any) -> Any:
-        return self.switching(t, x, p) - SLIDING_BAND * self._size(t, x, p)
+    def is_above(self, t: Any, x: Any, p: Any) -> Any:
+        return self._height(t, x, p) > SLIDING_BAND
 
-    def excess_below(self, t: Any, x: Any, p: Any) -> Any:
-        return self.switching(t, x, p) + SLIDING_BAND * self._size(t, x, p)
+    def is_below(self, t: Any, x: Any, p: Any) -> Any:
+        return self._height(t, x, p) < -SLIDING_BAND
 
-    def _slides(self, t: Any, x: Any, p: Any) -> Any:
-        return np.abs(self.switching(t, x, p)) <= 2.0 * SLIDING_BAND * self._size(t, x, p)
+    def _height(self, t: Any, x: Any, p: Any) -> Any:
+        """Distance from the surface relative to the size of the state, with the sign of ``h``."""
+        return self.switching(t, x, p) / self._size(t, x, p)
 
     def _size(self, t: Any, x: Any, p: Any) -> Any:
         """How much ``h`` changes over distances of the size of the state."""
@@ -234,23 +250,14 @@ class _Surface:
         return [value - share * slope for value, slope in zip(x, normal, strict=True)]
 
 
-def _derived_gradient(
-    below: ModelFunction,
-    above: ModelFunction,
-    switching: ModelFunction,
+def _check_traceable(
+    functions: Iterable[tuple[str, ModelFunction, int]],
     state: tuple[str, ...] | int,
     parameters: tuple[str, ...],
-) -> ModelFunction:
-    """``(D_x h, D_t h)`` as a model function, which can be traced in turn; all three are tried first."""
-    # SymPy is slow to import, and importing the library must not wait for it.
-    from sympy.core.parameters import distribute
+) -> None:
+    from hybrid.trace import TraceError, trace
 
-    from hybrid.derivative import symbolic_jacobian
-    from hybrid.printer import IMPORTS, assignments
-    from hybrid.trace import Traced, TraceError, model_symbols, trace
-
-    n = state if isinstance(state, int) else len(state)
-    for what, function, size in (("below", below, n), ("above", above, n), ("switching", switching, 1)):
+    for what, function, size in functions:
         try:
             values = trace(function, state, parameters)
         except TraceError as error:
@@ -261,8 +268,21 @@ def _derived_gradient(
             raise ModelError(f"filippov: {what}: {error}") from error
         if len(values) != size:
             raise ModelError(f"filippov: {what} must return {size} values; it returns {len(values)}.")
-    symbols = model_symbols(n, len(parameters))
-    [row] = symbolic_jacobian(values, symbols.variables)
+
+
+def _derived_gradient(
+    function: ModelFunction, state: tuple[str, ...] | int, parameters: tuple[str, ...]
+) -> ModelFunction:
+    """``(D_x, D_t)`` of a scalar function as a model function, which can be traced in turn."""
+    # SymPy is slow to import, and importing the library must not wait for it.
+    from sympy.core.parameters import distribute
+
+    from hybrid.derivative import symbolic_jacobian
+    from hybrid.printer import IMPORTS, assignments
+    from hybrid.trace import Traced, model_symbols, trace
+
+    symbols = model_symbols(state if isinstance(state, int) else len(state), len(parameters))
+    [row] = symbolic_jacobian(trace(function, state, parameters), symbols.variables)
     statements = assignments([f"out[{i}]" for i in range(len(row))], row)
     namespace: dict[str, Any] = {}
     exec("\n    ".join((f"{IMPORTS}\ndef gradient(t, x, p, out):", *statements)), namespace)
@@ -280,9 +300,19 @@ def _derived_gradient(
     return gradient
 
 
-def _nowhere(t: Any, x: Any, p: Any) -> list[Any]:
-    """Both ways and every mixture of them lead on: no state is the one after this."""
-    return [np.inf for _ in x]
+def _rate(gradient: ModelFunction, field: ModelFunction) -> ModelFunction:
+    """``D_t g + D_x g f``, the rate of a function along a field, as a model function."""
+
+    def rate(t: Any, x: Any, p: Any) -> Any:
+        *normal, own = gradient(t, x, p)
+        return _dot(normal, field(t, x, p), own)
+
+    return rate
+
+
+def _at_entry(t: Any, x: Any, p: Any) -> float:
+    """A guard that lies behind the state from the start: its condition is asked once, at the entry."""
+    return 1.0
 
 
 def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:

@@ -22,11 +22,12 @@ LIMIT = 1
 IMPULSE = 2
 # No limit is taken before this many jumps, so that the visible ones are there to be seen.
 FEWEST_JUMPS = 16
+# Unless a flight is no higher than this times rounding: what rounding does to its duration goes like the
+# reciprocal of its speed, and would spoil the limit.
+SHALLOW = 1e6
 # Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
 SHORT = 1e-5
 LONG = 1.0
-# Relative difference of mean and limit fields that the limit's own error may be blamed for.
-NEGLIGIBLE = 1e-4
 # Largest relative change of the limit that rounding may be blamed for.
 ROUGH = 1e-6
 EPSILON = 2.220446049250313e-16
@@ -49,21 +50,57 @@ def remaining_chatter(model, run, transition, speed, work):
 
 
 @njit(**KERNEL)
-def extrapolate(model, method, run, ratio, shift, span, work):
-    """Limit of the state as a geometric series, into ``work.settled (n,)``, and how far to trust it.
+def mean_field(model, run, transition, t, x, out, work):
+    """Field of a chatter averaged over its flights, ``f - a p`` into ``out (n,)``; returns ``a``.
 
-    Returns the largest ratio to the tolerances of what the next extrapolations will still change, judged from
-    the last change: of the limit time that is ``shift``.
+    ``a`` is the guard's acceleration and ``p`` the impulse per unit of the guard's speed: the impulses give
+    back the speed that the pull takes.
     """
-    tail = ratio / (1.0 - ratio)
+    mode = run.count[MODE]
+    model.flow(mode, t, x, model.parameters, work.field)
+    guard_speed(model, transition, t, x, work.field, work.gradient)
+    acceleration = guard_acceleration(model, transition, mode, t, x, work)
+    for i in range(model.dimension):
+        out[i] = work.field[i] - acceleration * run.trail[IMPULSE, i]
+    return acceleration
+
+
+@njit(**KERNEL)
+def follow_mean(model, run, transition, speed, span, work):
+    """Limit of the state into ``work.settled (n,)``: its speed taken out, then along the mean field until it.
+
+    ``speed`` is the guard's, with its sign. The error is of third order in it where pull and impulse are
+    constant, and one step of the classical Runge-Kutta method follows the mean field.
+    """
+    n, t = model.dimension, run.clock[PHASE]
+    start, place, slope = work.trial, work.error, work.new
+    for i in range(n):
+        start[i] = run.y[i] - speed * run.trail[IMPULSE, i]
+        work.settled[i], slope[i] = start[i], 0.0
+    for stage in range(4):
+        part = 0.5 * span * ((stage + 1) // 2)
+        weight = span / (6.0 if stage in (0, 3) else 3.0)
+        for i in range(n):
+            place[i] = start[i] + part * slope[i]
+        mean_field(model, run, transition, t + part, place, slope, work)
+        for i in range(n):
+            work.settled[i] += weight * slope[i]
+
+
+@njit(**KERNEL)
+def change_of_limit(model, method, run, ratio, shift, span, work):
+    """What later jumps will still change of the limit in ``work.settled``, in units of the tolerances.
+
+    Judged from the change since the jump before, of the limit time by ``shift``, and from its order, the
+    second in the speed.
+    """
     gain = ratio * ratio / (1.0 - ratio * ratio)
     misfit = gain * abs(shift) / (method.rtol * span + 8.0 * EPSILON * abs(run.clock[PHASE]))
     for i in range(model.dimension):
-        limit = run.y[i] + tail * (run.y[i] - run.trail[BEFORE, i])
+        limit = work.settled[i]
         scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
         misfit = max(misfit, gain * abs(limit - run.trail[LIMIT, i]) / scale)
         run.trail[LIMIT, i] = limit
-        work.settled[i] = limit
     return misfit
 
 
@@ -71,15 +108,16 @@ def extrapolate(model, method, run, ratio, shift, span, work):
 def accumulation(model, method, run, transition, since_last, work):
     """Follow the jumps of one transition; once their limit is known, return the time to it, else 0.
 
-    To be called right after a jump, ``since_last`` after the one before. Components and limit time are
-    extrapolated as geometric series, with an error of second order in the remaining speed; two successive
-    extrapolations tell how large it is. (They could take it away too, but would amplify rounding.) The limit
-    state goes to ``work.settled``.
+    To be called right after a jump, ``since_last`` after the one before. The state is followed along the mean
+    field for the time that is left, whose error is of second order in the remaining speed; two successive
+    limits tell how large it is. (They could take it away too, but would amplify rounding.) The limit state
+    goes to ``work.settled``.
     """
     n = model.dimension
     model.flow(run.count[MODE], run.clock[PHASE], run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
-    speed *= -model.direction[transition]
+    side = -model.direction[transition]
+    speed *= side
     consecutive = run.count[CHATTER_JUMPS] + 1 == run.count[JUMPS] and run.count[CHATTERING] > 0
     span, found = 0.0, False
     if consecutive:
@@ -88,20 +126,22 @@ def accumulation(model, method, run, transition, since_last, work):
         ratio = run.clock[RESTITUTION]
         # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
         height = 0.25 * speed * span * (1.0 - ratio)
-        drowned = height <= rounding_band(model, run, run.clock[PHASE], work.gradient)
-        misfit = extrapolate(model, method, run, ratio, span - (run.trail[LIMIT, n] - since_last), span, work)
+        band = rounding_band(model, run, run.clock[PHASE], work.gradient)
+        drowned = height <= band
+        shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
+        follow_mean(model, run, transition, side * speed, span, work)
+        shift = span - (run.trail[LIMIT, n] - since_last)
+        misfit = change_of_limit(model, method, run, ratio, shift, span, work)
         # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
         # takes over.
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
-        found = drowned or (run.count[CHATTERING] >= FEWEST_JUMPS and (misfit <= 1.0 or floor))
+        found = drowned or (shallow and (misfit <= 1.0 or floor))
         run.trail[IMPULSE, n] = misfit
         run.trail[LIMIT, n] = span
         run.count[CHATTERING] += 1
     else:
         run.count[CHATTERING] = 1
         run.trail[LIMIT, n], run.trail[IMPULSE, n] = math.inf, math.inf
-    for i in range(n):
-        run.trail[BEFORE, i] = run.y[i]
     run.trail[BEFORE, n] = speed
     run.count[CHATTER_JUMPS] = run.count[JUMPS]
     return span if found else 0.0
@@ -114,7 +154,10 @@ def remember_impulse(model, run, transition, transversality, work):
     after = guard_speed(model, transition, run.clock[PHASE], work.new, work.field_after, work.gradient)
     run.clock[RESTITUTION] = -after / transversality
     for i in range(n):
-        run.trail[IMPULSE, i] = (work.new[i] - run.y[i]) / (after - transversality)
+        change = work.new[i] - run.y[i]
+        # A reset that puts the state back on the guard only takes away the rounding of the landing.
+        rounding = abs(change) <= 16.0 * EPSILON * run.scale[i]
+        run.trail[IMPULSE, i] = 0.0 if rounding else change / (after - transversality)
 
 
 @njit(**KERNEL)
@@ -175,29 +218,32 @@ def chatter_matrix(model, run, transition, work):
 
 
 @njit(**KERNEL)
-def add_change_of_duration(model, run, target, span, work):
+def add_change_of_duration(model, method, run, target, span, work):
     """Add to ``work.saltation`` what a change of the chatter's duration does.
 
-    A state that chatters longer drifts longer with the mean field of the chatter, ``f + a p`` with the pull
-    ``a`` and the impulse ``p``, and shorter with that of the limit mode; where the two agree nothing is
-    added. The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the
-    height through its energy. To be called after ``chatter_matrix``, whose slope and gradient it uses.
+    A state that chatters longer drifts longer with the mean field of the chatter, and shorter with that of
+    the limit mode; where the two agree, up to what the error of the limit makes of them, nothing is added.
+    The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the height
+    through its energy. To be called after ``chatter_matrix``, whose slope and gradient it uses.
     """
-    n, mode, transition = model.dimension, run.count[MODE], run.count[LAST_FIRED]
+    n, transition = model.dimension, run.count[LAST_FIRED]
     ratio, speed = run.clock[RESTITUTION], run.trail[BEFORE, n]
     limit, side = run.clock[PHASE] + span, -model.direction[transition]
-    model.flow(mode, limit, work.settled, model.parameters, work.field)
-    guard_speed(model, transition, limit, work.settled, work.field, work.gradient)
-    pull = -side * guard_acceleration(model, transition, mode, limit, work.settled, work)
+    mean = work.trial
+    pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
     model.flow(target, limit, work.settled, model.parameters, work.field_after)
+    model.flow_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
     by_speed = 2.0 * side / (pull * (1.0 - ratio))
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
-    largest = 0.0
     for i in range(n):
-        largest = max(largest, abs(work.field[i]), abs(work.field_after[i]))
-    for i in range(n):
-        excess = work.field[i] + side * pull * run.trail[IMPULSE, i] - work.field_after[i]
-        if abs(excess) > NEGLIGIBLE * largest:
+        excess = mean[i] - work.field_after[i]
+        # Rounding of the fields and of the impulse, a quotient by the speed, and the error of the limit.
+        blurred = abs(work.field[i]) + abs(work.field_after[i]) + pull * run.scale[i] / speed
+        blurred *= 16.0 * EPSILON
+        for j in range(n):
+            steepness = abs(work.jacobian[i, j]) + abs(work.reset_jacobian[i, j])
+            blurred += steepness * (method.atol + method.rtol * run.scale[j])
+        if abs(excess) > blurred:
             for j in range(n):
                 work.saltation[i, j] += excess * (by_speed * work.error[j] + by_height * work.gradient[j])
 

@@ -13,8 +13,17 @@ from hybrid.kernels.codes import (
     PREVIOUS_MODE,
     SIMULTANEOUS,
 )
-from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, sides_at_point
-from hybrid.kernels.layout import KERNEL, MODEL, PART, RUN, WORK
+from hybrid.kernels.guards import (
+    allowed,
+    guard_acceleration,
+    guard_speed,
+    guard_value,
+    keep_grazing,
+    rounding_band,
+    sides_at_point,
+    speed_rounding,
+)
+from hybrid.kernels.layout import KERNEL, MODEL, PART, RECORD, RUN, WORK
 
 MOST_JUMPS = 50
 # States that differ by less than this, relative to their sizes, came out the same.
@@ -78,15 +87,36 @@ def order_matters(model, run, one, other, work):
     return False
 
 
-@njit(int64(MODEL, RUN, int64, WORK), **PART)
-def first_in_order(model, run, fired, work):
-    """Of the transitions due where the run landed, the one listed first; notes whether order matters.
+@njit(**KERNEL)
+def turns_back(model, run, transition, work):
+    """Whether a guard only touches zero here: it moves to where it was, or turns there if it is at rest.
 
-    None if ``fired`` may not fire and no other is due: the run then takes its sides anew at this point, with
-    the crossing behind it.
+    At the bottom of a dip that is no deeper than rounding either end may be found first.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
-    if not allowed(model, fired, t, run.y, work.scalar):
+    model.flow(mode, t, run.y, model.parameters, work.field)
+    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+    direction = model.direction[transition]
+    before = run.side[transition] if direction == 0 else -direction
+    if abs(speed) > speed_rounding(model, run, mode, t, work):
+        return speed * before > 0.0
+    return guard_acceleration(model, transition, mode, t, run.y, work) * before > 0.0
+
+
+@njit(int64(MODEL, RUN, RECORD, int64, WORK), **PART)
+def first_in_order(model, run, record, fired, work):
+    """Of the transitions due where the run landed, the one listed first; notes whether order matters.
+
+    None if ``fired`` may not fire or has only touched, and no other is due: the run then takes its sides anew
+    at this point, with the crossing behind it.
+    """
+    mode, t = run.count[MODE], run.clock[PHASE]
+    fires = allowed(model, fired, t, run.y, work.scalar)
+    if fires and turns_back(model, run, fired, work):
+        fires = False
+        value = guard_value(model, fired, t, run.y, work.scalar)
+        keep_grazing(model, run, record, fired, t, run.y, value, work)
+    if not fires:
         other = companion(model, run, mode, t, run.y, fired, True, work)
         if other == NO_TRANSITION:
             sides_at_point(model, run, work)

@@ -173,4 +173,4 @@ def advance(
             run.count[CYCLE] = stop_cycle
             run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
-            run.count[PENDING] = parts.first_in_order(model, run, fired, work)
+            run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)

@@ -4,11 +4,21 @@ import math
 
 from numba import float64, njit, void
 
-from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, lowest, stays
+from hybrid.kernels.bernstein import (
+    NO_ROOT,
+    divide_by_theta,
+    first_crossing,
+    lowest,
+    stays,
+    value_and_slope,
+)
 from hybrid.kernels.codes import (
+    CYCLE,
     GRAZING_GUARD,
     GRAZING_PLACE,
     GRAZING_VALUE,
+    GRAZINGS,
+    JUMPS,
     MODE,
     NO_TRANSITION,
     PHASE,
@@ -31,6 +41,7 @@ EULER_IS_ENOUGH = 1e-8
 # Newton's steps take half of these at most, halvings of the bracket down to rounding the rest.
 MOST_LANDINGS = 120
 NOT_THERE = -1.0
+EPSILON = 2.220446049250313e-16
 
 
 @njit(**INLINE)
@@ -74,7 +85,7 @@ def rounding_band(model, run, t, gradient):
     size = abs(gradient[n] * t)
     for i in range(n):
         size += abs(gradient[i]) * run.scale[i]
-    return 16 * 2.220446049250313e-16 * size
+    return 16 * EPSILON * size
 
 
 @njit(**KERNEL)
@@ -111,6 +122,20 @@ def sides_at_point(model, run, work):
             run.side[transition] = -direction
 
 
+@njit(**KERNEL)
+def speed_rounding(model, run, mode, t, work):
+    """How far from zero rounding of the state alone can leave the speed of the guard in ``work.gradient``."""
+    n = model.dimension
+    model.flow_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    size = abs(work.gradient[n])
+    for i in range(n):
+        spread = abs(work.field[i])
+        for j in range(n):
+            spread += abs(work.jacobian[i, j]) * run.scale[j]
+        size += abs(work.gradient[i]) * spread
+    return 16 * EPSILON * size
+
+
 @njit(**INLINE)
 def affine_polynomial(model, method, transition, t, h, x, value, work):
     """Bernstein coefficients of an affine guard on the interpolant, exactly; returns their degree."""
@@ -136,12 +161,15 @@ def value_on_interpolant(model, transition, t, h, theta, work):
     degree = work.coefficients.shape[0] - 1
     for i in range(model.dimension):
         work.state[i] = 0.0
-    weight = 1.0
+    # From the nearer end on, each member of the basis is the one before times a ratio of at most the degree.
+    backwards = theta > 0.5
+    distance = 1.0 - theta if backwards else theta
+    basis, ratio = (1.0 - distance) ** degree, distance / (1.0 - distance)
     for j in range(degree + 1):
-        basis = weight * theta**j * (1.0 - theta) ** (degree - j)
+        row = degree - j if backwards else j
         for i in range(model.dimension):
-            work.state[i] += basis * work.coefficients[j, i]
-        weight *= (degree - j) / (j + 1.0)
+            work.state[i] += basis * work.coefficients[row, i]
+        basis *= ratio * (degree - j) / (j + 1.0)
     return guard_value(model, transition, t + theta * h, work.state, work.scalar)
 
 
@@ -164,10 +192,7 @@ def fit_polynomial(model, transition, t, h, start, end, offset, work):
     misfit = 0.0
     for i in range(degree):
         theta = 0.5 * (work.nodes[i] + work.nodes[i + 1])
-        fitted, weight = 0.0, 1.0
-        for j in range(degree + 1):
-            fitted += weight * theta**j * (1.0 - theta) ** (degree - j) * work.polynomial[j]
-            weight *= (degree - j) / (j + 1.0)
+        fitted, _ = value_and_slope(work.polynomial, degree, theta, work.stack[0])
         value = value_on_interpolant(model, transition, t, h, start + (end - start) * theta, work) - offset
         misfit = max(misfit, abs(fitted - value))
         if not math.isfinite(value):
@@ -244,6 +269,16 @@ def composed_crossing(model, method, run, transition, t, h, offset, on_guard, si
     return NO_ROOT, side
 
 
+@njit(**KERNEL)
+def leave_guard(model, run, transition, t, work):
+    """Put a guard on the side it has at the end of the attempted step, ``work.new``, whatever came before."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    if abs(value) > rounding_band(model, run, t, work.gradient):
+        run.side[transition] = 1 if value > 0.0 else -1
+        run.on_guard[transition] = 0
+
+
 @njit(**INLINE)
 def earliest_crossing(model, method, run, t, h, ignored, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
@@ -258,6 +293,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         if transition == ignored:
+            leave_guard(model, run, transition, t + h, work)
             continue
         value = guard_value(model, transition, t, run.y, work.scalar)
         on_guard = run.on_guard[transition]
@@ -367,3 +403,22 @@ def guard_acceleration(model, transition, mode, t, x, work):
     after = guard_speed(model, transition, t + epsilon, work.state, work.field, work.gradient)
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     return total + (after - before) / epsilon
+
+
+@njit(**KERNEL)
+def keep_grazing(model, run, record, transition, t, x, value, work):
+    """Count a touch of a guard at the state ``x (n,)``, and write it into the record if that keeps any."""
+    run.count[GRAZINGS] += 1
+    slot, mode = record.used[2], run.count[MODE]
+    if slot == record.grazing_time.shape[0]:
+        return
+    for i in range(model.dimension):
+        record.grazing_state[slot, i] = x[i]
+    place = record.grazing_state[slot]
+    model.flow(mode, t, place, model.parameters, work.field)
+    guard_speed(model, transition, t, place, work.field, work.gradient)
+    record.grazing_time[slot, 0], record.grazing_time[slot, 1] = t, value
+    record.grazing_time[slot, 2] = guard_acceleration(model, transition, mode, t, place, work)
+    record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
+    record.grazing_place[slot, 2] = run.count[JUMPS]
+    record.used[2] = slot + 1

@@ -26,6 +26,7 @@ from hybrid.kernels.codes import (
     LAST_FIRED,
     LAST_JUMP_CYCLE,
     LAST_JUMP_PHASE,
+    LAST_KIND,
     LAST_TRANSVERSALITY,
     LIMIT_OF_CHATTER,
     LOG_DETERMINANT,
@@ -48,27 +49,12 @@ from hybrid.kernels.guards import (
     guard_value,
     rounding_band,
     sides_at_point,
+    speed_rounding,
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.record import start_record
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
-
-EPSILON = 2.220446049250313e-16
-
-
-@njit(**KERNEL)
-def speed_rounding(model, run, mode, t, work):
-    """How far from zero rounding of the state alone can leave the speed of the guard in ``work.gradient``."""
-    n = model.dimension
-    model.flow_jacobian(mode, t, run.y, model.parameters, work.jacobian)
-    size = abs(work.gradient[n])
-    for i in range(n):
-        spread = abs(work.field[i])
-        for j in range(n):
-            spread += abs(work.jacobian[i, j]) * run.scale[j]
-        size += abs(work.gradient[i]) * spread
-    return 16 * EPSILON * size
 
 
 @njit(**KERNEL)
@@ -217,16 +203,20 @@ def carry_tangents(model, run, tangents, orthonormal, work):
 
 @njit(**KERNEL)
 def is_grazing(model, method, run, transition, transversality, work):
-    """Whether the state dips beyond the guard by less than the tolerances can tell.
+    """Whether the guard dips to the other side of zero by less than the tolerances can tell.
 
-    The depth of the dip, ``speed^2 / (2 acceleration)``, is what the crossing has before it turns back. Its
-    saltation matrix is then an extrapolation of a square root from beside its branch point.
+    The depth of the dip is ``speed^2 / (2 acceleration)``; it lies ahead if the guard turns back, and behind
+    if it comes from there. The saltation matrix is then an extrapolation of a square root from beside its
+    branch point.
     """
     acceleration = guard_acceleration(model, transition, run.count[MODE], run.clock[PHASE], run.y, work)
-    if transversality * acceleration >= 0.0:
-        return False
-    depth = transversality * transversality / (2.0 * abs(acceleration))
-    return depth <= error_band(method, run, work.gradient, model.dimension)
+    band = error_band(method, run, work.gradient, model.dimension)
+    if transversality * transversality <= 2.0 * abs(acceleration) * band:
+        return True
+    # Inside such a dip the steps, and with them the sizes that the tolerances refer to, are those of the dip.
+    way_in = run.clock[LAST_TRANSVERSALITY]
+    grazed = run.count[LAST_KIND] == GRAZING and run.count[LAST_FIRED] == transition
+    return grazed and way_in * transversality < 0.0 and abs(transversality) <= 2.0 * abs(way_in)
 
 
 @njit(**KERNEL)
@@ -263,12 +253,12 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
     mode, target = run.count[MODE], model.target[transition]
     transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
-    run.clock[LAST_TRANSVERSALITY] = transversality
     judge(run, model.dimension, work)
     kind = TRANSVERSE
     if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING
         run.count[ILL_CONDITIONED] += 1
+    run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
     sides_at_point(model, run, work)
     remember_jump(model, run, record, transition, transversality, kind, work.new, work)
     if tangents > 0:
@@ -325,7 +315,7 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     x_limit = work.settled
     remember_flight(run, record, model.dimension, span, x_limit)
     chatter_matrix(model, run, transition, work)
-    add_change_of_duration(model, run, target, span, work)
+    add_change_of_duration(model, method, run, target, span, work)
     if tangents > 0:
         carry_tangents(model, run, tangents, orthonormal, work)
         model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)

@@ -297,7 +297,7 @@ PARTS = types.NamedTuple(
         types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK)),
         types.FunctionType(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK)),
         types.FunctionType(void(MODEL, RUN, int64, int64, boolean, WORK)),
-        types.FunctionType(int64(MODEL, RUN, int64, WORK)),
+        types.FunctionType(int64(MODEL, RUN, RECORD, int64, WORK)),
     ),
     Parts,
 )

@@ -2,8 +2,8 @@
 
 from numba import njit
 
-from hybrid.kernels.codes import CYCLE, GRAZING_GUARD, GRAZING_VALUE, GRAZINGS, JUMPS, MODE
-from hybrid.kernels.guards import allowed, guard_acceleration, guard_speed
+from hybrid.kernels.codes import CYCLE, GRAZING_GUARD, GRAZING_VALUE, JUMPS, MODE
+from hybrid.kernels.guards import allowed, keep_grazing
 from hybrid.kernels.layout import KERNEL
 
 
@@ -31,24 +31,7 @@ def raise_degree(coefficients, degree, highest, columns):
 
 @njit(**KERNEL)
 def remember_grazing(model, run, record, time, work):
-    """Count the grazing found on a step, and write it into the record if that keeps any.
-
-    The state there is in ``work.state``, the rest in the slots of the run that ``note_grazing`` fills.
-    """
-    mode, transition = run.count[MODE], run.count[GRAZING_GUARD]
-    if not allowed(model, transition, time, work.state, work.scalar):
-        return
-    run.count[GRAZINGS] += 1
-    slot = record.used[2]
-    if slot == record.grazing_time.shape[0]:
-        return
-    for i in range(model.dimension):
-        record.grazing_state[slot, i] = work.state[i]
-    place = record.grazing_state[slot]
-    model.flow(mode, time, place, model.parameters, work.field)
-    guard_speed(model, transition, time, place, work.field, work.gradient)
-    record.grazing_time[slot, 0], record.grazing_time[slot, 1] = time, run.clock[GRAZING_VALUE]
-    record.grazing_time[slot, 2] = guard_acceleration(model, transition, mode, time, place, work)
-    record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
-    record.grazing_place[slot, 2] = run.count[JUMPS]
-    record.used[2] = slot + 1
+    """Keep the grazing found on a step, at the state in ``work.state``, if its transition might have fired."""
+    transition = run.count[GRAZING_GUARD]
+    if allowed(model, transition, time, work.state, work.scalar):
+        keep_grazing(model, run, record, transition, time, work.state, run.clock[GRAZING_VALUE], work)

@@ -1,3 +1,4 @@
+import functools
 import math
 import os
 import subprocess
@@ -7,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 
+from hybrid.compile import compile_system
 from hybrid.derivative import sample_points
 from hybrid.emit import emit
 from hybrid.errors import ModelError
@@ -319,3 +321,37 @@ def test_a_guard_asks_for_its_gradient():
     )
     with pytest.raises(ModelError, match=r"Transition 'hit': guard cannot be differentiated.*gradient="):
         emit(system)
+
+
+class TestPlainFunctions:
+    """What cannot be traced is compiled as it is, which takes a plain function."""
+
+    class Field:
+        factor = 2.0
+
+        def method(self, t, x, p):
+            return (-self.factor * x.q if x.q > 0 else x.q,)
+
+        def __call__(self, t, x, p):
+            return self.method(t, x, p)
+
+    @pytest.mark.parametrize(
+        "function", [Field(), Field().method, functools.partial(Field.method, Field())], ids=range(3)
+    )
+    def test_others_say_what_to_do(self, function):
+        system = HybridSystem(state=("q",), modes=[Mode("a", function)])
+        text = (
+            r"Mode 'a': field cannot be traced, and is compiled as it is only if it is a plain function; got"
+        )
+        with pytest.raises(ModelError, match=text):
+            compile_system(system)
+
+    def test_they_may_be_anything_where_they_can_be_traced(self):
+        class Decay:
+            rate = 2.0
+
+            def __call__(self, t, x, p):
+                return (-self.rate * x.q,)
+
+        system = HybridSystem(state=("q",), modes=[Mode("a", Decay())])
+        assert not compile_system(system).emitted.opaque

@@ -325,16 +325,16 @@ class TestTwoFolds:
     def test_visible_both(self):
         """The orbit slides into the two-fold, where it might leave above, below, or not at all."""
         arc = hybrid.simulate(self.VISIBLE, (-0.7, 0.0), (0.0, 5.0))
-        assert arc.status.code == hybrid.StatusCode.NON_FINITE
-        assert events(arc) == ["undecided"]
+        assert arc.status.code == hybrid.StatusCode.TERMINAL
+        assert events(arc) == ["two-fold"]
         assert arc.jumps[0].t == pytest.approx(0.7, abs=1e-8)
         np.testing.assert_allclose(arc.jumps[0].x_minus, [0.0, 0.0], atol=1e-8)
 
     def test_visible_and_invisible(self):
         """Sliding at ``(b - a) / (b + a)``: towards the two-fold if ``b > a``, else away from it."""
         arc = hybrid.simulate(self.MIXED, (-0.7, 0.0), (0.0, 5.0))
-        assert arc.status.code == hybrid.StatusCode.NON_FINITE
-        assert events(arc) == ["undecided"]
+        assert arc.status.code == hybrid.StatusCode.TERMINAL
+        assert events(arc) == ["two-fold"]
         assert arc.jumps[0].t == pytest.approx(2.0, abs=1e-7)
         arc = hybrid.simulate(self.MIXED, (-0.7, 0.0), (0.0, 5.0), parameters={"b": 0.65})
         assert arc.status.ok
@@ -352,21 +352,48 @@ class TestTwoFolds:
         with pytest.raises(hybrid.ArgumentError, match="allowed in more than one mode: below, above"):
             hybrid.simulate(system, (1.0, 0.0), (0.0, 1.0))
 
-    @pytest.mark.parametrize("system", [VISIBLE, MIXED, INVISIBLE])
-    def test_start_at_the_two_fold(self, system):
+    def test_start_at_the_two_fold(self):
         with pytest.raises(hybrid.ArgumentError, match="more than one mode: below, above"):
-            hybrid.simulate(system, (0.0, 0.0), (0.0, 1.0))
+            hybrid.simulate(self.VISIBLE, (0.0, 0.0), (0.0, 1.0))
+        with pytest.raises(hybrid.ArgumentError, match="'sliding' is left through 'two-fold'"):
+            hybrid.simulate(self.INVISIBLE, (0.0, 0.0), (0.0, 1.0))
 
-    def test_sliding_where_both_fields_leave_is_undecided(self):
+    def test_start_at_the_two_fold_with_one_way_out(self):
+        """The field below leads into the surface, that above away from it."""
+        arc = hybrid.simulate(self.MIXED, (0.0, 0.0), (0.0, 1.0))
+        assert arc.mode[0] == "above"
+        np.testing.assert_allclose(arc.x[-1], [1.0, 0.65], atol=1e-12)
+
+    def test_sliding_where_both_fields_leave_ends_the_run(self):
         arc = hybrid.simulate(self.VISIBLE, (1.0, 0.0), (0.0, 1.0), mode="sliding")
-        assert arc.status.code == hybrid.StatusCode.NON_FINITE
-        assert events(arc) == ["undecided"]
+        assert arc.status.code == hybrid.StatusCode.TERMINAL
+        assert events(arc) == ["two-fold"]
 
     @pytest.mark.parametrize(("mode", "sign"), [("below", -2.7), ("above", 1.3)])
     def test_a_named_mode_decides(self, mode, sign):
         arc = hybrid.simulate(self.VISIBLE, (1.0, 0.0), (0.0, 1.0), mode=mode)
         assert not arc.jumps
         np.testing.assert_allclose(arc.x[-1], [2.0, sign * 1.5], atol=1e-10)
+
+    @pytest.mark.parametrize("speed", [1e-3, 1e-6, 1e-9, 1e-12])
+    def test_a_slow_arrival_is_not_lost(self, speed):
+        """Straight on, at an angle that is next to none."""
+        system = planar(lambda t, x, p: (1.0, p.v), lambda t, x, p: (1.0, -1.0), parameters={"v": speed})
+        arc = hybrid.simulate(system, (0.0, -speed), (0.0, 2.0), mode="below")
+        assert events(arc) == ["below->sliding"]
+        assert arc.jumps[0].t == pytest.approx(1.0, abs=1e-3)
+        np.testing.assert_allclose(arc.x[-1], [2.0, 0.0], atol=1e-15)
+
+    @pytest.mark.parametrize("depth", [1e-4, 1e-8, 1e-12])
+    def test_an_arrival_that_would_soon_turn_back(self, depth):
+        """``y = depth - (x - 1)^2`` from below: slides from its first zero to the fold at 1, and leaves."""
+        system = planar(lambda t, x, p: (1.0, -2.0 * (x.x - 1)), lambda t, x, p: (1.0, -1.0))
+        arc = hybrid.simulate(system, (0.0, depth - 1.0), (0.0, 2.0))
+        assert events(arc) == ["below->sliding", "sliding->below"]
+        np.testing.assert_allclose(
+            arc.jumps.t, [1.0 - math.sqrt(depth), 1.0], atol=1e-7 * math.sqrt(depth) + 1e-9
+        )
+        np.testing.assert_allclose(arc.x[-1], [2.0, -1.0], atol=1e-11)
 
     @pytest.mark.parametrize("apart", [1e-3, 1e-6, -1e-6, -1e-3])
     def test_the_nearer_fold_decides(self, apart):
@@ -397,13 +424,11 @@ class TestModel:
             "below->above",
             "above->sliding",
             "above->below",
-            "undecided",
-            "sliding->above",
-            "sliding->below",
             "sliding too high",
             "sliding too low",
-            "below too high",
-            "above too low",
+            "two-fold",
+            "sliding->above",
+            "sliding->below",
         )
 
     def test_sliding_field_keeps_the_surface(self):

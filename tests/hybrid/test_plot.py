@@ -99,3 +99,14 @@ def test_graph_shows_loops_at_many_modes():
     axes.get_figure().canvas.draw()
     assert {"a", "d", "a->b ↑", "mark 0 ↕", "mark 1 ↕"} <= texts(axes)
     assert len(axes.patches) == 2
+
+
+def test_graph_shows_the_end_of_a_run():
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode("fall", lambda t, x, p: (-1.0,))],
+        transitions=[Transition("fall", None, Guard(lambda t, x, p: x.q, -1), name="ground")],
+    )
+    axes = plot_graph(system)
+    axes.get_figure().canvas.draw()
+    assert {"fall", "ground ↓"} <= texts(axes)
