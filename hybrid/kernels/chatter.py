@@ -14,7 +14,7 @@ from hybrid.kernels.codes import (
     RESTITUTION,
 )
 from hybrid.kernels.guards import guard_acceleration, guard_speed, rounding_band
-from hybrid.kernels.layout import KERNEL
+from hybrid.kernels.layout import EPSILON, KERNEL
 
 # Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
 BEFORE = 0
@@ -30,7 +30,6 @@ SHORT = 1e-5
 LONG = 1.0
 # Largest relative change of the limit that rounding may be blamed for.
 ROUGH = 1e-6
-EPSILON = 2.220446049250313e-16
 
 
 @njit(**KERNEL)

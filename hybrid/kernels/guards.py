@@ -23,7 +23,7 @@ from hybrid.kernels.codes import (
     NO_TRANSITION,
     PHASE,
 )
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, MODEL, VECTOR
+from hybrid.kernels.layout import ENTRY, EPSILON, INLINE, KERNEL, MODEL, VECTOR
 from hybrid.kernels.step import attempt_again
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
@@ -41,7 +41,6 @@ EULER_IS_ENOUGH = 1e-8
 # Newton's steps take half of these at most, halvings of the bracket down to rounding the rest.
 MOST_LANDINGS = 120
 NOT_THERE = -1.0
-EPSILON = 2.220446049250313e-16
 
 
 @njit(**INLINE)

@@ -52,7 +52,7 @@ from hybrid.kernels.guards import (
     speed_rounding,
     widen_scale,
 )
-from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, EPSILON, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.record import start_record
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
 

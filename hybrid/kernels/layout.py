@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import boolean, float64, int64, types, void
 
+EPSILON = 2.220446049250313e-16
+
 VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
 CUBE = float64[:, :, ::1]

@@ -31,7 +31,7 @@ def raise_degree(coefficients, degree, highest, columns):
 
 @njit(**KERNEL)
 def remember_grazing(model, run, record, time, work):
-    """Keep the grazing found on a step, at the state in ``work.state``, if its transition might have fired."""
+    """Keep the grazing found on a step, at ``work.state``, if its transition might have fired there."""
     transition = run.count[GRAZING_GUARD]
     if allowed(model, transition, time, work.state, work.scalar):
         keep_grazing(model, run, record, transition, time, work.state, run.clock[GRAZING_VALUE], work)

@@ -24,7 +24,7 @@ from hybrid.kernels.codes import (
     STEPS,
 )
 from hybrid.kernels.guards import NOT_THERE, earliest_crossing, land, value_on_interpolant
-from hybrid.kernels.layout import ATTEMPTS, INLINE, KERNEL, METHOD, MODEL, PART, RECORD, RUN, WORK
+from hybrid.kernels.layout import ATTEMPTS, EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RECORD, RUN, WORK
 from hybrid.kernels.record import raise_degree, remember_grazing, start_record
 from hybrid.kernels.step import (
     attempt,
@@ -41,7 +41,6 @@ GROW = 6.0
 # An event resets the pace: a flight that is a polynomial has no error to hold its steps back, and one step
 # across many bounces, each much shorter than it, would drown them in its rounding.
 LONGEST_AFTER_EVENT = 100.0
-EPSILON = 2.220446049250313e-16
 
 
 @njit(**INLINE)

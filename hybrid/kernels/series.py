@@ -26,10 +26,9 @@ from hybrid.kernels.codes import (
     STEPS,
 )
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
-from hybrid.kernels.layout import INLINE, KERNEL
+from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.record import remember_grazing, start_record
 
-EPSILON = 2.220446049250313e-16
 # Series that can be trusted to the last digit are taken to this order, and cut off below rounding.
 EXACT_ORDER = 28
 EXACT_TOLERANCE = 1e-17
