@@ -121,7 +121,7 @@ def picture(elastic: ModelComparison, damped: ModelComparison) -> None:
 def main() -> None:
     heading(
         "The founding system with every law of contact, omega from 7 to 8 rad/s, four tangent vectors,\n"
-        f"rtol = {SOLVER.rtol:.0e}. Distance: the largest difference of an exponent from the reference's, in 1/s."
+        f"rtol = {SOLVER.rtol:.0e}. Distance: largest difference of an exponent from the last law's, in 1/s."
     )
     columns = [
         "law",
