@@ -70,21 +70,20 @@ def rattler_picture(system: HybridSystem) -> None:
     strobe.set_xlabel("position q")
     strobe.tick_params(labelleft=False)
     strobe.spines[["top", "right"]].set_visible(False)
-    save(figure, "rattler")
+    save(figure, HERE / "rattler.png")
 
 
 def graph_picture(system: HybridSystem) -> None:
     figure, axes = plt.subplots(figsize=(5.6, 2.3), layout="constrained")
     plot_graph(system, ax=axes)
-    save(figure, "graph")
+    save(figure, HERE / "graph.png")
 
 
-def save(figure: Any, name: str) -> None:
-    path = HERE / f"{name}.png"
+def save(figure: Any, path: Path) -> None:
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
     quantise(path)
-    print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1024:.0f} kB")
+    print(f"{path}: {path.stat().st_size / 1024:.0f} kB")
 
 
 def quantise(path: Path) -> None:

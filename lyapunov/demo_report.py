@@ -15,6 +15,7 @@ from lyapunov.demo_study import STARTS, Regime
 from lyapunov.demo_tangents import TRAP_OMEGA, Explanation, Trap
 from lyapunov.floquet import floquet_exponents
 from lyapunov.statistics import running_tapered_mean
+from lyapunov.text import table
 
 # An explanation is worth the name if it leaves at most this part of the disagreement.
 EXPLAINS = 0.5
@@ -167,17 +168,6 @@ def number(value: float | None) -> str:
     if value is None or math.isnan(value):
         return ""
     return f"{value:.2e}" if 0 < abs(value) < 1e-3 else f"{value:.4f}" if abs(value) < 1 else f"{value:.2f}"
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Columns of text, the first to the left, the others to the right."""
-    cells = [list(headings), *map(list, rows)]
-    widths = [max(len(row[column]) for row in cells) for column in range(len(headings))]
-    lines = []
-    for row in cells:
-        first, rest = row[0].ljust(widths[0]), [c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True)]
-        lines.append("  ".join([first, *rest]).rstrip())
-    return "\n".join(lines)
 
 
 def write_histories(folder: Path, regime: Regime) -> None:

@@ -48,8 +48,8 @@ class LyapunovSpectrum:
         ``(intervals, k)``: growth rate of each direction over each interval; empty with ``history=False``.
     interval, intervals
         Length of an interval in units of time, and how many were completed.
-    jumps_per_interval
-        Mean number of jumps an interval.
+    jumps_per_interval, steps_per_interval
+        Mean numbers of jumps and of the solver's steps, rejected ones too, an interval.
     mode, x
         Where the orbit ended: name of the mode, state ``(n,)``.
     status
@@ -63,6 +63,7 @@ class LyapunovSpectrum:
     interval: float
     intervals: int
     jumps_per_interval: float
+    steps_per_interval: float
     mode: str
     x: np.ndarray
     status: Status
@@ -192,7 +193,7 @@ class _Estimate:
         if transient:
             _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
         mean, batches = TaperedMean(k + 1), new_batches(k + 1)
-        jumps = trajectory.jumps
+        jumps, steps = trajectory.jumps, int(trajectory.run.count[codes.STEPS])
         self.grazed_growth = trajectory.run.clock[codes.ILL_CONDITIONED_GROWTH]
         growths = np.empty((0, k))
         if code == codes.DONE:
@@ -207,6 +208,7 @@ class _Estimate:
             interval=self.interval,
             intervals=mean.count,
             jumps_per_interval=(trajectory.jumps - jumps) / max(mean.count, 1),
+            steps_per_interval=(int(trajectory.run.count[codes.STEPS]) - steps) / max(mean.count, 1),
             mode=trajectory.mode,
             x=trajectory.x,
             status=self._status(code, max(mean.count, 1)),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import HybridSystem
+from models.contact import Bodies, ContactLaw, Hertz, after_collision
 
 
-def vibroimpact() -> HybridSystem:
-    r"""Two-body vibro-impact system with Hertz contact, driven at the main body.
+def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
+    r"""Two-body vibro-impact system, driven at the main body, with Hertz contact or another law.
 
     .. math::
 
@@ -17,6 +18,12 @@ def vibroimpact() -> HybridSystem:
         \ddot x_2 &= -2 \xi_2 \omega_2 (\dot x_2 - \dot x_1) - \omega_2^2 (x_2 - x_1 - D) + F_{con} / m_2 \\
         F &= P \cos(\omega t + \varphi_0), \quad \chi = m_2 / m_1, \quad
         F_{con} = K \max(x_1 - x_2, 0)^{3/2}
+
+    Parameters
+    ----------
+    contact
+        A law of :mod:`models.contact`, which replaces :math:`F_{con}`, its parameters and its modes;
+        by default ``Hertz(hertz_stiffness())``, the founding model.
 
     Returns
     -------
@@ -53,6 +60,8 @@ def vibroimpact() -> HybridSystem:
     V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
     nonsmooth discontinuous vibroimpact system", 2017.
     """
+    contact = contact or Hertz(hertz_stiffness())
+    bodies = Bodies(_field, lambda t, x, p: x.x1 - x.x2, lambda t, x, p: x.v1 - x.v2, _collided)
     return HybridSystem(
         name="vibro-impact",
         state=("x1", "x2", "v1", "v2"),
@@ -60,13 +69,10 @@ def vibroimpact() -> HybridSystem:
             "m1": 1000.0, "omega1": 6.283, "xi1": 0.036,
             "m2": 100.0, "omega2": 5.646, "xi2": 0.036,
             "P": 500.0, "phi0": 0.0, "omega": 7.40,
-            "D": 0.05, "K": hertz_stiffness(),
+            "D": 0.05, **contact.parameters,
         },
-        modes=[Mode("free", _free), Mode("contact", _contact)],
-        transitions=[
-            Transition("free", "contact", Guard(lambda t, x, p: x.x1 - x.x2, direction=+1), name="impact"),
-            Transition("contact", "free", Guard(lambda t, x, p: x.x1 - x.x2, direction=-1), name="release"),
-        ],
+        modes=contact.modes(bodies),
+        transitions=contact.transitions(bodies),
         period=lambda p: 2 * np.pi / p.omega,
     )  # fmt: skip
 
@@ -87,17 +93,13 @@ def hertz_stiffness(
     return float(4 / 3 * q / ((d1 + d2) * np.sqrt(A + B)))
 
 
-def _free(t, x, p):
-    return _accelerated(t, x, p, 0.0)
-
-
-def _contact(t, x, p):
-    return _accelerated(t, x, p, p.K * np.maximum(x.x1 - x.x2, 0.0) ** 1.5)
-
-
-def _accelerated(t, x, p, Fcon):
+def _field(t, x, p, Fcon):
     chi = p.m2 / p.m1
     F = p.P * np.cos(p.omega * t + p.phi0)
     main = -2 * p.xi1 * p.omega1 * x.v1 - p.omega1**2 * x.x1
     coupling = 2 * p.xi2 * p.omega2 * (x.v1 - x.v2) + p.omega2**2 * (x.x1 - x.x2 + p.D)
     return x.v1, x.v2, main - chi * coupling + (F - Fcon) / p.m1, coupling + Fcon / p.m2
+
+
+def _collided(t, x, p, e):
+    return (x.x1, x.x1, *after_collision(p.m1, p.m2, x.v1, x.v2, e))

@@ -1,0 +1,213 @@
+"""No more model than the scene needs: models of the same thing, by their exponents and by what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import ArgumentError, HybridSystem, Status
+from hybrid.errors import unknown_name
+from hybrid.progress import progress_bar
+from hybrid.solvers import RungeKutta
+from hybrid.status import SUCCESS
+from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
+from lyapunov.text import table
+
+
+@attrs.frozen(eq=False, repr=False)
+class ModelComparison:
+    """Spectra of several models at the same parameters; ``print`` shows them as a table.
+
+    Attributes
+    ----------
+    spectra
+        Name of a model to its spectra, one at each of ``points``.
+    reference
+        Name of the model that the others are held against.
+    points
+        Parameter values, by name.
+    """
+
+    spectra: Mapping[str, tuple[LyapunovSpectrum, ...]]
+    reference: str
+    points: tuple[Mapping[str, float], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the models, the cheapest first."""
+        return tuple(sorted(self.spectra, key=self.cost))
+
+    @property
+    def status(self) -> Status:
+        """Of the first run that did not succeed, or SUCCESS."""
+        runs = (spectrum.status for spectra in self.spectra.values() for spectrum in spectra)
+        return next((status for status in runs if not status.ok), SUCCESS)
+
+    def cost(self, name: str) -> float:
+        """Mean number of the solver's steps an interval, rejected ones too, over all points."""
+        return float(np.mean([spectrum.steps_per_interval for spectrum in self._of(name)]))
+
+    def distance(self, name: str) -> np.ndarray:
+        """Largest difference of an exponent from the reference's at each point, ``(points,)``.
+
+        The exponents are compared largest first; nan where a run of either model did not succeed.
+        """
+        pairs = zip(self._of(name), self._of(self.reference), strict=True)
+        return np.array([_distance(spectrum, reference) for spectrum, reference in pairs])
+
+    def within(self, tolerance: float) -> tuple[str, ...]:
+        """Names of the models within ``tolerance`` of the reference at every point, the cheapest first."""
+        if not tolerance >= 0:
+            raise ArgumentError(f"tolerance must be at least 0, in inverse units of time; got {tolerance!r}.")
+        return tuple(
+            name
+            for name in self.names
+            if name == self.reference or bool(np.all(self.distance(name) <= tolerance))
+        )
+
+    def cheapest(self, tolerance: float) -> str:
+        """Name of the cheapest model within ``tolerance`` of the exponents of the reference at every point.
+
+        Parameters
+        ----------
+        tolerance
+            In inverse units of time. The reference itself is within any.
+
+        Raises
+        ------
+        ArgumentError
+            If the tolerance is negative.
+        """
+        return self.within(tolerance)[0]
+
+    def _of(self, name: str) -> tuple[LyapunovSpectrum, ...]:
+        if name not in self.spectra:
+            raise ArgumentError(unknown_name("Model", name, self.spectra, "Models"))
+        return self.spectra[name]
+
+    def __repr__(self) -> str:
+        return f"<ModelComparison of {', '.join(self.names)} at {len(self.points)} points>"
+
+    def __str__(self) -> str:
+        rows = []
+        for name in self.names:
+            spectra, distance = self._of(name), self.distance(name)
+            good = distance[np.isfinite(distance)]
+            rows.append(
+                [
+                    name,
+                    f"{self.cost(name):.1f}",
+                    f"{np.mean([spectrum.jumps_per_interval for spectrum in spectra]):.2f}",
+                    *(("0", "0") if name == self.reference else _figures(good)),
+                    f"{sum(not spectrum.status.ok for spectrum in spectra)}",
+                ]
+            )
+        headings = ["model", "steps", "jumps", "median distance", "largest distance", "failed"]
+        return table(headings, rows)
+
+
+def compare_models(
+    systems: Mapping[str, HybridSystem],
+    x0: ArrayLike,
+    *,
+    reference: str,
+    points: Sequence[Mapping[str, float]] = ({},),
+    mode: str | None = None,
+    k: int | None = None,
+    intervals: int = 300,
+    interval: float | None = None,
+    transient: int = 200,
+    solver: RungeKutta | None = None,
+    progress: bool = False,
+) -> ModelComparison:
+    """Exponents and cost of several models of the same thing, over a range of parameters.
+
+    Which of them is the cheapest that is as good as the best one, :meth:`ModelComparison.cheapest` answers.
+    All start at the same state at every point, so that where attractors coexist two models may end on
+    different ones: a distance, too.
+
+    Parameters
+    ----------
+    systems
+        Name to model. They have the same states, and the parameters that ``points`` name.
+    x0, mode, k, intervals, interval, transient, solver
+        As for :func:`lyapunov_spectrum`.
+    reference
+        Name of the model to hold the others against.
+    points
+        Parameter values to compare at, each a mapping as ``parameters`` of :func:`lyapunov_spectrum`; by
+        default the models' own.
+    progress
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    ModelComparison
+
+    Raises
+    ------
+    ModelError
+        If a model cannot be compiled or lacks the mode ``mode``.
+    ArgumentError
+        If the reference is no model of ``systems``, the states differ, or an argument does not fit.
+
+    Examples
+    --------
+    >>> import models
+    >>> from models.contact import Hertz, Rigid
+    >>> from models.vibroimpact import hertz_stiffness
+    >>> laws = {"rigid": Rigid(e=1.0), "Hertz": Hertz(hertz_stiffness())}
+    >>> found = compare_models(
+    ...     {name: models.vibroimpact(law) for name, law in laws.items()},
+    ...     (-0.00765806, -0.00411675, 0.05565196, -0.35621583),
+    ...     reference="Hertz",
+    ...     points=[{"omega": 7.39}, {"omega": 7.40}],
+    ...     intervals=50,
+    ... )
+    >>> found.cheapest(tolerance=0.02), found.cheapest(tolerance=1e-3)
+    ('rigid', 'Hertz')
+    """
+    if reference not in systems:
+        raise ArgumentError(unknown_name("Reference model", reference, systems, "Models"))
+    if not points:
+        raise ArgumentError("points must hold at least one mapping of parameter values; got none.")
+    if len({system.state for system in systems.values()}) > 1:
+        states = ", ".join(f"{system.state} in {name!r}" for name, system in systems.items())
+        raise ArgumentError(f"The models must have the same states; got {states}.")
+    spectra: dict[str, tuple[LyapunovSpectrum, ...]] = {}
+    with progress_bar(len(systems) * len(points), "Spectra", progress) as bar:
+        for name, system in systems.items():
+            found = []
+            for parameters in points:
+                found.append(
+                    lyapunov_spectrum(
+                        system,
+                        x0,
+                        mode=mode,
+                        parameters=parameters,
+                        k=k,
+                        intervals=intervals,
+                        interval=interval,
+                        transient=transient,
+                        solver=solver,
+                        history=False,
+                    )
+                )
+                bar.update(1)
+            spectra[name] = tuple(found)
+    return ModelComparison(spectra, reference, tuple(dict(point) for point in points))
+
+
+def _distance(spectrum: LyapunovSpectrum, reference: LyapunovSpectrum) -> float:
+    if not (spectrum.status.ok and reference.status.ok):
+        return float("nan")
+    mine, theirs = np.sort(spectrum.exponents), np.sort(reference.exponents)
+    # Two directions that are both annihilated do not differ.
+    return float(np.max(np.abs(np.subtract(mine, theirs, where=mine != theirs, out=np.zeros(len(mine))))))
+
+
+def _figures(distance: np.ndarray) -> tuple[str, str]:
+    return (f"{np.median(distance):.1e}", f"{distance.max():.1e}") if len(distance) else ("-", "-")

@@ -1,0 +1,371 @@
+r"""Laws of contact between two bodies, from rigid to Hunt and Crossley's, and how to match one to another.
+
+With the penetration :math:`\delta`, its rate :math:`\dot\delta` and the reduced mass
+:math:`m = m_1 m_2 / (m_1 + m_2)` an impact by itself is :math:`m \ddot\delta = -F`, from
+:math:`\delta = 0, \dot\delta = v` until the bodies part at :math:`\dot\delta = -e\, v`; :math:`e` is the
+coefficient of restitution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from math import cos, cosh, exp, expm1, gamma, log1p, pi, sin, sinh, sqrt, tan, tanh
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from hybrid import ArgumentError, Guard, Mode, Reset, Transition
+
+# Restitution of a Kelvin-Voigt contact with critical damping; below it the damping is above critical.
+CRITICAL_RESTITUTION = exp(-2)
+# Between them the restitution takes every value there is, in floating point.
+LEAST_ANGLE, LARGEST_ANGLE = 1e-8, 350.0
+
+
+class Bodies(NamedTuple):
+    """What a law of contact needs to know of the two bodies.
+
+    Attributes
+    ----------
+    field
+        ``(t, x, p, force)``: the time derivative of the state under a force that pushes them apart.
+    penetration, rate
+        ``(t, x, p)``: how far they overlap, and how fast they approach.
+    collided
+        ``(t, x, p, e)``: the state after a collision by Newton's law.
+    """
+
+    field: Callable[..., Any]
+    penetration: Callable[..., Any]
+    rate: Callable[..., Any]
+    collided: Callable[..., Any]
+
+
+class ContactLaw(Protocol):
+    """A law of contact: run-time parameters, and the part of the graph that it makes of two bodies.
+
+    The bodies are apart in the mode ``free``, and meet in the transition ``impact``.
+    """
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Default values by name."""
+        ...
+
+    def modes(self, bodies: Bodies) -> list[Mode]:
+        """The mode ``free`` and those in which the bodies touch."""
+        ...
+
+    def transitions(self, bodies: Bodies) -> list[Transition]:
+        """The transition ``impact`` and those that lead back to ``free``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rigid:
+    r"""Rigid contact, with Newton's law of restitution: :math:`\dot\delta \mapsto -e\, \dot\delta`.
+
+    One mode, ``free``, and one transition, ``impact``. Impacts that accumulate end the run with the status
+    ACCUMULATION: there is no mode in which the bodies stay together.
+
+    Parameters
+    ----------
+    e
+        Coefficient of restitution.
+    """
+
+    e: float = 1.0
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``e``."""
+        return asdict(self)
+
+    def modes(self, bodies: Bodies) -> list[Mode]:
+        """``free``."""
+        return [_free(bodies)]
+
+    def transitions(self, bodies: Bodies) -> list[Transition]:
+        """``impact``."""
+        collision = Reset(lambda t, x, p: bodies.collided(t, x, p, p.e))
+        return [Transition("free", "free", Guard(bodies.penetration, +1), collision, name="impact")]
+
+
+@dataclass(frozen=True)
+class Hertz:
+    r"""Elastic contact of smooth bodies: :math:`F = K\, \delta^{3/2}`.
+
+    Modes ``free`` and ``contact``, in contact while :math:`\delta \ge 0`; transitions ``impact`` and
+    ``release``.
+
+    Parameters
+    ----------
+    K
+        Stiffness, N/m^(3/2).
+    """
+
+    K: float
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``K``."""
+        return asdict(self)
+
+    def modes(self, bodies: Bodies) -> list[Mode]:
+        """``free`` and ``contact``."""
+        return [_free(bodies), _pushed(bodies, lambda delta, rate, p: _hertz_force(delta, p))]
+
+    def transitions(self, bodies: Bodies) -> list[Transition]:
+        """``impact`` and ``release``."""
+        return _in_and_out(bodies)
+
+    def duration(self, mass: float, speed: float) -> float:
+        r"""Duration of an impact, s.
+
+        .. math::
+
+            T = \frac{4 \sqrt{\pi}\, \Gamma(2/5)}{5\, \Gamma(9/10)} \frac{\delta_{max}}{v} = 2.943
+            \frac{\delta_{max}}{v}, \quad \delta_{max} = \Bigl(\frac{5 m v^2}{4 K}\Bigr)^{2/5}
+
+        Parameters
+        ----------
+        mass, speed
+            Reduced mass :math:`m`, kg, and speed of approach :math:`v`, m/s.
+
+        References
+        ----------
+        K. L. Johnson, Contact Mechanics, Cambridge University Press 1985, section 11.4,
+        doi:10.1017/CBO9781139171731.
+        """
+        deepest = (5 * mass * speed**2 / (4 * self.K)) ** 0.4
+        return 0.8 * sqrt(pi) * gamma(0.4) / gamma(0.9) * deepest / speed
+
+
+@dataclass(frozen=True)
+class HuntCrossley:
+    r"""Hertz contact with losses: :math:`F = K\, \delta^{3/2} (1 + \tfrac32 \alpha\, \dot\delta)`.
+
+    Modes and transitions are those of :class:`Hertz`. The force starts and ends at zero and never pulls:
+    no impact rebounds faster than :math:`2 / (3 \alpha)`.
+
+    Parameters
+    ----------
+    K
+        Stiffness, N/m^(3/2).
+    alpha
+        Loss, s/m; for small :math:`\alpha v` the restitution is :math:`1 - \alpha v`.
+
+    References
+    ----------
+    K. H. Hunt, F. R. E. Crossley, "Coefficient of restitution interpreted as damping in vibroimpact", Journal
+    of Applied Mechanics 42(2), 440-445, 1975, doi:10.1115/1.3423596.
+    """
+
+    K: float
+    alpha: float
+
+    @classmethod
+    def from_restitution(cls, e: float, K: float, speed: float) -> HuntCrossley:
+        r"""The law with restitution ``e``, ``0 < e <= 1``, at one speed of impact.
+
+        Energy lost along :math:`\delta` depends on neither stiffness nor mass: with
+        :math:`u = \tfrac32 \alpha v`, :math:`(1 + e)\, u = \ln\frac{1 + u}{1 - e u}` exactly.
+
+        Parameters
+        ----------
+        e, K
+            Coefficient of restitution and stiffness, N/m^(3/2).
+        speed
+            Speed of approach :math:`v`, m/s.
+
+        Raises
+        ------
+        ArgumentError
+            If ``e`` is out of its range.
+        """
+        _check_restitution(e)
+        if e == 1:
+            return cls(K, 0.0)
+
+        # The unknown w = -ln(1 - e u) keeps its digits where e u is next to one.
+        def u(w: float) -> float:
+            return -expm1(-w) / e
+
+        # The root, of u = (1 - e) 3/2 to first order, lies above a sixth of that.
+        least = -log1p(-e * (1 - e) / 4)
+        w = _root(lambda w: log1p(u(w)) + w - (1 + e) * u(w), least, (1 + e) / e)
+        return cls(K, 2 * u(w) / (3 * speed))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``K`` and ``alpha``."""
+        return asdict(self)
+
+    def modes(self, bodies: Bodies) -> list[Mode]:
+        """``free`` and ``contact``."""
+        return [
+            _free(bodies),
+            _pushed(bodies, lambda delta, rate, p: _hertz_force(delta, p) * (1 + 1.5 * p.alpha * rate)),
+        ]
+
+    def transitions(self, bodies: Bodies) -> list[Transition]:
+        """``impact`` and ``release``."""
+        return _in_and_out(bodies)
+
+
+@dataclass(frozen=True)
+class KelvinVoigt:
+    r"""Spring and damper side by side: :math:`F = k\, \delta + c\, \dot\delta`.
+
+    At the impact the force jumps to :math:`c v`. The contact is left where the force vanishes, so it never
+    pulls, as it would if it were left at :math:`\delta = 0`. The surfaces are dented there still, and the
+    bodies move apart freely in the mode ``recovery`` until :math:`\delta = 0`; pressed together once more,
+    they are in contact as soon as the force would push.
+
+    Modes ``free``, ``contact``, ``recovery``; transitions ``impact``, ``release`` (into ``recovery``),
+    ``parting`` (into ``free``) and ``return`` (into ``contact``).
+
+    Parameters
+    ----------
+    k, c
+        Stiffness, N/m, and damping, N s/m.
+    """
+
+    k: float
+    c: float
+
+    @classmethod
+    def from_restitution(cls, e: float, mass: float, duration: float) -> KelvinVoigt:
+        r"""The law with restitution ``e``, ``0 < e <= 1``, at any speed, and with one duration of contact.
+
+        With the damping ratio :math:`\zeta = \cos\theta` the force vanishes after
+        :math:`T = 2 \theta / (\omega \sin\theta)`, :math:`\omega^2 = k / m`, and
+        :math:`e = \exp(-2 \theta \cot\theta)`. Above critical damping, for ``e < exp(-2)``, :math:`\theta` is
+        imaginary.
+
+        Parameters
+        ----------
+        e
+            Coefficient of restitution.
+        mass, duration
+            Reduced mass, kg, and duration of contact, s, :meth:`Hertz.duration` for one.
+
+        Raises
+        ------
+        ArgumentError
+            If ``e`` is out of its range.
+        """
+        _check_restitution(e)
+        if e == 1:
+            return cls(mass * (pi / duration) ** 2, 0.0)
+        if e > CRITICAL_RESTITUTION:
+            theta = _root(lambda theta: exp(-2 * theta / tan(theta)) - e, LEAST_ANGLE, pi / 2)
+            zeta, omega = cos(theta), 2 * theta / (duration * sin(theta))
+        else:
+            theta = _root(lambda theta: e - exp(-2 * theta / tanh(theta)), LEAST_ANGLE, LARGEST_ANGLE)
+            zeta, omega = cosh(theta), 2 * theta / (duration * sinh(theta))
+        return cls(mass * omega**2, 2 * zeta * omega * mass)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """``k`` and ``c``."""
+        return asdict(self)
+
+    def modes(self, bodies: Bodies) -> list[Mode]:
+        """``free``, ``contact`` and ``recovery``."""
+        free = _free(bodies)
+        contact = _pushed(bodies, lambda delta, rate, p: p.k * delta + p.c * rate)
+        return [free, contact, Mode("recovery", free.field)]
+
+    def transitions(self, bodies: Bodies) -> list[Transition]:
+        """``impact``, ``release``, ``parting`` and ``return``."""
+
+        def force(t, x, p):
+            return p.k * bodies.penetration(t, x, p) + p.c * bodies.rate(t, x, p)
+
+        return [
+            Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
+            Transition("contact", "recovery", Guard(force, -1), name="release"),
+            Transition("recovery", "free", Guard(bodies.penetration, -1), name="parting"),
+            Transition("recovery", "contact", Guard(force, +1), name="return"),
+        ]
+
+
+def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[str, ContactLaw]:
+    """Every law that can have restitution ``e``, matched at one speed of impact, the simplest first.
+
+    All lose the same energy at that speed. Hertz and Hunt-Crossley share the stiffness; Kelvin-Voigt shares
+    the duration of the Hertz contact, since that is how long tangent vectors are turned.
+
+    Parameters
+    ----------
+    K
+        Hertz stiffness, N/m^(3/2).
+    mass, speed
+        Reduced mass, kg, and speed of approach, m/s.
+    e
+        Coefficient of restitution, ``0 < e <= 1``; a Hertz contact is among the laws for ``e = 1`` only,
+        a Hunt-Crossley contact, which is then the same, for ``e < 1`` only.
+
+    Raises
+    ------
+    ArgumentError
+        If ``e`` is out of its range.
+
+    Examples
+    --------
+    >>> laws = matched_laws(K=1.5e11, mass=90.9, speed=0.4, e=0.8)
+    >>> {name: sorted(law.parameters) for name, law in laws.items()}
+    {'rigid': ['e'], 'Kelvin-Voigt': ['c', 'k'], 'Hunt-Crossley': ['K', 'alpha']}
+    """
+    hertz = Hertz(K)
+    return {
+        "rigid": Rigid(e),
+        "Kelvin-Voigt": KelvinVoigt.from_restitution(e, mass, hertz.duration(mass, speed)),
+        **({"Hertz": hertz} if e == 1 else {"Hunt-Crossley": HuntCrossley.from_restitution(e, K, speed)}),
+    }
+
+
+def after_collision(m1: float, m2: float, v1: Any, v2: Any, e: Any) -> tuple[Any, Any]:
+    """Velocities of two masses after a collision: momentum is kept, ``v1 - v2`` becomes ``-e (v1 - v2)``."""
+    impulse = (1 + e) * m1 * m2 / (m1 + m2) * (v1 - v2)
+    return v1 - impulse / m1, v2 + impulse / m2
+
+
+def _free(bodies: Bodies) -> Mode:
+    return Mode("free", lambda t, x, p: bodies.field(t, x, p, 0.0))
+
+
+def _pushed(bodies: Bodies, force: Callable[..., Any]) -> Mode:
+    """The mode ``contact`` under a force of ``(penetration, rate, p)``."""
+    return Mode(
+        "contact",
+        lambda t, x, p: bodies.field(t, x, p, force(bodies.penetration(t, x, p), bodies.rate(t, x, p), p)),
+    )
+
+
+def _in_and_out(bodies: Bodies) -> list[Transition]:
+    return [
+        Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
+        Transition("contact", "free", Guard(bodies.penetration, -1), name="release"),
+    ]
+
+
+def _hertz_force(penetration: Any, p: Any) -> Any:
+    # A step may try a point a little outside of the contact, where the power has no value.
+    return p.K * np.maximum(penetration, 0.0) ** 1.5
+
+
+def _check_restitution(e: float) -> None:
+    if not 0 < e <= 1:
+        raise ArgumentError(
+            f"Restitution e of a compliant contact must satisfy 0 < e <= 1; got {e!r}. Use Rigid for e = 0."
+        )
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function that is negative at ``low`` and positive at ``high``, by bisection to rounding."""
+    while low < (middle := (low + high) / 2) < high:
+        low, high = (middle, high) if function(middle) < 0 else (low, middle)
+    return high
