@@ -18,6 +18,8 @@ from hybrid.system import HybridSystem, finite_number
 
 # Newton steps are halved down to this part before they are taken as they are.
 SHORTEST_STEP = 1 / 64
+# A shorter period, as a share of the guess, is no orbit.
+SHORTEST_PERIOD = 1e-3
 # Jumps of a guess that are looked at in the search for a point away from them.
 MOST_JUMPS_LOOKED_AT = 10_000
 
@@ -278,6 +280,14 @@ class _Shooting:
         shooting, moved = self._moved(guess, shift)
         normal = shooting.shoot(moved).field
         orbit = shooting.newton(moved, normal, tolerance, max_iterations)
+        if orbit.status.ok and orbit.period < SHORTEST_PERIOD * guess.period:
+            # Every point closes after no time at all.
+            status = Status(
+                StatusCode.NOT_CONVERGED,
+                f"Newton's method let the period shrink from {guess.period:.3g} to {orbit.period:.3g}: a point.",
+                "Start nearer to the orbit, with a better guess of its period.",
+            )
+            return attrs.evolve(orbit, status=status)
         if not orbit.status.ok:
             return orbit
         return self._nearest(orbit, guess)

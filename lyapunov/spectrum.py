@@ -155,9 +155,8 @@ def lyapunov_spectrum(
         raise ArgumentError(f"k must be a whole number from 1 to {n}, the dimension of the state; got {k!r}.")
     check_count("intervals", intervals, 1)
     check_count("transient", transient, 0)
-    trajectory = start(
-        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=np.eye(n, int(k))
-    )
+    tangent = generic_directions(n, int(k)) if n else None
+    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=tangent)
     length = interval_length(trajectory, interval)
     with progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
         return _Estimate(trajectory, length).run(transient, intervals, history, bar)
@@ -173,6 +172,16 @@ def interval_length(trajectory: Trajectory, interval: float | None) -> float:
         return float(trajectory.model.period)
     norm = np.linalg.norm(trajectory.jacobian(), 2)
     return 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
+
+
+def generic_directions(n: int, k: int) -> np.ndarray:
+    """Orthonormal ``(n, k)``, the same every time, with no component along any axis that is zero.
+
+    Axes are often invariant, that of a clock for one: a first vector along it would never see the largest
+    exponent.
+    """
+    directions, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))
+    return np.asarray(directions[:, :k])
 
 
 class _Estimate:
@@ -192,6 +201,7 @@ class _Estimate:
         code = codes.DONE
         if transient:
             _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
+            self._replace_annihilated()
         mean, batches = TaperedMean(k + 1), new_batches(k + 1)
         jumps, steps = trajectory.jumps, int(trajectory.run.count[codes.STEPS])
         self.grazed_growth = trajectory.run.clock[codes.ILL_CONDITIONED_GROWTH]
@@ -245,6 +255,20 @@ class _Estimate:
             if history:
                 kept.append(rates[:done, :-1])
         return np.concatenate(kept), code
+
+    def _replace_annihilated(self) -> None:
+        """Give a new direction to each tangent vector that a jump has sent to zero.
+
+        One that is annihilated again and again has the exponent minus infinity; what happened during the
+        transient alone says nothing about that.
+        """
+        run, n = self.trajectory.run, self.trajectory.model.dimension
+        vectors = run.y[n:].reshape(-1, n)
+        gone = ~np.any(vectors, axis=1)
+        if np.any(gone):
+            kept = vectors[~gone]
+            basis, _ = np.linalg.qr(np.vstack([kept, generic_directions(n, n)]).T)
+            vectors[gone] = basis[:, len(kept) : len(vectors)].T
 
     def _status(self, code: int, intervals: int) -> Status:
         status = self.trajectory.status(code)

@@ -214,3 +214,36 @@ def test_bad_arguments(arguments, message):
 def test_bad_state():
     with pytest.raises(hybrid.ArgumentError, match="'v' must be finite; got nan"):
         lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, np.nan))
+
+
+def test_a_clock_among_the_states_hides_nothing():
+    """Along the axis of a clock nothing grows; the vectors start along no axis, so the largest comes first."""
+    result = lyapunov.lyapunov_spectrum(
+        models.buck_converter(),
+        (12.03, 0.61, 0.0),
+        mode="off",
+        parameters={"E": 33.0},
+        interval=400e-6,
+        intervals=500,
+    )
+    assert np.all(np.diff(result.exponents) <= 0)
+
+
+def test_what_only_the_transient_annihilates_is_not_minus_infinity():
+    system = hybrid.HybridSystem(
+        state=("x", "y"),
+        modes=[
+            hybrid.Mode("before", lambda t, x, p: (1.0, 0.0)),
+            hybrid.Mode("after", lambda t, x, p: (-0.5 * x.x, -2.0 * x.y)),
+        ],
+        transitions=[
+            hybrid.Transition(
+                "before",
+                "after",
+                hybrid.Guard(lambda t, x, p: x.x, +1),
+                hybrid.Reset(lambda t, x, p: (1.0, 1.0)),
+            )
+        ],
+    )
+    result = lyapunov.lyapunov_spectrum(system, (-1.0, 0.0), interval=0.5, transient=100, intervals=200)
+    np.testing.assert_allclose(result.exponents, [-0.5, -2.0], atol=1e-6)
