@@ -31,6 +31,7 @@ ROOT = sympy.Symbol("w", positive=True)
 ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 # Columns between those of the guards and the others: the time since the step's start, the integral of div f.
 CLOCK, DIVERGENCE, OTHERS = range(3)
+HIGHEST_DEGREE = 28
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
 
@@ -52,7 +53,7 @@ class Propagator:
     kind
         A code of ``hybrid.kernels.codes``: RUNGE_KUTTA, TAYLOR, EXACT or DESINGULARISED.
     degree
-        Degree in time of every solution if that is a polynomial, else 0.
+        Degree in time of every solution, and of every guard along it, if those are polynomials, else 0.
     columns
         Columns that the series need beside those of state, tangents and guards.
     reason
@@ -112,7 +113,10 @@ def _series(
         return Propagator(TAYLOR, 0, columns, "smooth, nonlinear in the state", statements)
     if not all(_elementary(entry, symbols) for entry in field):
         return Propagator(TAYLOR, 0, columns, "affine, its forcing has no short series", statements)
-    degree = _degree(field, jacobian, symbols)
+    powers = [_polynomial(guard, symbols) for guard in guards] or [1]
+    degree = _degree(field, jacobian, symbols) * max(powers) * (0 not in powers)
+    if degree > HIGHEST_DEGREE:
+        degree = 0
     how = f"polynomials of degree {degree}" if degree else "affine in the state"
     return Propagator(EXACT, degree, columns, how, statements)
 
@@ -174,6 +178,14 @@ def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
             continue
         return False
     return True
+
+
+def _polynomial(guard: sympy.Expr, symbols: Symbols) -> int:
+    """Degree of a guard that is a polynomial in state and time, at least 1; zero for any other."""
+    variables = [v for v in symbols.variables if guard.has(v)]
+    if not guard.is_polynomial(*variables):
+        return 0
+    return max(1, sympy.Poly(guard, *variables).total_degree()) if variables else 1
 
 
 def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]], symbols: Symbols) -> int:

@@ -112,6 +112,9 @@ def enter(model, run, work):
         direction = model.direction[transition]
         before = run.side[transition] if run.count[PREVIOUS_MODE] == mode else 0
         side = 1 if trend > 0.0 else (-1 if trend < 0.0 else -direction)
+        if order == 3 and landed and transition == run.count[LAST_FIRED]:
+            # A root of third order: what follows is beyond the guard, and has been crossed already.
+            side = direction if direction != 0 else -before
         run.side[transition] = side
         run.on_guard[transition] = order
         inbound = side == direction or (direction == 0 and on_guard and side * before < 0)

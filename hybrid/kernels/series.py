@@ -34,6 +34,9 @@ EXACT_ORDER = 28
 EXACT_TOLERANCE = 1e-17
 # Share of the largest component that is an absolute tolerance for the others.
 SHARE = 1e-3
+SAFETY = 0.9
+# Terms at the end of a series that have to be small.
+TAIL = 8
 # A flight without end is followed for this many times the time in which the state changes by its size.
 LONG = 100.0
 
@@ -67,39 +70,69 @@ def values_at(series, order, s, length, out):
 
 
 @njit(**INLINE)
-def worst_ratio(row, series, start, n, rtol, floor):
-    """Largest ratio of coefficients to tolerances over one block."""
-    worst = 0.0
-    for i in range(start, start + n):
-        worst = max(worst, abs(series[row, i]) / (floor + rtol * abs(series[0, i])))
-    return worst
+def weigh_guards(model, mode, series, n, length, first, rtol, worst):
+    """Add to ``worst`` the last terms of guards that are not affine, whose series ends before the state's.
+
+    They are measured against what the guard changes while the state changes by its size.
+    """
+    size, pace = 0.0, 0.0
+    for i in range(n):
+        size, pace = max(size, abs(series[0, i])), max(pace, abs(series[1, i]))
+    scale = size / pace if size * pace > 0.0 else 1.0
+    start = model.first_outgoing[mode]
+    for slot in range(start, model.first_outgoing[mode + 1]):
+        if model.affine_guard[model.outgoing[slot]] == 1:
+            continue
+        column = length + slot - start
+        largest = abs(series[0, column]) + scale * (
+            abs(series[1, column]) + scale * (abs(series[2, column]) + scale * abs(series[3, column]))
+        )
+        for k in range(TAIL if largest > 0.0 else 0):
+            worst[k] = max(worst[k], abs(series[first + k, column]) / (rtol * largest))
 
 
 @njit(**KERNEL)
-def longest_step(series, n, length, order, rtol, atol, exact):
-    """Longest step at which the last two terms of every block are below its tolerance.
+def longest_step(model, mode, series, n, length, order, rtol, atol, exact, worst):
+    """Longest step at which the last term of every block is below its tolerance, as after Jorba and Zou 2005.
 
-    Jorba and Zou 2005, section 3.2, with the tolerances of the Runge-Kutta methods: each tangent vector is a
-    block by itself. Nan if a coefficient is.
+    The tolerances are those of the Runge-Kutta methods: each tangent vector is a block by itself. One term is
+    not enough, on the clock of a contact only every fifth may be there: the ones before must be on their
+    way, below the powers of ``rtol`` that lead to it.
+    ``worst (>= TAIL,)`` is scratch. Nan if a coefficient is.
     """
-    last, before = 1e-300, 1e-300
+    first = order + 1 - TAIL
+    for k in range(TAIL):
+        worst[k] = 1e-300
     for start in range(0, length, n):
         square, largest = 0.0, 0.0
         for i in range(start, start + n):
             square += series[0, i] * series[0, i]
             largest = max(largest, abs(series[0, i]))
+        if largest == 0.0:
+            # From rest at the origin, the first terms tell the size.
+            for i in range(start, start + n):
+                largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
         if exact:
             floor = SHARE * rtol * largest + 1e-300
         elif start > 0:
             floor = rtol * math.sqrt(square / n) + 1e-300
         else:
             floor = atol
-        a = worst_ratio(order, series, start, n, rtol, floor)
-        b = worst_ratio(order - 1, series, start, n, rtol, floor)
-        if not a + b < math.inf:
-            return math.nan
-        last, before = max(last, a), max(before, b)
-    return min(last ** (-1.0 / order), before ** (-1.0 / (order - 1)))
+        for i in range(start, start + n):
+            weight = 1.0 / (floor + rtol * abs(series[0, i]))
+            for k in range(TAIL):
+                worst[k] = max(worst[k], weight * abs(series[first + k, i]))
+            if not weight * (abs(series[order, i]) + abs(series[order - 1, i])) < math.inf:
+                return math.nan
+    weigh_guards(model, mode, series, n, length, first, rtol, worst)
+    h = worst[TAIL - 1] ** (-1.0 / order)
+    decay = rtol ** (1.0 / order)
+    share = 1.0
+    for k in range(TAIL - 2, -1, -1):
+        share /= decay
+        if worst[k] * h ** (first + k) > share:
+            h = (share / worst[k]) ** (1.0 / (first + k))
+    return SAFETY * h
 
 
 @njit(**KERNEL)
@@ -301,9 +334,11 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if degree > 0:
         h = math.inf
     elif exact:
-        h = longest_step(series, n, length, order, EXACT_TOLERANCE, 0.0, True)
+        h = longest_step(model, mode, series, n, length, order, EXACT_TOLERANCE, 0.0, True, work.polynomial)
     else:
-        h = longest_step(series, n, length, order, method.rtol, method.atol, False)
+        h = longest_step(
+            model, mode, series, n, length, order, method.rtol, method.atol, False, work.polynomial
+        )
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock >= 0:
@@ -342,6 +377,6 @@ def unhurried(series, n, run):
     size, pace = 0.0, 0.0
     for i in range(n):
         size, pace = max(size, abs(series[0, i])), max(pace, abs(series[1, i]))
-    h = max(run.clock[NEXT_STEP], LONG * size / pace if pace > 0.0 else 1.0)
+    h = max(run.clock[NEXT_STEP], LONG * size / pace if pace * size > 0.0 else 1.0)
     run.clock[NEXT_STEP] = min(2.0 * h, 1e50)
     return h

@@ -11,7 +11,7 @@ from hybrid.solvers.dop853 import DOP853
 from hybrid.solvers.runge_kutta import RungeKutta
 from hybrid.solvers.tableau import Tableau
 
-LOWEST_ORDER = 8
+LOWEST_ORDER = 12
 HIGHEST_ORDER = 28
 
 

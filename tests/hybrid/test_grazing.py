@@ -88,13 +88,19 @@ class TestTouches:
     @pytest.mark.parametrize("guard", GUARDS)
     @pytest.mark.parametrize("c", [0.0, 1e-12, 1e-13])
     def test_a_touch_within_the_tolerances_is_kept_on_the_arc(self, c, guard):
-        arc = run(c, guard)
+        arc = run(c, guard, solver=DOP853())
         (grazing,) = arc.grazings
         assert grazing.transition == "touch"
         assert abs(grazing.t - 1) < 1e-6
         assert abs(grazing.value - c) < 1e-14
         assert grazing.acceleration == pytest.approx(2.0, rel=1e-6)
         np.testing.assert_allclose(grazing.x, [c, 0.0, 0.0], atol=1e-6)
+
+    @pytest.mark.parametrize("guard", GUARDS)
+    def test_an_exact_flight_tells_a_miss_from_a_touch(self, guard):
+        """Its error is rounding: one unit in a million millionth above the guard is a clear miss."""
+        assert run(1e-12, guard).grazings == ()
+        assert len(run(0.0, guard).grazings) == 1
 
     @pytest.mark.parametrize("c", [1e-3, 1e-6, 1e-8])
     def test_a_clear_miss_is_not(self, c):

@@ -144,6 +144,15 @@ def test_degree_of_polynomial_solutions(field, degree):
     assert (propagator.kind, propagator.degree) == (EXACT, degree)
 
 
+@pytest.mark.parametrize(
+    ("guard", "degree"), [(lambda x: x.x + 1, 2), (lambda x: x.x * x.y**2 - 1, 6), (lambda x: np.exp(x.x), 0)]
+)
+def test_a_step_over_a_whole_flight_needs_polynomial_guards_too(guard, degree):
+    flight = Transition("a", "a", Guard(lambda t, x, p: guard(x), -1))
+    [propagator] = emit(system_of(lambda t, x, p: (x.y, -9.81), flight)).propagators
+    assert (propagator.kind, propagator.degree) == (EXACT, degree)
+
+
 def test_a_guard_says_what_holds_in_its_mode():
     """max(x, 0) is x where the mode ends at x = 0, and zero on the other side."""
 

@@ -217,7 +217,7 @@ def test_bad_state():
 
 
 def test_a_clock_among_the_states_hides_nothing():
-    """Along the axis of a clock nothing grows; the vectors start along no axis, so the largest comes first."""
+    """Nothing grows along the axis of a clock; the vectors start along no axis, the largest comes first."""
     result = lyapunov.lyapunov_spectrum(
         models.buck_converter(),
         (12.03, 0.61, 0.0),

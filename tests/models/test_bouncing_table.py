@@ -67,7 +67,9 @@ def test_a_locked_ball_lifts_off_when_the_table_falls_as_fast():
     arc = hybrid.simulate(bouncing_table(), (0.001, 0.0), (0.0, 1.0), mode="flight", solver=TIGHT)
     liftoffs = [jump.t for jump in arc.jumps if jump.transition == "liftoff"]
     assert len(liftoffs) > 3
-    assert {jump.kind for jump in arc.jumps} == {"transverse", "limit"}
+    # The last bounces of a chatter are no higher than the tolerance.
+    assert {jump.kind for jump in arc.jumps} <= {"transverse", "grazing", "limit"}
+    assert sum(jump.kind == "limit" for jump in arc.jumps) == len(liftoffs)
     exact = math.asin(G / (A * W**2)) / W
     np.testing.assert_allclose([t % PERIOD for t in liftoffs], exact, rtol=0, atol=1e-10)
 
