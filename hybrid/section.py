@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.load import load_kernels
+from hybrid.load import address, entry, load_kernels
 from hybrid.progress import progress_bar
 from hybrid.run import UNLIMITED, Trajectory, check_count, empty_record, start
 from hybrid.solvers import RungeKutta
@@ -126,8 +126,8 @@ def stroboscopic_section(
 def _strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, int]:
     states = np.empty((count, trajectory.model.dimension))
     places = np.empty((count, 3), dtype=np.int64)
-    done, code = load_kernels("hybrid.kernels.sections").strobe(
-        load_kernels().advance,
+    done, code = entry(load_kernels("hybrid.kernels.sections").strobe)(
+        address(load_kernels().advance),
         trajectory.parts,
         trajectory.model,
         trajectory.method,

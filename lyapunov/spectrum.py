@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status
 from hybrid.kernels import codes
-from hybrid.load import load_kernels
+from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
 from hybrid.run import Trajectory, check_count, start
 from hybrid.solvers import RungeKutta
@@ -216,8 +216,8 @@ class _Estimate:
         self, intervals: int, mean: TaperedMean, batches: Any, history: bool, bar: Progress
     ) -> tuple[np.ndarray, int]:
         trajectory = self.trajectory
-        kernel = load_kernels("lyapunov.kernels").growth_rates
-        advance = load_kernels().advance
+        kernel = entry(load_kernels("lyapunov.kernels").growth_rates)
+        advance = address(load_kernels().advance)
         kept = [np.empty((0, trajectory.tangents))]
         code = codes.DONE
         while mean.count < intervals and code == codes.DONE:
