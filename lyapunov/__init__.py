@@ -1,12 +1,15 @@
 """Lyapunov and Floquet exponents of hybrid systems."""
 
+from lyapunov.chart import Chart, chart
 from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
 from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
 
 __all__ = [
+    "Chart",
     "LyapunovSpectrum",
     "TwoOrbitExponents",
+    "chart",
     "floquet_exponents",
     "lyapunov_spectrum",
     "two_orbit_exponents",

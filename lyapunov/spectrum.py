@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status
+from hybrid import ArgumentError, HybridSystem, Status, compile_system
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
@@ -148,18 +148,22 @@ def lyapunov_spectrum(
     >>> bool(abs(spectrum.sum_defect) < 1e-9)
     True
     """
-    n = system.dimension if isinstance(system, HybridSystem) else 0
-    k = n if k is None else k
-    if n and not (isinstance(k, int | np.integer) and 1 <= k <= n):
-        raise ArgumentError(f"k must be a whole number from 1 to {n}, the dimension of the state; got {k!r}.")
+    vectors = first_vectors(system, k)
     check_count("intervals", intervals, 1)
     check_count("transient", transient, 0)
-    trajectory = start(
-        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=np.eye(n, int(k))
-    )
+    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
     length = interval_length(trajectory, interval)
     with progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        return _Estimate(trajectory, length).run(transient, intervals, history, bar)
+        return Estimate(trajectory, length).run(transient, intervals, history, bar)
+
+
+def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
+    """Tangent vectors ``(n, k)`` to start with; all ``n`` for None."""
+    n = compile_system(system).system.dimension
+    k = n if k is None else k
+    if not (isinstance(k, int | np.integer) and 1 <= k <= n):
+        raise ArgumentError(f"k must be a whole number from 1 to {n}, the dimension of the state; got {k!r}.")
+    return np.eye(n, int(k))
 
 
 def interval_length(trajectory: Trajectory, interval: float | None) -> float:
@@ -174,8 +178,8 @@ def interval_length(trajectory: Trajectory, interval: float | None) -> float:
     return 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
 
 
-class _Estimate:
-    """Accumulates the growth rates that the kernel delivers in bursts."""
+class Estimate:
+    """Takes a trajectory further and accumulates the growth rates that the kernel delivers in bursts."""
 
     def __init__(self, trajectory: Trajectory, interval: float) -> None:
         self.trajectory = trajectory
@@ -187,6 +191,7 @@ class _Estimate:
         self.grazed_growth = 0.0
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
+        """The spectrum over so many intervals after a transient of so many."""
         trajectory, k = self.trajectory, self.trajectory.tangents
         code = codes.DONE
         if transient:
