@@ -23,7 +23,7 @@ from models.impact_oscillator import one_impact_orbits
 # Elastic, undamped and unforced; the period only counts the time.
 CONSERVATIVE = {"xi1": 0.0, "xi2": 0.0, "P": 0.0}
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
-TOLERANCES = (1e-9, 1e-11, 1e-13, 1e-14)
+TOLERANCES = (1e-9, 1e-11, 1e-13, 1e-14, 1e-15)
 
 
 def energy(p: dict[str, float], x: np.ndarray) -> float:
