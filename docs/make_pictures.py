@@ -11,9 +11,12 @@ import matplotlib as mpl
 mpl.use("Agg")
 
 import matplotlib.pyplot as plt
+import numpy as np
 
 from hybrid import DOP853, HybridSystem, periodic_orbit, simulate, stroboscopic_section
 from hybrid.plot import COLOURS, plot_arc, plot_graph, plot_phase
+from lyapunov import chart
+from lyapunov.plot import plot_chart, style
 
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
@@ -79,6 +82,25 @@ def graph_picture(system: HybridSystem) -> None:
     save(figure, HERE / "graph.png")
 
 
+def chart_picture(system: HybridSystem) -> None:
+    """Sections and exponents over the forcing frequency, the attractor carried along."""
+    with style():
+        swept = chart(
+            system,
+            {"w": np.linspace(1.3, 1.9, 600)},
+            (0.5, 0.0),
+            k=2,
+            intervals=1000,
+            section=200,
+            continue_from="previous",
+            solver=DOP853(rtol=1e-8, atol=1e-10),
+        )
+        figure = plot_chart(swept)
+        figure.axes[0].set_ylabel("position q, once a period")
+        figure.axes[1].set_xlabel("forcing frequency w")
+        save(figure, HERE / "chart.png")
+
+
 def save(figure: Any, path: Path) -> None:
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
@@ -100,6 +122,7 @@ def main() -> None:
         system = model_of_the_readme()
         rattler_picture(system)
         graph_picture(system)
+        chart_picture(system)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ A model is a graph: modes are smooth vector fields, transitions are guards and r
 it the import of the compiler, waits for the first call that needs it.
 """
 
+from hybrid.accuracy import GlobalError, global_error
 from hybrid.arc import Grazing, HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
@@ -20,6 +21,7 @@ __all__ = [
     "DOP853",
     "ArgumentError",
     "CompiledSystem",
+    "GlobalError",
     "Grazing",
     "Guard",
     "HybridArc",
@@ -39,6 +41,7 @@ __all__ = [
     "Tsit5",
     "compile_system",
     "filippov",
+    "global_error",
     "periodic_orbit",
     "poincare_section",
     "saltation_matrix",

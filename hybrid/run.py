@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.load import address, load_kernels
+from hybrid.load import address, entry, load_kernels
 from hybrid.solvers import RungeKutta, Taylor
 from hybrid.solvers.taylor import HIGHEST_ORDER
 from hybrid.status import Status, StatusCode, run_status
@@ -263,7 +263,7 @@ class Trajectory:
     ) -> int:
         """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run."""
         return int(
-            load_kernels().advance(
+            entry(load_kernels().advance)(
                 self.parts,
                 self.model,
                 self.method,
@@ -425,9 +425,9 @@ def _guards_beyond(
 
     phase = run.clock[codes.PHASE]
     values = np.ones(2 * len(system.transitions))
-    guard_values(model, phase, run.y, values)
+    entry(guard_values)(model, phase, run.y, values)
     run.count[codes.MODE] = index
-    enter(model, run, work)
+    entry(enter)(model, run, work)
     beyond = []
     for i, transition in enumerate(system.transitions):
         if transition.source != system.mode_names[index]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.load import load_kernels
+from hybrid.load import address, entry, load_kernels
 from hybrid.progress import progress_bar
 from hybrid.run import UNLIMITED, Trajectory, check_count, empty_record, start
 from hybrid.solvers import RungeKutta
@@ -105,7 +105,7 @@ def stroboscopic_section(
     with progress_bar(transient + periods, "Section", progress, "period") as bar:
         for kept, left in ((False, transient), (True, periods)):
             while left > 0 and code == codes.DONE:
-                states, places, code = _strobe(trajectory, min(left, POINTS_AT_ONCE))
+                states, places, code = strobe(trajectory, min(left, POINTS_AT_ONCE))
                 if kept:
                     chunks.append((states, places))
                 elif len(places):
@@ -123,11 +123,15 @@ def stroboscopic_section(
     )
 
 
-def _strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, int]:
+def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, int]:
+    """States ``(N, n)`` and places ``(N, 3)`` of the next ``count`` periods at the phase of the start.
+
+    The places are cycle, mode and jump count; the code says why there may be fewer.
+    """
     states = np.empty((count, trajectory.model.dimension))
     places = np.empty((count, 3), dtype=np.int64)
-    done, code = load_kernels("hybrid.kernels.sections").strobe(
-        load_kernels().advance,
+    done, code = entry(load_kernels("hybrid.kernels.sections").strobe)(
+        address(load_kernels().advance),
         trajectory.parts,
         trajectory.model,
         trajectory.method,

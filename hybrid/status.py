@@ -23,6 +23,7 @@ class StatusCode(IntEnum):
     AMBIGUOUS_ORDER = 99
     SINGULAR_SALTATION = 100
     NOT_CONVERGED = 101
+    NOT_RUN = 102
 
 
 @attrs.frozen

@@ -1,14 +1,17 @@
 """Lyapunov and Floquet exponents of hybrid systems."""
 
+from lyapunov.chart import Chart, chart
 from lyapunov.compare import ModelComparison, compare_models
 from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
 from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
 
 __all__ = [
+    "Chart",
     "LyapunovSpectrum",
     "ModelComparison",
     "TwoOrbitExponents",
+    "chart",
     "compare_models",
     "floquet_exponents",
     "lyapunov_spectrum",

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid.arc import HybridArc
+from hybrid.errors import ArgumentError
+from lyapunov.chart import Chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -202,3 +204,151 @@ def _plot_section(ax: Axes, panel: Panel, x: str, y: str, labels: tuple[str, str
         ax.set_ylim(b - radius[1], b + radius[1])
     ax.set_xlabel(labels[0])
     ax.set_ylabel(labels[1])
+
+
+def plot_exponents(ax: Axes, chart: Chart) -> Axes:
+    """Exponents of a chart over one parameter, with a band of two standard errors, and the line of zero.
+
+    Parameters
+    ----------
+    ax
+        Where to draw.
+    chart
+        From :func:`lyapunov.chart`, over one parameter.
+    """
+    name, values = _only_axis(chart)
+    ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+    order = np.argsort(values)
+    for i in range(chart.exponents.shape[-1]):
+        middle, error = chart.exponents[order, i], 2 * chart.standard_error[order, i]
+        middle = np.where(np.isfinite(middle), middle, np.nan)
+        colour = COLOURS[i % len(COLOURS)]
+        ax.plot(values[order], middle, color=colour, linewidth=0.9, label=f"$\\lambda_{{{i + 1}}}$")
+        ax.fill_between(values[order], middle - error, middle + error, color=colour, alpha=0.25, linewidth=0)
+    _mark_failures(ax, chart)
+    ax.set_xlabel(name)
+    ax.set_ylabel("Lyapunov exponents")
+    ax.grid(True, axis="y")
+    if chart.exponents.shape[-1] > 1:
+        ax.legend()
+    return ax
+
+
+def plot_bifurcation(ax: Axes, chart: Chart, component: str | None = None) -> Axes:
+    """Points of the section over the parameter: a bifurcation diagram.
+
+    Parameters
+    ----------
+    ax
+        Where to draw.
+    chart
+        From :func:`lyapunov.chart`, over one parameter and with ``section=``.
+    component
+        Name of the state's component to show, by default the first.
+
+    Raises
+    ------
+    ArgumentError
+        If the chart is over two parameters or has no section.
+    """
+    name, values = _only_axis(chart)
+    points = chart.section.shape[1]
+    if points == 0:
+        raise ArgumentError("This chart has no points of a section. Make it with section=100, for instance.")
+    names = chart.system.state_names
+    i = 0 if component is None else names.index(component)
+    ax.plot(np.repeat(values, points), chart.section[:, :, i].ravel(), ",", color=COLOURS[0], rasterized=True)
+    ax.set_xlabel(name)
+    ax.set_ylabel(names[i])
+    return ax
+
+
+def plot_map(ax: Axes, chart: Chart, exponent: int = 0) -> Axes:
+    """Map of an exponent over two parameters, red where it is positive, blue where negative, grey where not.
+
+    Parameters
+    ----------
+    ax
+        Where to draw; a colour bar is set beside it.
+    chart
+        From :func:`lyapunov.chart`, over two parameters.
+    exponent
+        Which exponent, 0 for the largest.
+
+    Raises
+    ------
+    ArgumentError
+        If the chart is over one parameter.
+    """
+    if len(chart.over) != 2:
+        raise ArgumentError("A map needs a chart over two parameters. Use plot_exponents for one.")
+    (down, rows), (across, columns) = chart.over.items()
+    values = chart.exponents[..., exponent]
+    finite = np.abs(values[np.isfinite(values)])
+    # A few extremes would leave the rest pale.
+    limit = float(np.quantile(finite, 0.98)) if finite.size and finite.max() > 0 else 1.0
+    ax.set_facecolor("0.75")
+    mesh = ax.pcolormesh(
+        columns,
+        rows,
+        np.ma.masked_invalid(values),
+        cmap="RdBu_r",
+        vmin=-limit,
+        vmax=limit,
+        shading="nearest",
+        rasterized=True,
+    )
+    ax.figure.colorbar(mesh, ax=ax, extend="both", label=f"$\\lambda_{{{exponent + 1}}}$")
+    ax.set_xlabel(across)
+    ax.set_ylabel(down)
+    return ax
+
+
+def plot_chart(chart: Chart, component: str | None = None) -> Figure:
+    """A figure of a chart: exponents under their bifurcation diagram, or a map of the largest one.
+
+    Parameters
+    ----------
+    chart
+        From :func:`lyapunov.chart`. With ``section=`` the diagram is drawn.
+    component
+        Name of the state's component in the diagram, by default the first.
+    """
+    import matplotlib.pyplot as plt
+
+    if len(chart.over) == 2:
+        figure, ax = plt.subplots(figsize=(5.6, 4.4), layout="constrained")
+        plot_map(ax, chart)
+        return figure
+    if chart.section.shape[1] == 0:
+        figure, ax = plt.subplots(figsize=(7.2, 3.2), layout="constrained")
+        plot_exponents(ax, chart)
+        return figure
+    figure, (above, below) = plt.subplots(2, figsize=(7.2, 5.4), sharex=True, layout="constrained")
+    plot_bifurcation(above, chart, component).set_xlabel("")
+    plot_exponents(below, chart)
+    return figure
+
+
+def _only_axis(chart: Chart) -> tuple[str, np.ndarray]:
+    if len(chart.over) != 1:
+        raise ArgumentError(
+            f"This chart is over {' and '.join(chart.over)}: lines need one parameter. Use plot_map."
+        )
+    return next(iter(chart.over.items()))
+
+
+def _mark_failures(ax: Axes, chart: Chart) -> None:
+    """Ticks at the foot of the axes where a row has a status other than success."""
+    bad = next(iter(chart.over.values()))[~chart.ok]
+    if len(bad):
+        ax.plot(
+            bad,
+            np.zeros(len(bad)),
+            "|",
+            color=COLOURS[1],
+            markersize=8,
+            transform=ax.get_xaxis_transform(),
+            label="not to be trusted",
+            clip_on=False,
+        )

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status
+from hybrid import ArgumentError, HybridSystem, Status, compile_system
 from hybrid.kernels import codes
-from hybrid.load import load_kernels
+from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
 from hybrid.run import Trajectory, check_count, start
 from hybrid.solvers import RungeKutta
@@ -149,17 +149,22 @@ def lyapunov_spectrum(
     >>> bool(abs(spectrum.sum_defect) < 1e-9)
     True
     """
-    n = system.dimension if isinstance(system, HybridSystem) else 0
-    k = n if k is None else k
-    if n and not (isinstance(k, int | np.integer) and 1 <= k <= n):
-        raise ArgumentError(f"k must be a whole number from 1 to {n}, the dimension of the state; got {k!r}.")
+    vectors = first_vectors(system, k)
     check_count("intervals", intervals, 1)
     check_count("transient", transient, 0)
-    tangent = generic_directions(n, int(k)) if n else None
-    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=tangent)
+    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
     length = interval_length(trajectory, interval)
     with progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        return _Estimate(trajectory, length).run(transient, intervals, history, bar)
+        return Estimate(trajectory, length).run(transient, intervals, history, bar)
+
+
+def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
+    """Tangent vectors ``(n, k)`` to start with; all ``n`` for None."""
+    n = compile_system(system).system.dimension
+    k = n if k is None else k
+    if not (isinstance(k, int | np.integer) and 1 <= k <= n):
+        raise ArgumentError(f"k must be a whole number from 1 to {n}, the dimension of the state; got {k!r}.")
+    return generic_directions(n, int(k))
 
 
 def interval_length(trajectory: Trajectory, interval: float | None) -> float:
@@ -184,8 +189,8 @@ def generic_directions(n: int, k: int) -> np.ndarray:
     return np.asarray(directions[:, :k])
 
 
-class _Estimate:
-    """Accumulates the growth rates that the kernel delivers in bursts."""
+class Estimate:
+    """Takes a trajectory further and accumulates the growth rates that the kernel delivers in bursts."""
 
     def __init__(self, trajectory: Trajectory, interval: float) -> None:
         self.trajectory = trajectory
@@ -197,6 +202,7 @@ class _Estimate:
         self.grazed_growth = 0.0
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
+        """The spectrum over so many intervals after a transient of so many."""
         trajectory, k = self.trajectory, self.trajectory.tangents
         code = codes.DONE
         if transient:
@@ -228,8 +234,8 @@ class _Estimate:
         self, intervals: int, mean: TaperedMean, batches: Any, history: bool, bar: Progress
     ) -> tuple[np.ndarray, int]:
         trajectory = self.trajectory
-        kernel = load_kernels("lyapunov.kernels").growth_rates
-        advance = load_kernels().advance
+        kernel = entry(load_kernels("lyapunov.kernels").growth_rates)
+        advance = address(load_kernels().advance)
         kept = [np.empty((0, trajectory.tangents))]
         code = codes.DONE
         while mean.count < intervals and code == codes.DONE:

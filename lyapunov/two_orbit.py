@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status
 from hybrid.kernels import codes
-from hybrid.load import load_kernels
+from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
 from hybrid.run import Trajectory, check_count, start
 from hybrid.solvers import RungeKutta
@@ -246,7 +246,8 @@ def _follow(
     bar: Progress,
 ) -> tuple[np.ndarray, Status]:
     """Distances ``(M, 2)`` of the free and the renormalised companion, in bursts, and how the runs ended."""
-    kernel, advance = load_kernels("lyapunov.kernels").distances, load_kernels().advance
+    kernel = entry(load_kernels("lyapunov.kernels").distances)
+    advance = address(load_kernels().advance)
     runs: list[Any] = [reference, *companions]
     cycle = reference.run.count[codes.CYCLE : codes.CYCLE + 1].copy()
     phase = reference.run.clock[codes.PHASE : codes.PHASE + 1].copy()

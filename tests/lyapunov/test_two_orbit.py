@@ -15,8 +15,8 @@ PERIOD = 2 * np.pi
 
 @pytest.fixture(scope="module")
 def stable():
-    """The impact oscillator on its stable orbit."""
-    return lyapunov.two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=1000)
+    """The impact oscillator on its stable orbit; two orbits at rounding would coincide sooner or later."""
+    return lyapunov.two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=300)
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +49,10 @@ def test_formulas_7_and_9_as_they_are_printed(name, request):
 
 def test_a_stable_distance_stops_at_rounding(stable):
     """So (7) decays like 1/M from there on, though the exponent is -0.0855."""
-    late = slice(500, None)
-    levels = (stable.single_piece * np.arange(1, 1001) * PERIOD)[late]
+    late = slice(100, None)
+    levels = (stable.single_piece * np.arange(1, 301) * PERIOD)[late]
     assert np.log(1e-17 / 1e-8) < levels.min() <= levels.max() < np.log(1e-12 / 1e-8)
-    assert abs(stable.single_piece[-1]) < 0.004
+    assert abs(stable.single_piece[-1]) < 0.012
 
 
 def test_a_chaotic_distance_stops_at_the_size_of_the_attractor(chaotic):
@@ -64,14 +64,18 @@ def test_a_chaotic_distance_stops_at_the_size_of_the_attractor(chaotic):
 
 def test_formula_9_tends_to_the_level_over_the_interval(stable):
     """No exponent at all: the level of the distance, near -16, over the period."""
-    level = np.log(stable.distances[-300:] / stable.separation).mean()
+    level = np.log(stable.distances[-200:] / stable.separation).mean()
     assert stable.undivided[-1] == pytest.approx(level / stable.interval, rel=0.15)
 
 
-def test_renormalised_companion_of_the_impact_oscillator(stable):
+def test_renormalised_companion_of_the_impact_oscillator():
+    """The multipliers turn the tangent plane once in 650 periods, so it takes that long."""
+    result = lyapunov.two_orbit_exponents(
+        models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=1000
+    )
     exact = np.log(abs(-0.58429531 + 0.00560035j)) / PERIOD
-    assert stable.renormalised_exponent == pytest.approx(exact, abs=1e-4)
-    assert stable.renormalised[-1] == pytest.approx(exact, abs=1e-3)
+    assert result.renormalised_exponent == pytest.approx(exact, abs=1e-4)
+    assert result.renormalised[-1] == pytest.approx(exact, abs=1e-3)
 
 
 def test_renormalised_companion_of_the_founding_system():

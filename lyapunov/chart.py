@@ -1,0 +1,383 @@
+"""Exponents over one or two parameters, on all cores."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
+from threading import Event
+from typing import Any, Literal
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode
+from hybrid.kernels import codes
+from hybrid.load import load_kernels
+from hybrid.progress import progress_bar
+from hybrid.run import Trajectory, check_count, check_solver, check_state, driver_parts, start
+from hybrid.section import strobe
+from hybrid.solvers import RungeKutta
+from lyapunov.spectrum import Estimate, first_vectors, interval_length
+
+UNTOUCHED = Status(
+    StatusCode.NOT_RUN, "Interrupted before this row was done.", "Chart the rows that are missing once more."
+)
+
+
+@attrs.frozen(eq=False, repr=False)
+class Chart:
+    """Lyapunov exponents over a grid of parameter values; rows that were not run hold nan.
+
+    Attributes
+    ----------
+    system
+        The model.
+    over
+        Parameter names to their values: the axes of the grid, one or two.
+    exponents, standard_error
+        ``(*grid, k)``, as in :class:`lyapunov.LyapunovSpectrum`.
+    sum_rule, jumps_per_interval
+        ``grid``, as there.
+    x, mode
+        ``(*grid, n)`` and ``grid``: state, and name of the mode, in which each row's spectrum ended.
+    section
+        ``(*grid, points, n)``: states once a forcing period after that, for a bifurcation diagram.
+    status
+        ``grid`` of :class:`hybrid.Status`.
+    """
+
+    system: HybridSystem
+    over: dict[str, np.ndarray]
+    exponents: np.ndarray
+    standard_error: np.ndarray
+    sum_rule: np.ndarray
+    jumps_per_interval: np.ndarray
+    x: np.ndarray
+    mode: np.ndarray
+    section: np.ndarray
+    status: np.ndarray
+
+    @property
+    def ok(self) -> np.ndarray:
+        """Whether each row is complete and valid, a ``grid`` of booleans."""
+        return np.vectorize(lambda status: status.ok, otypes=[bool])(self.status)
+
+    def __repr__(self) -> str:
+        counts = Counter(status.code.name for status in self.status.flat)
+        ends = ", ".join(f"{count} {name}" for name, count in counts.most_common())
+        return f"<Chart over {' and '.join(self.over)}, {self.status.size} rows: {ends}>"
+
+
+def chart(
+    system: HybridSystem,
+    over: Mapping[str, ArrayLike],
+    x0: ArrayLike,
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    k: int | None = 1,
+    intervals: int = 1000,
+    interval: float | None = None,
+    transient: int = 200,
+    t0: float = 0.0,
+    solver: RungeKutta | None = None,
+    section: int = 0,
+    continue_from: Literal["previous"] | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Chart:
+    """Lyapunov exponents at every point of a grid of parameter values, computed in threads.
+
+    The result does not depend on the number of threads, to the last bit. Ctrl-C ends the chart, not the
+    program: the rows done are returned, the others have the status ``NOT_RUN``.
+
+    Parameters
+    ----------
+    system
+        The model.
+    over
+        ``{"omega": values}`` for a line, ``{"omega": values, "e": values}`` for a grid; the last one varies
+        fastest.
+    x0, mode, t0
+        Where each row starts, as for :func:`hybrid.simulate`.
+    parameters
+        Values of the other parameters.
+    k
+        Number of exponents, 1 to n, or None for all.
+    intervals, interval, transient, solver
+        As for :func:`lyapunov.lyapunov_spectrum`.
+    section
+        Points of the stroboscopic section to keep of each row, for a bifurcation diagram.
+    continue_from
+        ``"previous"`` carries the attractor along the last axis: a row starts where the transient of the row
+        before it led, the first from ``x0``. A row that cannot start there, and one after a row whose
+        transient broke off, starts from ``x0``. The attractor is carried without tangent vectors, ahead of
+        the rows, so that these still run side by side; it costs each row a second transient.
+    threads
+        How many; by default as many as the process has cores.
+    progress
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Chart
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError). What is wrong with
+        the values of a single row is in its status instead.
+
+    Examples
+    --------
+    >>> import models
+    >>> damping = chart(models.impact_oscillator(), {"c": [0.1, 0.2, 0.4]}, (0.0, 0.0), intervals=200)
+    >>> damping
+    <Chart over c, 3 rows: 3 SUCCESS>
+    >>> bool((damping.exponents[:, 0] < 0).all())
+    True
+    """
+    axes = _axes(system, over, parameters)
+    vectors = first_vectors(system, k)
+    check_count("intervals", intervals, 1)
+    check_count("transient", transient, 1 if continue_from else 0)
+    check_count("section", section, 0)
+    if threads is not None:
+        check_count("threads", threads, 1)
+    if continue_from not in (None, "previous"):
+        raise ArgumentError(f'continue_from must be None or "previous"; got {continue_from!r}.')
+    if section and system.period is None:
+        raise ArgumentError(
+            "section= takes points once a forcing period, and the system declares none. Give HybridSystem a "
+            "period=, or leave section out."
+        )
+    if mode is not None:
+        system.mode_index(mode)
+    work = _Rows(
+        system=system,
+        x0=check_state(system, x0),
+        mode=mode,
+        t0=t0,
+        parameters=dict(parameters or {}),
+        vectors=vectors,
+        intervals=intervals,
+        interval=interval,
+        transient=transient,
+        solver=check_solver(solver),
+        points=section,
+    )
+    work.load()
+    sheet = _Sheet(axes, vectors.shape, section)
+    sweep = _Sweep(work, sheet, bool(continue_from))
+    with progress_bar(len(sheet.status), "Chart", progress, "row") as bar:
+        sweep.run(threads or _cores(), bar.update)
+    return sheet.chart(system)
+
+
+def _axes(
+    system: HybridSystem, over: Mapping[str, ArrayLike], parameters: Mapping[str, float] | None
+) -> dict[str, np.ndarray]:
+    if not isinstance(over, Mapping) or not 1 <= len(over) <= 2:
+        raise ArgumentError(f"over must map one or two parameter names to values; got {over!r}.")
+    axes = {name: np.array(values, dtype=float) for name, values in over.items()}
+    for name, values in axes.items():
+        if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
+            raise ArgumentError(
+                f"over[{name!r}] must be a list of finite numbers, one or more; got shape {values.shape}."
+            )
+        if name in (parameters or {}):
+            raise ArgumentError(f"Parameter {name!r} is given twice: in over and in parameters.")
+    if isinstance(system, HybridSystem):
+        system.parameter_values({**(parameters or {}), **{name: values[0] for name, values in axes.items()}})
+    return axes
+
+
+def _cores() -> int:
+    """Cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@attrs.frozen(eq=False)
+class _Rows:
+    """What all rows have in common, and how one is computed."""
+
+    system: HybridSystem
+    x0: np.ndarray
+    mode: str | None
+    t0: float
+    parameters: dict[str, float]
+    vectors: np.ndarray
+    intervals: int
+    interval: float | None
+    transient: int
+    solver: RungeKutta
+    points: int
+
+    def load(self) -> None:
+        """Load all kernels that rows need, before threads do so at once."""
+        load_kernels("lyapunov.kernels")
+        load_kernels("hybrid.kernels.sections")
+        driver_parts(bool(self.solver.tableau.implicit))
+
+    def start(
+        self, values: Mapping[str, float], state: np.ndarray, mode: str | None, vectors: np.ndarray | None
+    ) -> tuple[Trajectory, float]:
+        """A trajectory at its start, and the length of its intervals."""
+        trajectory = start(
+            self.system,
+            state,
+            self.t0,
+            mode=mode,
+            parameters={**self.parameters, **values},
+            solver=self.solver,
+            tangent=vectors,
+        )
+        return trajectory, interval_length(trajectory, self.interval)
+
+    def carried(
+        self, values: Mapping[str, float], state: np.ndarray, mode: str | None
+    ) -> tuple[np.ndarray, str | None]:
+        """State and mode after the transient, which is whole forcing periods so that the phase is kept."""
+        try:
+            trajectory, length = self.start(values, state, mode, None)
+        except HybridError:
+            trajectory, length = self.start(values, self.x0, self.mode, None)
+        period, clock = trajectory.model.period, trajectory.run
+        span = self.transient * length
+        cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
+        phase = clock.clock[codes.PHASE] + (0.0 if period else span)
+        code = trajectory.advance_to(
+            int(clock.count[codes.CYCLE]) + cycles, float(phase), trajectory.no_record()
+        )
+        if code != codes.DONE:
+            return self.x0, self.mode
+        # With a single mode the check that it allows the state is worth more than the name.
+        return trajectory.x, self.mode if len(self.system.modes) == 1 else trajectory.mode
+
+
+class _Sheet:
+    """The results of all rows, filled in as they are done, in any order."""
+
+    def __init__(self, axes: dict[str, np.ndarray], shape: tuple[int, ...], points: int) -> None:
+        self.axes = axes
+        self.grid = tuple(len(values) for values in axes.values())
+        rows, (n, k) = math.prod(self.grid), shape
+        self.numbers = np.full((rows, 2 * k + 2), np.nan)
+        self.x = np.full((rows, n), np.nan)
+        self.section = np.full((rows, points, n), np.nan)
+        self.mode = [""] * rows
+        self.status = [UNTOUCHED] * rows
+
+    def values(self, row: int) -> dict[str, float]:
+        """The parameter values of a row."""
+        place = np.unravel_index(row, self.grid)
+        return {name: float(axis[i]) for (name, axis), i in zip(self.axes.items(), place, strict=True)}
+
+    def fill(self, row: int, trajectory: Trajectory, spectrum: Any, points: int) -> None:
+        """Enter a spectrum, and as many points of the section as its trajectory goes on for."""
+        self.numbers[row] = np.concatenate(
+            [
+                spectrum.exponents,
+                spectrum.standard_error,
+                [spectrum.sum_rule, spectrum.jumps_per_interval],
+            ]
+        )
+        self.x[row], self.mode[row] = spectrum.x, spectrum.mode
+        if points and spectrum.status.ok:
+            states, _, _ = strobe(trajectory, points)
+            self.section[row, : len(states)] = states
+        self.status[row] = spectrum.status
+
+    def chart(self, system: HybridSystem) -> Chart:
+        """All rows in the shape of the grid."""
+        k = self.numbers.shape[1] // 2 - 1
+        exponents, errors, rest = np.split(self.numbers.reshape(*self.grid, -1), (k, 2 * k), axis=-1)
+        status = np.empty(len(self.status), dtype=object)
+        status[:] = self.status
+        return Chart(
+            system=system,
+            over=self.axes,
+            exponents=exponents,
+            standard_error=errors,
+            sum_rule=rest[..., 0],
+            jumps_per_interval=rest[..., 1],
+            x=self.x.reshape(*self.grid, -1),
+            mode=np.array(self.mode).reshape(self.grid),
+            section=self.section.reshape(*self.grid, *self.section.shape[1:]),
+            status=status.reshape(self.grid),
+        )
+
+
+class _StoppedError(Exception):
+    """A row is given up because the chart was."""
+
+
+class _Sweep:
+    """Rows in a pool of threads: kernels let go of the interpreter, so threads run side by side."""
+
+    def __init__(self, work: _Rows, sheet: _Sheet, chained: bool) -> None:
+        self.work = work
+        self.sheet = sheet
+        self.chained = chained
+        self.stop = Event()
+        self.ended: SimpleQueue[BaseException | None] = SimpleQueue()
+
+    def run(self, threads: int, done: Callable[[], object]) -> None:
+        """Compute all rows, or those until an interrupt."""
+        rows, origin = len(self.sheet.status), (self.work.x0, self.work.mode)
+        chain = self.sheet.grid[-1]
+        with ThreadPoolExecutor(threads) as self.pool:
+            try:
+                for row in range(0, rows, chain if self.chained else 1):
+                    self.pool.submit(self._guarded, self._link if self.chained else self._row, row, *origin)
+                for _ in range(rows):
+                    failure = self.ended.get()
+                    if failure is not None:
+                        raise failure
+                    done()
+            except KeyboardInterrupt:
+                pass
+            finally:
+                self.stop.set()
+
+    def update(self, n: float = 1) -> None:
+        """What a row reports its intervals to: here it may be told to stop."""
+        if self.stop.is_set():
+            raise _StoppedError
+
+    def _guarded(self, task: Callable[..., None], row: int, state: np.ndarray, mode: str | None) -> None:
+        try:
+            self.update()
+            task(row, state, mode)
+        except _StoppedError:
+            pass
+        except HybridError as refusal:
+            self.sheet.status[row] = Status(StatusCode.NOT_RUN, f"This row could not start. {refusal}")
+            self.ended.put(None)
+        except BaseException as failure:
+            self.ended.put(failure)
+
+    def _link(self, row: int, state: np.ndarray, mode: str | None) -> None:
+        """Carry the attractor through one row; the next link goes ahead of the row's own spectrum."""
+        work = self.work
+        try:
+            state, mode = work.carried(self.sheet.values(row), state, mode)
+        except HybridError:
+            state, mode = work.x0, work.mode
+        if (row + 1) % self.sheet.grid[-1]:
+            self.pool.submit(self._guarded, self._link, row + 1, state, mode)
+        self.pool.submit(self._guarded, self._row, row, state, mode)
+
+    def _row(self, row: int, state: np.ndarray, mode: str | None) -> None:
+        work = self.work
+        trajectory, length = work.start(self.sheet.values(row), state, mode, work.vectors)
+        spectrum = Estimate(trajectory, length).run(work.transient, work.intervals, False, self)
+        self.sheet.fill(row, trajectory, spectrum, work.points)
+        self.ended.put(None)

@@ -1,0 +1,137 @@
+"""Estimated global errors against true ones, from closed forms at forty digits."""
+
+import functools
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import hybrid
+import models
+from hybrid import DOP853, StatusCode, Tsit5, global_error
+from tests.cases import systems
+from tests.reference.impacts import ImpactOscillator
+
+
+def bouncing_ball(rng):
+    """Bounces up to somewhere between 30 and 80 % of the time at which they accumulate."""
+    h, g, e = rng.uniform(0.5, 2), rng.uniform(5, 10), rng.uniform(0.5, 0.9)
+    end = float(np.sqrt(2 * h / g) * (1 + e) / (1 - e) * rng.uniform(0.3, 0.8))
+    with mp.workdps(40):
+        fall = mp.sqrt(2 * mp.mpf(h) / g)
+        times, q, v, t = [], mp.mpf(h), mp.mpf(0), mp.mpf(0)
+        lands = fall
+        while lands < end:
+            times.append(lands)
+            t, q, v = lands, mp.mpf(0), (v if v else g * fall) * mp.mpf(e)
+            lands = t + 2 * v / g
+        s = end - t
+        exact = times, (q + v * s - g * s**2 / 2, v - g * s)
+    run = {"x0": (h, 0.0), "t_span": (0.0, end), "parameters": {"g": g, "e": e}}
+    return models.bouncing_ball(), run, exact
+
+
+def solvable_oscillator(rng, span=10):
+    """Chaos over ten units of time, in which errors grow a few hundred times."""
+    u0, b = rng.uniform(0.05, 0.95), rng.uniform(0.3, 0.65)
+    with mp.workdps(40):
+        rate, w, u, sign, times = mp.mpf(b), 2 * mp.pi, mp.mpf(u0), mp.mpf(1), []
+        for half in range(1, 2 * span + 1):
+            u = sign - (u - sign) * mp.exp(rate / 2)
+            if mp.sign(u) != sign:
+                times.append(mp.mpf(half) / 2)
+            sign = mp.sign(u)
+        # A quarter later the cosine is zero and the sine one.
+        grown = (u - sign) * mp.exp(rate / 4)
+        exact = times, (sign - grown * rate / w, -grown * (w + rate**2 / w))
+    run = {"x0": (u0, 0.0), "t_span": (0.0, span + 0.25), "mode": "plus", "parameters": {"b": b}}
+    return systems.solvable_oscillator(), run, exact
+
+
+@functools.cache
+def flight(x, v):
+    with mp.workdps(40):
+        return ImpactOscillator(1.0, 0.1, 1.0, 1.0, 1.0, 0.8).impacts((x, v), 6)
+
+
+def impact_oscillator(rng):
+    """Six impacts from one of four starts."""
+    x0 = [(-0.8, 0.3), (0.1, -0.9), (0.6, 0.6), (-0.2, 0.5)][rng.integers(4)]
+    exact = flight(*x0)
+    run = {"x0": x0, "t_span": (0.0, exact["t_end"])}
+    return models.impact_oscillator(), run, (exact["t"], exact["x_end"])
+
+
+def shares(case, solver, count):
+    """Share of components and jumps whose error is below its estimate, and the median of their ratio."""
+    rng = np.random.default_rng(5)
+    errors, estimates = [], []
+    for _ in range(count):
+        system, run, (times, x) = case(rng)
+        found = global_error(system, solver=solver, **run)
+        assert found.status.ok
+        assert len(found.jumps) == len(times)
+        # The difference is taken at forty digits: a time rounded to a double is not the exact one.
+        errors += [float(abs(mp.mpf(jump.t) - t)) for jump, t in zip(found.arc.jumps, times, strict=True)]
+        errors += [float(abs(mp.mpf(value) - t)) for value, t in zip(found.arc.x[-1], x, strict=True)]
+        estimates += [*found.jumps, *found.x]
+    errors, estimates = np.array(errors), np.array(estimates)
+    return (errors <= estimates).mean(), np.median(estimates / np.maximum(errors, 1e-17))
+
+
+@pytest.mark.parametrize("method", [DOP853, Tsit5])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-10])
+@pytest.mark.parametrize("case", [solvable_oscillator, impact_oscillator])
+def test_estimates_hold_the_error(case, rtol, method):
+    """Nearly always, and not by being wide."""
+    covered, ratio = shares(case, method(rtol=rtol, atol=rtol / 100), 12)
+    assert covered >= 0.97
+    assert 1.0 < ratio < 5.0
+
+
+@pytest.mark.parametrize("method", [DOP853, Tsit5])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-10, 1e-13])
+def test_estimates_hold_the_rounding_of_polynomial_flight(rtol, method):
+    """A method makes no error here: what there is, rounding has made and the bounces have magnified."""
+    covered, ratio = shares(bouncing_ball, method(rtol=rtol, atol=rtol / 100), 25)
+    assert covered >= 0.85
+    assert ratio < 50.0
+
+
+def test_a_chaotic_run_beyond_its_digits_says_so():
+    """After 80 units of time an error has grown by e^40."""
+    found = global_error(systems.solvable_oscillator(), (0.3, 0.0), (0.0, 80.25), mode="plus")
+    assert found.status.code == StatusCode.NOT_CONVERGED
+    assert "Runs at tighter tolerances agree on the first" in str(found.status)
+    assert found.jumps[0] < 1e-9
+    assert found.jumps[-1] > 0.1
+    assert found.x.max() > 0.1
+
+
+def test_a_start_on_a_guard_is_not_pushed_over_it():
+    """The block starts to stick: displaced upwards, it would be faster than the belt."""
+    system, stuck = systems.stick_slip(), (0.0, 0.2)
+    found = global_error(system, stuck, (0.0, 13.0), mode="stick")
+    assert found.status.ok
+    assert found.arc.jumps[0].transition == "release"
+    assert abs(found.arc.jumps[0].t - 5.0) <= found.jumps[0] < 1e-10
+
+
+def test_a_run_that_breaks_off_keeps_its_status():
+    found = global_error(models.bouncing_ball(), (1.0, 0.0), (0.0, 5.0))
+    assert found.status.code == StatusCode.ACCUMULATION
+    assert np.isfinite(found.jumps[0])
+
+
+def test_a_run_without_jumps():
+    """Decay: exp(-1) of the start."""
+    system = hybrid.HybridSystem(state=("x",), modes=[hybrid.Mode("only", lambda t, x, p: (-x.x,))])
+    found = global_error(system, (1.0,), (0.0, 1.0), solver=DOP853(rtol=1e-6, atol=1e-8))
+    assert abs(found.arc.x[-1, 0] - np.exp(-1)) <= found.x[0] < 1e-5
+    assert found.jumps.shape == (0,)
+    assert "in the last state, SUCCESS" in repr(found)
+
+
+def test_tolerances_that_cannot_be_tightened():
+    with pytest.raises(hybrid.ArgumentError, match="rtol must be at least 1e-13; got 1e-14"):
+        global_error(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), solver=DOP853(rtol=1e-14))

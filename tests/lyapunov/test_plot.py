@@ -1,0 +1,79 @@
+"""Charts of exponents show what they are given."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import lyapunov
+import models
+from hybrid import DOP853, ArgumentError
+from lyapunov.plot import plot_bifurcation, plot_chart, plot_exponents, plot_map
+
+SHORT = {"intervals": 20, "transient": 5, "solver": DOP853(rtol=1e-6, atol=1e-8)}
+
+
+@pytest.fixture(autouse=True)
+def _no_figures_left():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def line():
+    """Over the stop, unordered; at -1 the start is behind it."""
+    over = {"d": [1.0, 0.5, 0.8, -1.0]}
+    return lyapunov.chart(models.impact_oscillator(), over, (0.0, 0.0), k=2, section=3, **SHORT)
+
+
+@pytest.fixture(scope="module")
+def grid():
+    over = {"r": [0.7, 0.8, 0.9], "d": [1.0, -1.0]}
+    return lyapunov.chart(models.impact_oscillator(), over, (0.0, 0.0), **SHORT)
+
+
+def test_exponents_are_drawn_in_the_order_of_the_parameter(line):
+    ax = plot_exponents(plt.figure().subplots(), line)
+    zero, first, second, failed = ax.lines
+    assert set(zero.get_ydata()) == {0.0}
+    np.testing.assert_array_equal(first.get_xdata(), [-1.0, 0.5, 0.8, 1.0])
+    np.testing.assert_array_equal(first.get_ydata(), line.exponents[[3, 1, 2, 0], 0])
+    np.testing.assert_array_equal(second.get_ydata(), line.exponents[[3, 1, 2, 0], 1])
+    np.testing.assert_array_equal(failed.get_xdata(), [-1.0])
+    assert len(ax.collections) == 2
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("d", "Lyapunov exponents")
+
+
+def test_the_bifurcation_diagram_has_every_point(line):
+    ax = plot_bifurcation(plt.figure().subplots(), line, "v")
+    (points,) = ax.lines
+    np.testing.assert_array_equal(points.get_xdata(), np.repeat([1.0, 0.5, 0.8, -1.0], 3))
+    np.testing.assert_array_equal(points.get_ydata(), line.section[:, :, 1].ravel())
+    assert ax.get_ylabel() == "v"
+
+
+def test_a_map_is_white_at_zero_and_grey_where_nothing_is_known(grid):
+    ax = plot_map(plt.figure().subplots(), grid)
+    (mesh,) = ax.collections
+    assert mesh.norm(0.0) == 0.5
+    shown = mesh.get_array()
+    np.testing.assert_array_equal(shown[:, 0], grid.exponents[:, 0, 0])
+    assert shown.mask[:, 1].all()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("d", "r")
+
+
+def test_a_figure_of_each_kind(line, grid):
+    assert len(plot_chart(line).axes) == 2
+    # The map, and its colour bar.
+    assert len(plot_chart(grid).axes) == 2
+    bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
+    assert len(plot_chart(bare).axes) == 1
+    with pytest.raises(ArgumentError, match="no points of a section"):
+        plot_bifurcation(plt.figure().subplots(), bare)
+
+
+def test_lines_and_maps_want_their_kind_of_chart(line, grid):
+    ax = plt.figure().subplots()
+    with pytest.raises(ArgumentError, match="over r and d: lines need one parameter"):
+        plot_exponents(ax, grid)
+    with pytest.raises(ArgumentError, match="A map needs a chart over two parameters"):
+        plot_map(ax, line)
