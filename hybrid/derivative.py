@@ -136,7 +136,9 @@ def reference_derivative(
         return difference
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
         return difference
-    tolerance = np.where(np.isinf(difference.tolerance), np.inf, 1e-9 * (1.0 + np.abs(values)))
+    # Where a magnitude with a small factor hides its derivative the two differ by that factor.
+    tolerance = 1e-9 * (1.0 + np.abs(values)) + 2.0 * np.abs(values - difference.values)
+    tolerance[np.isinf(difference.tolerance)] = np.inf
     return Reference(t, x, values, tolerance, "complex step")
 
 
@@ -196,7 +198,7 @@ def _central_difference(
     (central, bend), (half_central, half_bend) = coarse, fine
     size = 1.0 + np.abs(half_central)
     rounding = 1e-10 * np.abs(here).reshape(-1, 1)
-    tolerance = 1e-6 * size + rounding + 4.0 * np.abs(half_central - central)
+    tolerance = 1e-7 * size + rounding + 4.0 * np.abs(half_central - central)
     # The slopes ahead and behind approach each other with the step, save where the function has a kink.
     kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size + rounding)
     tolerance[kink] = np.inf
