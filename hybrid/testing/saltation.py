@@ -43,7 +43,8 @@ def check_saltation(case: Case) -> None:
     found = [
         ("fundamental matrix of the run across the event", window.fundamental(), "simulate(tangent=True)")
     ]
-    if len(window.jumps) == 1:
+    # A run from just after a passable transition would begin with it.
+    if len(window.jumps) == 1 and jump.transition not in case.passable:
         xi = _saltation(case, jump)
         found += [
             (
@@ -293,8 +294,6 @@ class _Window:
         """Tangent maps up to just before the jump and from just after it, with a matrix between them."""
         case, jump = self.case, self.jump
         gap = 1e-6 * self.width
-        if jump.transition in case.passable:
-            discard("a run from just after the event would begin with it")
         before = case.simulate(jump.t - gap, start=(self.begin, self.start, jump.source), tangent=True)
         after = case.simulate(self.end, start=(jump.t, jump.x_plus, jump.target), tangent=True)
         rest = np.eye(len(self.start)) + gap * _field_slope(case, jump.source, jump.t, jump.x_minus)
