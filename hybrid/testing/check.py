@@ -150,7 +150,7 @@ def check_system(
 ) -> SystemReport:
     """Check on drawn runs every property that a hybrid system has, and report the smallest failure in words.
 
-    The runs are the same each time. One that chatters, grazes, reaches two guards together or hangs on the
+    The same program draws the same runs each time. One that chatters, grazes, reaches two guards together or hangs on the
     tolerances is cut short before that, or discarded; the report counts them.
 
     Parameters

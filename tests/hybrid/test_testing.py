@@ -43,6 +43,7 @@ BALL = models.bouncing_ball()
 NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC = CONTINUITY, ORDER, ELASTIC
 
 
+DOWNHILL = {"states": {"theta": (-0.3, 0.4), "omega": (0.5, 2.0)}}
 BUCK = {"states": {"v": (11.9, 12.1), "i": (0.55, 0.65), "tau": (0.0, 0.3)}, "t_span": (0.0, 8e-4)}
 
 
@@ -102,16 +103,16 @@ def rattler():
         ),
         (rattler(), {}, {NOT_ELASTIC}),
         (systems.solvable_oscillator(), {}, {NOT_CONTINUOUS, NOT_ELASTIC}),
-        (systems.rimless_wheel(), {}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (systems.rimless_wheel(), DOWNHILL, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
         (systems.jerk(), {}, {NOT_ELASTIC}),
-        (systems.constant_fields(), {}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (systems.constant_fields(), {"mode": "left"}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
         (systems.switched_linear(), {}, {SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
         (
             systems.stick_slip(),
             {"mode": "slip", "states": {"x": (-1.0, 1.0), "v": (-1.0, 0.1)}},
             {SUM_RULE, NOT_ELASTIC},
         ),
-        (systems.incline(), {}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (systems.incline(), {"mode": "fall"}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
         (
             systems.buck_converter(),
             {**BUCK, "parameters": {**systems.buck_converter().parameters, "E": (24.0, 26.0)}},
