@@ -233,6 +233,8 @@ class Case:
             arc = self.simulate(t1)
         if not is_clean(arc):
             return f"the run is not fit: {arc.status}" if not arc.status.ok else "the run grazes or chatters"
+        if not np.all(arc.jumps.transversality):
+            return "a guard is reached without speed"
         last = arc.jumps.t[-1] if len(arc.jumps) else self.t0
         if not t1 - last > 1e-6 * (t1 - self.t0):
             return "the run ends at an event"

@@ -150,8 +150,8 @@ def check_system(
 ) -> SystemReport:
     """Check on drawn runs every property that a hybrid system has, and report the smallest failure in words.
 
-    The same program draws the same runs each time. One that chatters, grazes, reaches two guards together or hangs on the
-    tolerances is cut short before that, or discarded; the report counts them.
+    The same program draws the same runs each time. One that chatters, grazes, reaches two guards together or
+    hangs on the tolerances is cut short before that, or discarded; the report counts them.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def check_system(
     t_span
         Runs lie in it; by default two forcing periods, or a span that is guessed from the fields.
     mode
-        Where runs start; by default in any mode whose guards allow the state.
+        The only one that runs start in; by default any whose guards allow the state.
     elastic
         Names of the components whose sign turns with time, or the involution of the state, of a system that
         conserves energy: it must run backwards to where it started. Left out, this is not checked.

@@ -103,7 +103,7 @@ def cases(
         Runs start in the first half of it and last a fifth of what is left or more. By default two forcing
         periods from 0, or about as long as the state needs to cross its ranges ten times.
     mode
-        Where to start; by default any mode that allows the state.
+        The only one to start in; by default any mode that allows the state.
     passable
         Names of transitions through whose guard the state may go on in the same mode, as through a membrane.
     solver
@@ -135,10 +135,10 @@ def cases(
         for _ in range(STARTS_TRIED):
             x0 = draw(state)
             case = Case(system, p, mode, x0, t0, t0 + duration, fraction, through, solver, engine)
-            allowed = [mode] if mode is not None else _allowed(case)
+            allowed = [name for name in _allowed(case) if mode in (None, name)]
             if allowed:
                 return attrs.evolve(case, mode=allowed[choice % len(allowed)])
-        return case
+        return attrs.evolve(case, mode=None)
 
     return drawn_case()
 
