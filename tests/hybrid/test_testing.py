@@ -112,7 +112,11 @@ def rattler():
             {"mode": "slip", "states": {"x": (-1.0, 1.0), "v": (-1.0, 0.1)}},
             {SUM_RULE, NOT_ELASTIC},
         ),
-        (systems.incline(), {"mode": "fall", "t_span": (0.0, 40.0)}, {SUM_RULE, NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (
+            systems.incline(),
+            {"mode": "fall", "t_span": (0.0, 40.0)},
+            {SUM_RULE, NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC},
+        ),
         (
             systems.buck_converter(),
             {**BUCK, "parameters": {**systems.buck_converter().parameters, "E": (24.0, 26.0)}},
