@@ -58,12 +58,15 @@ def check_derivative(system: HybridSystem, role: Role) -> None:
     ModelError
         If an entry is wrong, or if the column for time is missing and the function depends on time.
     """
+    values = system.parameter_values()
     for t, x in sample_points(system.dimension):
-        reference = _reference(system, role, t, x)
-        given = _evaluate(system, role.derivative, t, x)
+        reference = reference_derivative(system, role, t, x, values)
+        given = evaluate(system, role.derivative, t, x, values)
         if reference is None or given is None:
             continue
-        _compare(system, role, given.reshape(role.rows, -1), reference)
+        fault = derivative_fault(system, role, given.reshape(role.rows, -1), reference)
+        if fault is not None:
+            raise ModelError(fault)
 
 
 def complex_step_error(system: HybridSystem, role: Role) -> Exception | None:
@@ -71,14 +74,15 @@ def complex_step_error(system: HybridSystem, role: Role) -> Exception | None:
 
     It must run on complex numbers, and agree with central differences.
     """
+    values = system.parameter_values()
     for t, x in sample_points(system.dimension):
         try:
-            complex_step = _complex_step(system, role, t, x)
+            complex_step = _complex_step(system, role, t, x, values)
         except ArithmeticError:
             continue
         except Exception as error:
             return error
-        reference = _central_difference(system, role, t, x)
+        reference = _central_difference(system, role, t, x, values)
         if reference is not None and not reference.confirms(complex_step):
             return ModelError("it runs on complex numbers, but is not differentiable there")
     return None
@@ -92,7 +96,19 @@ def sample_points(n: int) -> Iterator[tuple[float, np.ndarray]]:
 
 
 @attrs.frozen(eq=False)
-class _Reference:
+class Reference:
+    """Derivative of a model function at a point, and how far to believe it.
+
+    Attributes
+    ----------
+    t, x
+        The point.
+    values, tolerance
+        ``(rows, n + 1)``; the tolerance is infinite where the function has a kink or a jump.
+    source
+        How it was found, for error texts.
+    """
+
     t: float
     x: np.ndarray
     values: np.ndarray
@@ -100,54 +116,114 @@ class _Reference:
     source: str
 
     def confirms(self, other: np.ndarray) -> bool:
-        # `not (a > b)` rather than `a <= b`: an entry that is nan says nothing against the other.
+        """Whether another derivative agrees; an entry that is nan says nothing against it."""
         return not np.any(np.abs(other - self.values) > self.tolerance)
 
 
-def _reference(system: HybridSystem, role: Role, t: float, x: np.ndarray) -> _Reference | None:
-    difference = _central_difference(system, role, t, x)
+def reference_derivative(
+    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+) -> Reference | None:
+    """Complex step where central differences confirm it, else those; None where the function is not finite.
+
+    ``parameters`` is the vector ``(m,)`` of their values.
+    """
+    difference = _central_difference(system, role, t, x, parameters)
     if difference is None:
         return None
     try:
-        values = _complex_step(system, role, t, x)
+        values = _complex_step(system, role, t, x, parameters)
     except Exception:  # whatever stops it, the central difference stands in
         return difference
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
         return difference
-    return _Reference(t, x, values, 1e-9 * (1.0 + np.abs(values)), "complex step")
+    # Where a magnitude with a small factor hides its derivative the two differ by that factor.
+    tolerance = 1e-9 * (1.0 + np.abs(values)) + 2.0 * np.abs(values - difference.values)
+    tolerance[np.isinf(difference.tolerance)] = np.inf
+    return Reference(t, x, values, tolerance, "complex step")
 
 
-def _central_difference(system: HybridSystem, role: Role, t: float, x: np.ndarray) -> _Reference | None:
-    coarse, fine = (_difference(system, role, t, x, h) for h in (DIFFERENCE_STEP, DIFFERENCE_STEP / 2))
-    size = _evaluate(system, role.function, t, x)
-    if coarse is None or fine is None or size is None:
-        return None
-    rounding = 1e-10 * np.abs(size).reshape(-1, 1)
-    tolerance = 1e-6 * (1.0 + np.abs(fine)) + rounding + 4.0 * np.abs(fine - coarse)
-    return _Reference(t, x, (4.0 * fine - coarse) / 3.0, tolerance, "central difference")
-
-
-def _difference(system: HybridSystem, role: Role, t: float, x: np.ndarray, h: float) -> np.ndarray | None:
-    columns = []
-    for shift in h * np.eye(len(x) + 1):
-        ahead = _evaluate(system, role.function, t + shift[-1], x + shift[:-1])
-        behind = _evaluate(system, role.function, t - shift[-1], x - shift[:-1])
-        if ahead is None or behind is None:
-            return None
-        columns.append((ahead - behind) / (2.0 * h))
-    return np.column_stack(columns)
-
-
-def _evaluate(system: HybridSystem, function: Callable[..., Any] | None, t: float, x: np.ndarray) -> Any:
-    """Values as a flat array, or None where they do not exist or are not finite."""
+def evaluate(
+    system: HybridSystem,
+    function: Callable[..., Any] | None,
+    t: float,
+    x: np.ndarray,
+    parameters: np.ndarray,
+) -> Any:
+    """Values of a model function as a flat array, or None where they do not exist or are not finite."""
     assert function is not None
-    p = parameter_view(system, system.parameter_values())
+    p = parameter_view(system, parameters)
     try:
         with np.errstate(all="ignore"):
             values = np.ravel(np.asarray(function(np.float64(t), state_values(system, x), p), dtype=float))
     except (ArithmeticError, ValueError):
         return None
     return values if np.all(np.isfinite(values)) else None
+
+
+def derivative_fault(system: HybridSystem, role: Role, given: np.ndarray, reference: Reference) -> str | None:
+    """What is wrong with a derivative ``(rows, n)`` or ``(rows, n + 1)``, in words; None if nothing is."""
+    n = system.dimension
+    missing_time = given.shape[1] == n
+    full = np.column_stack([given, np.zeros(role.rows)]) if missing_time else given
+    wrong = np.abs(full - reference.values) > reference.tolerance
+    if not np.any(wrong):
+        return None
+    # Look at the states first: a wrong entry there tells more than a missing column.
+    j, i = (int(k) for k in np.argwhere(wrong.T)[0])
+    place = f"t = {reference.t:.6g}, x = ({', '.join(f'{value:.6g}' for value in reference.x)})"
+    row = "" if role.size is None else f" of {system.state_names[i]}"
+    expected = f"{reference.values[i, j]:.10g}"
+    if missing_time and j == n:
+        return (
+            f"{role.derivative_title} has {n} columns, but the {role.name} depends on t: D_t{row} is "
+            f"{expected} at {place}. Return {n + 1} columns with D_t last."
+        )
+    column = (*system.state_names, "t")[j]
+    return (
+        f"{role.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
+        f"{reference.source} of the {role.name} gives {expected}. Mend it, or leave it out: it is derived."
+    )
+
+
+def _central_difference(
+    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+) -> Reference | None:
+    here = evaluate(system, role.function, t, x, parameters)
+    if here is None:
+        return None
+    coarse = _differences(system, role, t, x, parameters, here, DIFFERENCE_STEP)
+    fine = _differences(system, role, t, x, parameters, here, DIFFERENCE_STEP / 2)
+    if coarse is None or fine is None:
+        return None
+    (central, bend), (half_central, half_bend) = coarse, fine
+    size = 1.0 + np.abs(half_central)
+    rounding = 1e-10 * np.abs(here).reshape(-1, 1)
+    tolerance = 1e-7 * size + rounding + 4.0 * np.abs(half_central - central)
+    # The slopes ahead and behind approach each other with the step, save where the function has a kink.
+    kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size + rounding)
+    tolerance[kink] = np.inf
+    return Reference(t, x, (4.0 * half_central - central) / 3.0, tolerance, "central difference")
+
+
+def _differences(
+    system: HybridSystem,
+    role: Role,
+    t: float,
+    x: np.ndarray,
+    parameters: np.ndarray,
+    here: np.ndarray,
+    h: float,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Central differences, and how much the slopes ahead and behind differ."""
+    central, bend = [], []
+    for shift in h * np.eye(len(x) + 1):
+        ahead = evaluate(system, role.function, t + shift[-1], x + shift[:-1], parameters)
+        behind = evaluate(system, role.function, t - shift[-1], x - shift[:-1], parameters)
+        if ahead is None or behind is None:
+            return None
+        central.append((ahead - behind) / (2.0 * h))
+        bend.append(np.abs(ahead - 2.0 * here + behind) / h)
+    return np.column_stack(central), np.column_stack(bend)
 
 
 class _ComplexState(np.ndarray):
@@ -158,8 +234,10 @@ class _ComplexState(np.ndarray):
         return complex(value) if isinstance(value, np.complexfloating) else value
 
 
-def _complex_step(system: HybridSystem, role: Role, t: float, x: np.ndarray) -> np.ndarray:
-    p = parameter_view(system, system.parameter_values())
+def _complex_step(
+    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+) -> np.ndarray:
+    p = parameter_view(system, parameters)
     columns = []
     for shift in COMPLEX_STEP * np.eye(len(x) + 1):
         z = x + 1j * shift[:-1]
@@ -170,27 +248,3 @@ def _complex_step(system: HybridSystem, role: Role, t: float, x: np.ndarray) -> 
             values = np.asarray(role.function(complex(t, shift[-1]), state, p), dtype=complex)
         columns.append(np.ravel(values).imag / COMPLEX_STEP)
     return np.column_stack(columns)
-
-
-def _compare(system: HybridSystem, role: Role, given: np.ndarray, reference: _Reference) -> None:
-    n = system.dimension
-    missing_time = given.shape[1] == n
-    full = np.column_stack([given, np.zeros(role.rows)]) if missing_time else given
-    wrong = np.abs(full - reference.values) > reference.tolerance
-    if not np.any(wrong):
-        return
-    # Look at the states first: a wrong entry there tells more than a missing column.
-    j, i = (int(k) for k in np.argwhere(wrong.T)[0])
-    place = f"t = {reference.t:.6g}, x = ({', '.join(f'{value:.6g}' for value in reference.x)})"
-    row = "" if role.size is None else f" of {system.state_names[i]}"
-    expected = f"{reference.values[i, j]:.10g}"
-    if missing_time and j == n:
-        raise ModelError(
-            f"{role.derivative_title} has {n} columns, but the {role.name} depends on t: D_t{row} is "
-            f"{expected} at {place}. Return {n + 1} columns with D_t last."
-        )
-    column = (*system.state_names, "t")[j]
-    raise ModelError(
-        f"{role.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
-        f"{reference.source} of the {role.name} gives {expected}. Mend it, or leave it out: it is derived."
-    )

@@ -284,7 +284,7 @@ class _Shooting:
             # Every point closes after no time at all.
             status = Status(
                 StatusCode.NOT_CONVERGED,
-                f"The period shrank from {guess.period:.3g} to {orbit.period:.3g}: that is a point, no orbit.",
+                f"The period shrank from {guess.period:.3g} to {orbit.period:.3g}: a point, no orbit.",
                 "Start nearer to the orbit, with a better guess of its period.",
             )
             return attrs.evolve(orbit, status=status)

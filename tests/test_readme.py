@@ -14,6 +14,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 import hybrid
+import hybrid.testing
 import lyapunov
 import models
 
@@ -60,6 +61,10 @@ def test_the_readme_shows_what_it_says():
     assert names["swept"].ok.all()
     assert 0.0 < names["swept"].exponents.max() < 0.4
     assert "accumulate" in printed
+    assert names["report"].jumps.keys() == {"impact", "touch", "leave"}
+    assert not names["report"].never_seen
+    assert "jacobian: entry D_v of v is -0.15 at t = 0, x = (0.004, 0)" in printed
+    assert "case: parameters c = 0.15006, the others as declared" in printed
 
 
 def test_the_model_of_the_readme_is_short():
@@ -76,6 +81,7 @@ def test_the_first_model_of_a_newcomer_is_short():
 def test_the_readme_names_all_there_is():
     text = PAGES[0].read_text(encoding="utf-8")
     public = [*hybrid.__all__, *(name for name in lyapunov.__all__ if name.islower())]
+    public += hybrid.testing.__all__
     public += [name for name in vars(models) if callable(getattr(models, name))]
     public += [code.name for code in hybrid.StatusCode]
     missing = [name for name in public if f"`{name}`" not in text and f"{name}`" not in text]

@@ -1,0 +1,58 @@
+"""Properties that every hybrid system has, checked on drawn runs: for the library's models and for yours.
+
+``check_system(system)`` checks them all. Each is also a function of one :class:`Case` for tests of your own,
+``@given(cases(system))``.
+"""
+
+from hybrid.testing.case import Case, Engine, PropertyError, Run, discard
+from hybrid.testing.check import PropertyReport, SystemReport, check_system
+from hybrid.testing.derivatives import check_derivatives
+from hybrid.testing.events import check_jumps, check_sides
+from hybrid.testing.invariance import (
+    check_cut,
+    check_elastic,
+    check_names,
+    check_order,
+    check_samples,
+    check_scale,
+    check_split,
+)
+from hybrid.testing.saltation import (
+    check_continuity,
+    check_extension,
+    check_flow_direction,
+    check_saltation,
+    check_sum_rule,
+)
+from hybrid.testing.small import small_systems
+from hybrid.testing.strategies import cases, parameters, states
+
+__all__ = [
+    "Case",
+    "Engine",
+    "PropertyError",
+    "PropertyReport",
+    "Run",
+    "SystemReport",
+    "cases",
+    "check_continuity",
+    "check_cut",
+    "check_derivatives",
+    "check_elastic",
+    "check_extension",
+    "check_flow_direction",
+    "check_jumps",
+    "check_names",
+    "check_order",
+    "check_saltation",
+    "check_samples",
+    "check_scale",
+    "check_sides",
+    "check_split",
+    "check_sum_rule",
+    "check_system",
+    "discard",
+    "parameters",
+    "small_systems",
+    "states",
+]

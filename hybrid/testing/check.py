@@ -1,0 +1,314 @@
+"""Every property of one system, in one call."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import attrs
+import numpy as np
+from hypothesis import HealthCheck, Phase, Verbosity, given
+from hypothesis import settings as hypothesis_settings
+from hypothesis.errors import Unsatisfiable, UnsatisfiedAssumption
+from hypothesis.strategies import SearchStrategy
+
+from hybrid.run import check_count
+from hybrid.solvers import RungeKutta
+from hybrid.system import HybridSystem
+from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError
+from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
+from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
+from hybrid.testing.invariance import (
+    CUT,
+    ELASTIC,
+    NAMES,
+    ORDER,
+    SAMPLES,
+    SCALE,
+    SPLIT,
+    check_cut,
+    check_elastic,
+    check_names,
+    check_order,
+    check_samples,
+    check_scale,
+    check_split,
+)
+from hybrid.testing.saltation import (
+    CONTINUITY,
+    EXTENSION,
+    FLOW_DIRECTION,
+    SALTATION,
+    SUM_RULE,
+    check_continuity,
+    check_extension,
+    check_flow_direction,
+    check_saltation,
+    check_sum_rule,
+)
+from hybrid.testing.strategies import Ranges, cases
+
+# A property that was judged on fewer of its examples than this was hardly checked.
+HARDLY = 0.1
+
+
+@attrs.frozen
+class PropertyReport:
+    """What became of one property.
+
+    Attributes
+    ----------
+    name
+        The property, as a sentence.
+    examples
+        How many it was judged on, and held.
+    discarded
+        How many examples could not be judged, by reason.
+    """
+
+    name: str
+    examples: int
+    discarded: Counter[str]
+
+    @property
+    def checked(self) -> bool:
+        """Whether there was any example to judge it on."""
+        return self.examples > 0
+
+    def __str__(self) -> str:
+        lost = sum(self.discarded.values())
+        if not lost:
+            return f"{self.name}: {self.examples} examples."
+        if not self.checked:
+            return f"NOT CHECKED: {self.name}: {_most_common(self.discarded)}."
+        why = f"{lost} discarded ({_most_common(self.discarded)})"
+        hardly = "HARDLY CHECKED: " if self.examples < HARDLY * (self.examples + lost) else ""
+        return f"{hardly}{self.name}: {self.examples} examples, {why}."
+
+
+@attrs.frozen
+class SystemReport:
+    """What :func:`check_system` looked at; everything in it held.
+
+    Attributes
+    ----------
+    properties
+        One :class:`PropertyReport` each.
+    unfit
+        How many runs could not be judged, by reason; only derivatives were looked at.
+    jumps
+        How often each transition was taken, by name.
+    visits
+        How often each mode was entered or started in, by name.
+    """
+
+    name: str
+    properties: tuple[PropertyReport, ...]
+    unfit: Counter[str]
+    jumps: Counter[str]
+    visits: Counter[str]
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Properties that no example could be judged on."""
+        return tuple(found.name for found in self.properties if not found.checked)
+
+    @property
+    def never_seen(self) -> tuple[str, ...]:
+        """Transitions that were never taken and modes that no run was in."""
+        return tuple(name for count in (self.jumps, self.visits) for name in count if not count[name])
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: no property failed."]
+        if self.unfit:
+            lines.append(f"- {self.unfit.total()} runs could not be judged ({_most_common(self.unfit)}).")
+        lines += [f"- {found}" for found in self.properties]
+        if self.never_seen:
+            lines.append(f"- Never seen: {', '.join(self.never_seen)}. Give ranges that lead there.")
+        return "\n".join(lines)
+
+
+def _most_common(reasons: Counter[str]) -> str:
+    reason, most = reasons.most_common(1)[0]
+    share = "" if most == reasons.total() else f"{most} of them: "
+    return f"{share}{reason.rstrip('.')}"
+
+
+def check_system(
+    system: HybridSystem,
+    *,
+    states: Ranges | SearchStrategy[Any] | None = None,
+    parameters: Ranges | SearchStrategy[Any] | None = None,
+    t_span: tuple[float, float] | None = None,
+    mode: str | None = None,
+    elastic: Iterable[str] | Callable[[np.ndarray], np.ndarray] | None = None,
+    passable: Iterable[str] = (),
+    examples: int = 50,
+    solver: RungeKutta = TIGHT,
+    engine: Engine = LIBRARY,
+) -> SystemReport:
+    """Check on drawn runs every property that a hybrid system has, and report the smallest failure in words.
+
+    The same program draws the same runs each time. One that chatters, grazes, reaches two guards together or
+    hangs on the tolerances is cut short before that, or discarded; the report counts them.
+
+    Parameters
+    ----------
+    system
+        The model.
+    states, parameters
+        Ranges ``(low, high)``, numbers or strategies by name. States are drawn from -2 to 2, parameters from
+        within a fifth of their values, where they are left out.
+    t_span
+        Runs lie in it; by default two forcing periods, or a span that is guessed from the fields.
+    mode
+        The only one that runs start in; by default any whose guards allow the state.
+    elastic
+        Names of the components whose sign turns with time, or the involution of the state, of a system that
+        conserves energy: it must run backwards to where it started. Left out, this is not checked.
+    passable
+        Names of transitions through whose guards the state may go on in the same mode.
+    examples
+        How many runs are drawn.
+    solver
+        Method and tolerances, which should be tight.
+    engine
+        What solves and linearises.
+
+    Returns
+    -------
+    SystemReport
+        Which properties were checked, on how many examples, and why others could not be judged.
+
+    Raises
+    ------
+    PropertyError
+        If a property fails, or if no run at all could be judged.
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Examples
+    --------
+    >>> import models
+    >>> report = check_system(models.bouncing_ball(), examples=5)
+    >>> report.unchecked
+    ('The saltation matrix is the identity ...', 'The order in which ...', 'An elastic system ...')
+    """
+    check_count("examples", examples, 1)
+    properties: dict[str, Callable[[Case], None]] = {
+        DERIVATIVES: check_derivatives,
+        JUMPS: check_jumps,
+        SIDES: check_sides,
+        SALTATION: check_saltation,
+        FLOW_DIRECTION: check_flow_direction,
+        CONTINUITY: check_continuity,
+        EXTENSION: check_extension,
+        SUM_RULE: check_sum_rule,
+        SPLIT: check_split,
+        SAMPLES: check_samples,
+        NAMES: check_names,
+        ORDER: check_order,
+        SCALE: check_scale,
+        CUT: check_cut,
+    }
+    if elastic is not None:
+        flip = elastic if callable(elastic) else tuple(elastic)
+        properties[ELASTIC] = lambda case: check_elastic(case, flip)
+    tally = _Tally(system, properties)
+    drawn = cases(
+        system,
+        states=states,
+        parameters=parameters,
+        t_span=t_span,
+        mode=mode,
+        passable=passable,
+        solver=solver,
+        engine=engine,
+    )
+    _search(drawn, tally.judge, examples)
+    return tally.report(elastic is None)
+
+
+def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int) -> None:
+    """Judge drawn cases; the smallest one that fails is the one that is told."""
+
+    @hypothesis_settings(
+        max_examples=examples,
+        database=None,
+        deadline=None,
+        derandomize=True,
+        phases=(Phase.generate, Phase.shrink),
+        report_multiple_bugs=False,
+        suppress_health_check=list(HealthCheck),
+        verbosity=Verbosity.quiet,
+    )
+    @given(drawn)
+    def search(case: Case) -> None:
+        judge(case)
+
+    failure = None
+    try:
+        search()
+    except PropertyError as error:
+        failure = str(error)
+    except Unsatisfiable:
+        pass
+    if failure is not None:
+        raise PropertyError(failure)
+
+
+class _Tally:
+    """Judges cases by every property until one fails, from then on by that one alone, which then shrinks."""
+
+    def __init__(self, system: HybridSystem, properties: dict[str, Callable[[Case], None]]) -> None:
+        self.system = system
+        self.properties = properties
+        self.held = Counter(dict.fromkeys(properties, 0))
+        self.discarded: dict[str, Counter[str]] = {name: Counter() for name in properties}
+        self.jumps = Counter(dict.fromkeys(system.transition_names, 0))
+        self.visits = Counter(dict.fromkeys(system.mode_names, 0))
+        self.unfit: Counter[str] = Counter()
+        self.fit = 0
+        self.failed: str | None = None
+
+    def judge(self, case: Case) -> None:
+        if self.failed:
+            names = [self.failed]
+        else:
+            names = list(self.properties) if self._is_fit(case) else [DERIVATIVES]
+        for name in names:
+            try:
+                self.properties[name](case)
+            except UnsatisfiedAssumption as reason:
+                self.discarded[name][str(reason)] += 1
+            except PropertyError:
+                self.failed = name
+                raise
+            else:
+                self.held[name] += 1
+
+    def _is_fit(self, case: Case) -> bool:
+        try:
+            arc = case.run.arc
+        except UnsatisfiedAssumption as reason:
+            self.unfit[str(reason)] += 1
+            return False
+        self.fit += 1
+        self.jumps.update(jump.transition for jump in arc.jumps)
+        self.visits.update([str(arc.mode[0]), *(jump.target for jump in arc.jumps)])
+        return True
+
+    def report(self, without_elastic: bool) -> SystemReport:
+        name = self.system.name or "The system"
+        if not self.fit:
+            reasons = "".join(f"\n  {count} times: {why}" for why, count in self.unfit.most_common(3))
+            raise PropertyError(
+                f"{name}: none of {self.unfit.total()} runs could be judged.{reasons}\n"
+                "  likely: ranges of states that no mode allows, a guard with the wrong direction, or a span "
+                "of time that does not suit the model. Give states=, t_span= or mode=."
+            )
+        found = [PropertyReport(name, self.held[name], self.discarded[name]) for name in self.properties]
+        if without_elastic:
+            found.append(PropertyReport(ELASTIC, 0, Counter({"elastic= is not given": 1})))
+        return SystemReport(name, tuple(found), self.unfit, self.jumps, self.visits)

@@ -1,0 +1,63 @@
+"""Derivatives agree however they were found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hybrid.compile import compile_system
+from hybrid.derivative import derivative_fault, evaluate, reference_derivative
+from hybrid.roles import Role, field_role, guard_role, reset_role
+from hybrid.system import HybridSystem
+from hybrid.testing.case import Case, discard
+
+DERIVATIVES = "Given, traced and numerical derivatives agree"
+
+
+def check_derivatives(case: Case) -> None:
+    """Given and traced derivatives equal the complex step, or central differences where there is none.
+
+    Every field, guard and reset is looked at, at the start of the case; kinks are passed over, and points at
+    which a function is not finite.
+
+    Raises
+    ------
+    PropertyError
+        If an entry is wrong.
+    """
+    compile_system(case.system)
+    x, seen = np.array(case.x0), 0
+    for index, role in indexed_roles(case.system):
+        reference = reference_derivative(case.system, role, case.t0, x, case.values)
+        if reference is None:
+            continue
+        seen += 1
+        used = case.engine.derivative(case.system, role, index, case.t0, x, case.values)
+        found = {"the library's derivative": np.where(np.isfinite(used), used, np.inf)}
+        if role.derivative is not None:
+            given = evaluate(case.system, role.derivative, case.t0, x, case.values)
+            if given is not None:
+                found = {"the derivative given": given.reshape(role.rows, -1), **found}
+        for whose, matrix in found.items():
+            fault = derivative_fault(case.system, role, matrix, reference)
+            if fault is not None:
+                case.fail(
+                    DERIVATIVES,
+                    f"{whose}: {fault}",
+                    hint="a slip in the derivative; or a number in it where the function has a parameter. "
+                    "Leave it out: it is derived.",
+                )
+    if not seen:
+        discard("no model function is finite at the start")
+
+
+def indexed_roles(system: HybridSystem) -> Iterator[tuple[int, Role]]:
+    """Every model function with the index of its mode or transition."""
+    for index, mode in enumerate(system.modes):
+        yield index, field_role(system, mode)
+    for index, transition in enumerate(system.transitions):
+        yield index, guard_role(transition)
+        reset = reset_role(system, transition)
+        if reset is not None:
+            yield index, reset

@@ -1,0 +1,106 @@
+"""What every event of a run must satisfy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.roles import guard_role
+from hybrid.testing.case import Case, discard, guard_beyond
+from hybrid.testing.saltation import event_told
+
+JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
+SIDES = "A mode ends where its guards say"
+
+# Where a run is looked at between its events.
+INNER = np.linspace(0.02, 0.98, 7)
+
+
+def check_jumps(case: Case) -> None:
+    """At each jump the guard is zero and crosses in its direction, and the state after is the reset's.
+
+    Raises
+    ------
+    PropertyError
+        If one of these is not so.
+    """
+    run = case.run
+    if not len(run.arc.jumps):
+        discard("no event on the run")
+    mode, previous = case.mode, -np.inf
+    for jump in run.arc.jumps:
+        transition = case.transition(jump)
+        told = event_told(case, jump)
+        if jump.source != mode:
+            case.fail(JUMPS, told, f"the mode was {mode!r}", hint="events that fire out of turn.")
+        mode = jump.target
+        slope = case.slope(guard_role(transition), jump.transition, jump.t, jump.x_minus)
+        value = float(case.evaluate(transition.guard.function, jump.t, jump.x_minus)[0])
+        band = np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1] * jump.t)
+        # What the guard passes in the time to which that of an event can be known.
+        band += abs(jump.transversality) * (run.t1 - case.t0)
+        # A reset may land beyond a guard, which then fires at the same instant.
+        landed = jump.t == previous and value * transition.guard.direction > 0.0
+        previous = jump.t
+        if not (landed or abs(value) <= 1e-9 * band):
+            case.fail(
+                JUMPS, told, f"the guard is {value:.6g}, not zero", hint="an event that is late or early."
+            )
+        if not landed and jump.transversality * transition.guard.direction < 0.0:
+            case.fail(
+                JUMPS,
+                told,
+                f"the guard's speed is {jump.transversality:.6g}, its direction {transition.guard.direction}",
+                hint="a guard that fires in the wrong direction.",
+            )
+        reset = transition.reset
+        wanted = jump.x_minus if reset is None else case.evaluate(reset.function, jump.t, jump.x_minus)
+        if not np.all(np.abs(jump.x_plus - wanted) <= 1e-12 * (np.abs(wanted) + run.scale)):
+            case.fail(
+                JUMPS,
+                told,
+                f"wanted {case.state_told(wanted)} after it, which is the reset",
+                hint="a state that is moved after the reset (a nudge off the guard).",
+            )
+
+
+def check_sides(case: Case) -> None:
+    """Between events no guard of the mode is beyond zero in its direction, those of the passable ones apart.
+
+    Raises
+    ------
+    PropertyError
+        If a mode goes on beyond a guard that ends it.
+    """
+    run = case.run
+    guards = [
+        transition
+        for transition in case.system.transitions
+        if transition.guard.direction and not transition.is_marker and transition.name not in case.passable
+    ]
+    if not guards:
+        discard("no guard has a direction")
+    times, mode = [case.t0, *run.arc.jumps.t, run.t1], case.mode
+    for j in range(len(times) - 1):
+        if j > 0:
+            mode = run.arc.jumps[j - 1].target
+        length = times[j + 1] - times[j]
+        if not length > 1e-9 * (run.t1 - case.t0):
+            continue
+        for t in times[j] + length * INNER:
+            x = run.arc(t)
+            for transition in (guard for guard in guards if guard.source == mode):
+                beyond = guard_beyond(case, transition, t, x)
+                if not beyond > 0.0:
+                    continue
+                slope = case.slope(guard_role(transition), transition.name, t, x)
+                if not beyond > 1e-7 * float(np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1]) * length):
+                    continue
+                side = "above" if transition.guard.direction > 0 else "below"
+                case.fail(
+                    SIDES,
+                    f"guard of {transition.name!r}, which ends mode {mode!r} where it goes {side} zero: "
+                    f"{beyond * transition.guard.direction:.6g} at t = {t:.10g}, {case.state_told(x)}",
+                    event_told(case, run.arc.jumps[j - 1]) if j else "no event before",
+                    hint="a guard with the wrong direction, or a reset with the wrong sign that leaves the "
+                    "state beyond it; or a transition that may be passed: say so with passable=.",
+                )

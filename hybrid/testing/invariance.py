@@ -1,0 +1,254 @@
+"""What must not change when a system is written or run differently."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from hybrid.arc import HybridArc
+from hybrid.compile import compile_system
+from hybrid.errors import ArgumentError, unknown_name
+from hybrid.testing.case import Case, Run, discard, matrix_told
+from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
+
+CUT = "Cutting a flow by an identity transition changes nothing"
+NAMES = "The names of modes and transitions do not matter"
+ORDER = "The order in which transitions are listed does not matter"
+SCALE = "A positive factor of the guards does not matter"
+SPLIT = "A run that is split and resumed goes on as if it had not been"
+SAMPLES = "Samples, also exactly at an event, change nothing and are the states after it"
+ELASTIC = "An elastic system runs backwards to where it started"
+
+# Runs are compared to this, relative to the size of the state, where rounding is all they differ by.
+ROUNDING = 1e-9
+
+
+def check_cut(case: Case) -> None:
+    """A plane across the flow, at which nothing happens, changes neither the run nor its tangents.
+
+    Raises
+    ------
+    PropertyError
+        If the run changes, or a saltation matrix at the plane is not the identity.
+    """
+    if case.passable:
+        discard("in a second copy of a mode a passable transition would fire anew")
+    run = case.run
+    times = [case.t0, *run.arc.jumps.t, run.t1]
+    j = int(case.fraction * (len(times) - 1))
+    t = times[j] + case.fraction * (times[j + 1] - times[j])
+    x, mode = run.arc(t), _mode_after(case, j)
+    speed = case.evaluate(case.system.modes[case.system.mode_index(mode)].field, t, x) / run.scale
+    if not speed.any():
+        discard("the state rests where it would be cut")
+    normal = speed / np.linalg.norm(speed) / run.scale
+    offset = float(normal @ x)
+    height = float(normal @ np.array(case.x0)) - offset
+    if abs(height) < 1e-3:
+        discard("the start lies on the cut")
+    assert case.mode is not None
+    start = case.mode + AGAIN if height > 0.0 else case.mode
+    variant = altered(case.system)
+    arc = case.simulate(
+        run.t1,
+        system=variant.system,
+        start=(case.t0, case.x0, start),
+        extra=variant.cut(normal, offset),
+    )
+    if arc.grazings:
+        discard("the run touches the cut")
+    cuts = [jump for jump in arc.jumps if jump.transition in variant.cuts]
+    if not cuts:
+        case.fail(CUT, f"the cut at t = {t:.10g} was never crossed", hint="events that are missed.")
+    for cut in cuts:
+        if not np.all(
+            np.abs(cut.saltation - np.eye(len(normal))) * run.scale / run.scale[:, None] <= ROUNDING
+        ):
+            case.fail(
+                CUT,
+                f"wanted the identity as saltation matrix at the cut, t = {cut.t:.10g}",
+                f"got {matrix_told(cut.saltation)}",
+                hint="a term of the saltation matrix that does not vanish with the jump of the field.",
+            )
+    fired = [variant.original[name] for name in _fired(arc) if name not in variant.cuts]
+    hint = "events that act on what they should not."
+    _compare(case, CUT, arc, fired, variant.original[str(arc.mode[-1])], hint)
+
+
+def check_names(case: Case) -> None:
+    """Other names of modes and transitions lead to the same run.
+
+    Raises
+    ------
+    PropertyError
+        If the run changes.
+    """
+    run, system = case.run, renamed(case.system)
+    assert case.mode is not None
+    start = (case.t0, case.x0, new_name(case.system.mode_names, case.mode))
+    arc = case.simulate(run.t1, system=system, start=start)
+    fired = [name.split(" ", 1)[1] for name in _fired(arc)]
+    _compare(case, NAMES, arc, fired, str(arc.mode[-1]).split(" ", 1)[1], "something looks modes up by name.")
+
+
+def check_order(case: Case) -> None:
+    """The opposite order of the transitions leads to the same run, unless two guards are reached together.
+
+    Raises
+    ------
+    PropertyError
+        If the run changes.
+    """
+    if len(case.system.transitions) < 2:
+        discard("there are no two transitions")
+    arc = case.simulate(case.run.t1, system=reordered(case.system))
+    hint = "the first guard listed wins, not the first one reached; or two guards overlap."
+    _compare(case, ORDER, arc, _fired(arc), str(arc.mode[-1]), hint)
+
+
+def check_scale(case: Case) -> None:
+    """Guards multiplied by a positive number, from 1/1000 to 1000, lead to the same run.
+
+    Raises
+    ------
+    PropertyError
+        If the run changes.
+    """
+    variant = altered(case.system)
+    if variant.resets_stay:
+        discard("a model function cannot be traced, and so cannot be changed")
+    factor = 10.0 ** (6.0 * case.fraction - 3.0)
+    arc = case.simulate(case.run.t1, system=variant.system, extra=variant.scaled(factor))
+    hint = f"events found by an absolute tolerance on the guard; here all guards are times {factor:.3g}."
+    _compare(case, SCALE, arc, _fired(arc), str(arc.mode[-1]), hint)
+
+
+def check_split(case: Case) -> None:
+    """A run that ends anywhere, also at an event, and goes on from there is the run in one piece.
+
+    Not at the event of a passable transition: the state just after it does not show that it has happened.
+
+    Raises
+    ------
+    PropertyError
+        If an event is lost or fires twice, or the end changes.
+    """
+    run = case.run
+    times = [case.t0 + case.fraction * (run.t1 - case.t0)]
+    if len(run.arc.jumps) and case.the_jump().transition not in case.passable:
+        times.append(case.the_jump().t)
+    for t in times:
+        first = case.simulate(t)
+        second = case.simulate(run.t1, start=(t, first.x[-1], str(first.mode[-1])))
+        fired = [*_fired(first), *_fired(second)]
+        hint = f"events that fire twice or are lost near a start; the run was split at t = {t:.17g}."
+        _compare(case, SPLIT, second, fired, str(second.mode[-1]), hint)
+
+
+def check_samples(case: Case) -> None:
+    """Samples change neither the events nor the end, and at an event they are the state after it.
+
+    Raises
+    ------
+    PropertyError
+        If they do not.
+    """
+    run = case.run
+    jumps = {jump.t: jump.x_plus for jump in run.arc.jumps}
+    times = np.unique([case.t0 + case.fraction * (run.t1 - case.t0), *jumps, run.t1])
+    arc = case.simulate(run.t1, samples=times)
+    hint = "samples that steer the steps, or are taken on the wrong side of an event."
+    _compare(case, SAMPLES, arc, _fired(arc), str(arc.mode[-1]), hint)
+    for t, x in zip(arc.t, arc.x, strict=True):
+        wanted = jumps.get(float(t), run.arc(t))
+        if not np.all(np.abs(x - wanted) <= run.tolerance):
+            case.fail(
+                SAMPLES,
+                f"wanted {case.state_told(wanted)} at t = {t:.17g}",
+                f"got {case.state_told(x)}",
+                hint=hint,
+            )
+
+
+def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.ndarray]) -> None:
+    """An autonomous elastic system, its velocities turned round at the end, runs back to its start.
+
+    Parameters
+    ----------
+    case
+        With parameters at which the system is elastic.
+    flip
+        Names of the components that change their sign with time, or the involution of the state.
+
+    Raises
+    ------
+    PropertyError
+        If the run does not come back.
+    ArgumentError
+        If there is no such component.
+    """
+    turned = flip if callable(flip) else _Flip(case, tuple(flip))
+    if not all(compile_system(case.system).emitted.autonomous):
+        discard("a field depends on time")
+    run = case.run
+    start = (case.t0, turned(run.arc.x[-1]), str(run.arc.mode[-1]))
+    arc = case.simulate(run.t1, start=start)
+    other = case.simulate(run.t1, start=start, solver=case.looser)
+    if not arc.status.ok or len(other.jumps) != len(arc.jumps):
+        discard("the events of the run backwards hang on the tolerances")
+    back = turned(arc.x[-1])
+    error = np.abs(turned(other.x[-1]) - back)
+    if not np.all(np.abs(back - np.array(case.x0)) <= run.tolerance + 100.0 * error):
+        case.fail(
+            ELASTIC,
+            f"wanted {case.state_told(case.x0)} at the end of the run backwards",
+            f"got {case.state_told(back)}, after {len(run.arc.jumps)} events there and {len(arc.jumps)} back",
+            hint="a reset that loses energy or moves the state off the guard (a nudge), or damping.",
+        )
+
+
+class _Flip:
+    """Changes the sign of some components."""
+
+    def __init__(self, case: Case, names: tuple[str, ...]) -> None:
+        known = case.system.state_names
+        for name in names:
+            if name not in known:
+                raise ArgumentError(unknown_name("State component", name, known, "State components"))
+        self.signs = np.array([-1.0 if name in names else 1.0 for name in known])
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        return self.signs * x
+
+
+def _mode_after(case: Case, j: int) -> str:
+    """Mode of the run after ``j`` jumps."""
+    assert case.mode is not None
+    return case.mode if j == 0 else case.run.arc.jumps[j - 1].target
+
+
+def _fired(arc: HybridArc) -> list[str]:
+    return [jump.transition for jump in arc.jumps]
+
+
+def _compare(case: Case, property_name: str, arc: HybridArc, fired: list[str], mode: str, hint: str) -> None:
+    """Fail unless a run has the events, the mode and the state at the end that the run of the case has."""
+    run: Run = case.run
+    wanted = _fired(run.arc)
+    end = run.arc.x[-1]
+    same = Counter(fired) == Counter(wanted) and mode == run.arc.mode[-1]
+    if same and arc.status.ok and np.all(np.abs(arc.x[-1] - end) <= run.tolerance):
+        return
+    case.fail(
+        property_name,
+        f"wanted {case.state_told(end)} in mode {str(run.arc.mode[-1])!r} after {_list_told(wanted)}",
+        f"got {case.state_told(arc.x[-1])} in mode {mode!r} after {_list_told(fired)}; "
+        f"{arc.status.code.name}",
+        hint=hint,
+    )
+
+
+def _list_told(names: list[str]) -> str:
+    return ", ".join(names) if names else "no event"

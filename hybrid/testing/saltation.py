@@ -1,0 +1,343 @@
+"""What saltation matrices and tangent vectors must satisfy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.arc import Jump
+from hybrid.compile import compile_system
+from hybrid.errors import ArgumentError
+from hybrid.roles import field_role, guard_role, reset_role
+from hybrid.testing.case import Case, discard, matrix_told
+from hybrid.testing.variants import altered
+
+SALTATION = "The saltation matrix is the derivative of the flow across the event"
+EXTENSION = "The saltation matrix does not depend on how the reset goes on off the guard"
+CONTINUITY = "The saltation matrix is the identity where field and state are continuous"
+FLOW_DIRECTION = "The saltation matrix takes the field before the event to the field after it"
+SUM_RULE = "The exponents sum to the divergence of the fields and the determinants of the jumps"
+
+# Displacements of the finite differences, relative to the size of the state.
+STEP = 1e-4
+GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+def check_saltation(case: Case) -> None:
+    """Saltation and fundamental matrix equal central differences of the flow from before an event to after.
+
+    The differences are extrapolated (Richardson); how well they converge, and how fast the guard is crossed,
+    sets the tolerance.
+
+    Raises
+    ------
+    PropertyError
+        If an entry is wrong.
+    """
+    jump = case.the_jump()
+    window = _Window(case, jump)
+    differences, tolerance = window.differences()
+    hint = (
+        "a saltation matrix without its rank-one term, with a sign or a time term missing; or a derivative "
+        "given by hand."
+    )
+    found = [
+        ("fundamental matrix of the run across the event", window.fundamental(), "simulate(tangent=True)")
+    ]
+    # A run from just after a passable transition would begin with it.
+    if len(window.jumps) == 1 and jump.transition not in case.passable:
+        xi = _saltation(case, jump)
+        found += [
+            (
+                "saltation matrix, between the tangent maps before and after",
+                window.through(xi),
+                matrix_told(xi),
+            ),
+            ("saltation matrix of the jump", window.through(jump.saltation), matrix_told(jump.saltation)),
+        ]
+    for name, tangents, source in found:
+        if not np.all(np.abs(window.scaled(tangents) - window.scaled(differences)) <= tolerance):
+            case.fail(
+                SALTATION,
+                *(event_told(case, jump) for jump in window.jumps),
+                f"{name}: {source}",
+                f"wanted {matrix_told(differences)}, finite differences of the flow",
+                f"got {matrix_told(tangents)}",
+                hint=hint,
+            )
+
+
+def check_extension(case: Case) -> None:
+    """Adding a multiple of the guard to a reset, which is nothing on the guard, changes no saltation matrix.
+
+    Raises
+    ------
+    PropertyError
+        If one changes.
+    """
+    jump = case.the_jump()
+    transition = case.transition(jump)
+    if transition.is_marker:
+        discard("the event only marks a crossing")
+    variant = altered(case.system)
+    if variant.resets_stay:
+        discard("a model function cannot be traced, and so cannot be changed")
+    slope = _guard_slope(case, jump)
+    x_scale = case.run.scale
+    size = np.sum(np.abs(slope) * x_scale)
+    if not size > 0.0:
+        discard("the guard does not depend on the state")
+    signs = np.where(np.arange(len(x_scale)) % 2, -1.0, 1.0)
+    added = signs * (0.5 + case.fraction) * x_scale / size
+    wanted = _saltation(case, jump)
+    got = case.engine.saltation_matrix(
+        variant.system,
+        jump.transition,
+        jump.t,
+        jump.x_minus,
+        {**case.parameters, **variant.extension(added)},
+    )
+    field = case.evaluate(case.system.modes[case.system.mode_index(jump.source)].field, jump.t, jump.x_minus)
+    # Terms of this size cancel.
+    terms = np.abs(wanted) + np.abs(np.outer(added, slope)) * (
+        1.0 + np.abs(slope) @ np.abs(field) / abs(jump.transversality)
+    )
+    if not np.all(np.abs(got - wanted) <= 1e-9 * (terms + x_scale[:, None] / x_scale)):
+        case.fail(
+            EXTENSION,
+            event_told(case, jump),
+            f"wanted {matrix_told(wanted)}",
+            f"got {matrix_told(got)} with {matrix_told(added)} times the guard added to the reset",
+            hint="a saltation matrix that is only the derivative of the reset, or lacks a time term.",
+        )
+
+
+def check_continuity(case: Case) -> None:
+    """The saltation matrix is the identity where there is no reset and both fields are the same.
+
+    Raises
+    ------
+    PropertyError
+        If it is not.
+    """
+    looked_at = 0
+    for jump in case.run.arc.jumps:
+        if case.transition(jump).reset is not None:
+            continue
+        before, after = _fields(case, jump)
+        slope = np.abs(_guard_slope(case, jump))
+        kick = np.abs(after - before)[:, None] * slope / abs(jump.transversality)
+        if not np.all(np.abs(after - before) <= 1e-9 * (np.abs(before) + np.abs(after))):
+            continue
+        looked_at += 1
+        for xi in (_saltation(case, jump), jump.saltation):
+            if not np.all(np.abs(xi - np.eye(len(xi))) <= 1e-9 + 2.0 * kick):
+                case.fail(
+                    CONTINUITY,
+                    event_told(case, jump),
+                    f"got {matrix_told(xi)}",
+                    hint="a term of the saltation matrix that does not vanish with the jump of the field.",
+                )
+    if not looked_at:
+        discard("field or state jump at every event")
+
+
+def check_flow_direction(case: Case) -> None:
+    """``f_plus = Xi f_minus`` at every event whose guard and reset do not depend on time.
+
+    Raises
+    ------
+    PropertyError
+        If it is not so.
+    """
+    looked_at = 0
+    for jump in case.run.arc.jumps:
+        transition = case.transition(jump)
+        roles = [guard_role(transition), reset_role(case.system, transition)]
+        slopes = [
+            case.slope(role, jump.transition, jump.t, jump.x_minus) for role in roles if role is not None
+        ]
+        if any(np.any(slope[:, -1] != 0.0) for slope in slopes):
+            continue
+        looked_at += 1
+        before, after = _fields(case, jump)
+        for xi in (_saltation(case, jump), jump.saltation):
+            got, terms = xi @ before, np.abs(xi) @ np.abs(before) + np.abs(after)
+            if not np.all(np.abs(got - after) <= 1e-9 * (terms + terms.max())):
+                case.fail(
+                    FLOW_DIRECTION,
+                    event_told(case, jump),
+                    f"wanted {matrix_told(after)}, the field after",
+                    f"got {matrix_told(got)}, saltation matrix {matrix_told(xi)} times the field before",
+                    hint="a rank-one term of the saltation matrix that is missing or has the wrong sign.",
+                )
+    if not looked_at:
+        discard("no event, or one whose guard or reset depends on time")
+
+
+def check_sum_rule(case: Case) -> None:
+    """``log|det Phi|`` is the integral of ``div f`` and the sum of ``log|det Xi|`` along the run (Liouville).
+
+    Divided by the length of a long run these are the sum of the exponents and what it must be.
+
+    Raises
+    ------
+    PropertyError
+        If they differ.
+    """
+    run = case.run
+    determinants = [np.linalg.det(jump.saltation) for jump in run.arc.jumps]
+    arc = case.simulate(run.t1, tangent=True)
+    assert arc.fundamental is not None
+    if not arc.status.ok:
+        discard(str(arc.status))
+    sizes = np.linalg.svd(arc.fundamental / run.scale[:, None] * run.scale, compute_uv=False)
+    if not sizes[-1] > 1e-6 * sizes[0] or not np.all(np.abs(determinants) > 1e-9):
+        discard("a direction is lost, or nearly so, along the run")
+    jumps, flow, size = float(np.sum(np.log(np.abs(determinants)))), *_divergence(case)
+    got = float(np.linalg.slogdet(arc.fundamental).logabsdet)
+    tolerance = 1e-8 * (1.0 + abs(jumps) + size) + 1e-10 * sizes[0] / sizes[-1]
+    if not abs(got - jumps - flow) <= tolerance:
+        case.fail(
+            SUM_RULE,
+            f"wanted {jumps + flow:.10g}: {flow:.10g} from the divergence, {jumps:.10g} from "
+            f"{len(determinants)} jumps",
+            f"got {got:.10g}, the logarithm of the determinant of the fundamental matrix",
+            hint="tangent vectors that miss a jump, or a derivative of a field that is wrong.",
+        )
+
+
+def _divergence(case: Case) -> tuple[float, float]:
+    """Integral of ``div f`` along the run, by Gauss quadrature over each step; and of its magnitude."""
+    arc, system = case.run.arc, case.system
+    model = compile_system(system).model(case.parameters)
+    jacobian = np.zeros((system.dimension, system.dimension + 1))
+    total = size = 0.0
+    for i in range(len(arc.t) - 1):
+        h = arc.t[i + 1] - arc.t[i]
+        if arc.j[i] != arc.j[i + 1] or h <= 0.0:
+            continue
+        mode = system.mode_index(str(arc.mode[i]))
+        times = arc.t[i] + 0.5 * h * (1.0 + GAUSS_NODES)
+        for t, x, weight in zip(times, arc(times), GAUSS_WEIGHTS, strict=True):
+            model.flow_jacobian(mode, t, x, model.parameters, jacobian)
+            term = 0.5 * h * weight * np.trace(jacobian)
+            total += term
+            size += abs(term)
+    return float(total), float(size)
+
+
+class _Window:
+    """The time around one jump, or around several at one instant, in which flows are differenced."""
+
+    def __init__(self, case: Case, jump: Jump) -> None:
+        self.case, self.run = case, case.run
+        self.jumps = [other for other in self.run.arc.jumps if other.t == jump.t]
+        self.jump, last = self.jumps[0], self.jumps[-1]
+        times = np.array([case.t0, *self.run.arc.jumps.t, self.run.t1])
+        before, after = jump.t - times[self.jump.j], times[last.j + 2] - jump.t
+        if not min(before, after) > 1e-6 * (self.run.t1 - case.t0):
+            discard("events follow one another too closely")
+        rates = [
+            np.abs(_field_slope(case, mode, jump.t, x))
+            for mode, x in ((self.jump.source, self.jump.x_minus), (last.target, last.x_plus))
+        ]
+        scale = self.run.scale
+        fastest = max(float(np.max(np.sum(rate * scale / scale[:, None], axis=1))) for rate in rates)
+        longest = min(0.5 * before, 0.5 * after)
+        self.width = min(longest, 0.2 / fastest) if fastest > 0 else longest
+        self.begin, self.end = jump.t - self.width, jump.t + self.width
+        self.start = self.run.arc(self.begin)
+
+    def differences(self) -> tuple[np.ndarray, np.ndarray]:
+        """Derivative of the state at the end in that at the start, and the tolerance of its scaled form."""
+        scale, jump = self.run.scale, self.jump
+        slope = np.abs(_guard_slope(self.case, jump))
+        # The displaced runs must cross inside the window, too.
+        shift = slope * scale / abs(jump.transversality)
+        step = min(STEP, 0.1 * self.width / float(shift.max())) if shift.any() else STEP
+        if step < 1e-7:
+            discard("the guard is crossed too slowly for finite differences")
+        coarse, fine = (self._central(h) for h in (step, 0.5 * step))
+        spread = np.abs(self.scaled(fine - coarse))
+        size = 1.0 + np.abs(self.scaled(fine)).max()
+        noise = 20.0 * (self.case.solver.rtol + 1e-13) / step
+        tolerance = 2.0 * spread + (noise + 1e-7) * size
+        if not tolerance.max() <= 1e-2 * size:
+            discard("the finite differences do not converge: nearly a grazing")
+        return (4.0 * fine - coarse) / 3.0, tolerance
+
+    def _central(self, step: float) -> np.ndarray:
+        columns = []
+        for i, h in enumerate(step * self.run.scale):
+            displacement = np.zeros_like(self.start)
+            displacement[i] = h
+            columns.append(
+                (self._flow(self.start + displacement) - self._flow(self.start - displacement)) / (2 * h)
+            )
+        return np.column_stack(columns)
+
+    def _flow(self, x: np.ndarray) -> np.ndarray:
+        arc = self.case.simulate(self.end, start=(self.begin, x, self.jump.source))
+        if not arc.status.ok or [jump.transition for jump in arc.jumps] != [
+            jump.transition for jump in self.jumps
+        ]:
+            discard("a run beside this one has other events")
+        return np.asarray(arc.x[-1])
+
+    def fundamental(self) -> np.ndarray:
+        """Tangent map of a run across the event."""
+        arc = self.case.simulate(self.end, start=(self.begin, self.start, self.jump.source), tangent=True)
+        assert arc.fundamental is not None
+        return arc.fundamental
+
+    def through(self, xi: np.ndarray) -> np.ndarray:
+        """Tangent maps up to just before the jump and from just after it, with a matrix between them."""
+        case, jump = self.case, self.jump
+        gap = 1e-6 * self.width
+        before = case.simulate(jump.t - gap, start=(self.begin, self.start, jump.source), tangent=True)
+        after = case.simulate(self.end, start=(jump.t, jump.x_plus, jump.target), tangent=True)
+        rest = np.eye(len(self.start)) + gap * _field_slope(case, jump.source, jump.t, jump.x_minus)
+        assert before.fundamental is not None
+        assert after.fundamental is not None
+        return np.asarray(after.fundamental @ xi @ rest @ before.fundamental)
+
+    def scaled(self, matrix: np.ndarray) -> np.ndarray:
+        """A map between states, in units of their sizes."""
+        return np.asarray(matrix * self.run.scale / self.run.scale[:, None])
+
+
+def event_told(case: Case, jump: Jump) -> str:
+    """A jump in words."""
+    return (
+        f"event {jump.transition!r} at t = {jump.t:.10g} from mode {jump.source!r} to {jump.target!r}: "
+        f"{case.state_told(jump.x_minus)} becomes {case.state_told(jump.x_plus)}; guard's speed "
+        f"{jump.transversality:.6g}"
+    )
+
+
+def _saltation(case: Case, jump: Jump) -> np.ndarray:
+    try:
+        return case.engine.saltation_matrix(
+            case.system, jump.transition, jump.t, jump.x_minus, case.parameters
+        )
+    except ArgumentError as error:
+        discard(str(error))
+
+
+def _guard_slope(case: Case, jump: Jump) -> np.ndarray:
+    role = guard_role(case.transition(jump))
+    return case.slope(role, jump.transition, jump.t, jump.x_minus)[0, :-1]
+
+
+def _field_slope(case: Case, mode: str, t: float, x: np.ndarray) -> np.ndarray:
+    role = field_role(case.system, case.system.modes[case.system.mode_index(mode)])
+    return case.slope(role, mode, t, x)[:, :-1]
+
+
+def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:
+    modes = case.system.modes
+    source, target = (case.system.mode_index(name) for name in (jump.source, jump.target))
+    return (
+        case.evaluate(modes[source].field, jump.t, jump.x_minus),
+        case.evaluate(modes[target].field, jump.t, jump.x_plus),
+    )

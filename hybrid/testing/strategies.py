@@ -1,0 +1,204 @@
+"""Hypothesis strategies for states, parameter values and whole cases of a system."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from hybrid.derivative import evaluate
+from hybrid.errors import ArgumentError, unknown_name
+from hybrid.solvers import RungeKutta
+from hybrid.system import HybridSystem, finite_number
+from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
+
+# A range ``(low, high)``, a fixed number, or a strategy of numbers.
+Range = tuple[float, float] | float | SearchStrategy[float]
+Ranges = Mapping[str, Range]
+
+# Values lie on a grid of this many steps to either side: they print short and shrink to the middle.
+GRID = 500
+STARTS_TRIED = 4
+
+
+def states(
+    system: HybridSystem, ranges: Ranges | SearchStrategy[Any] | None = None
+) -> SearchStrategy[tuple[float, ...]]:
+    """States ``(n,)`` of a system as tuples.
+
+    Parameters
+    ----------
+    system
+        The model.
+    ranges
+        By component: a range ``(low, high)``, a number to keep it fixed, or a strategy; -2 to 2 where left
+        out. Or one strategy for the whole state.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such component, or a range is none.
+    """
+    if isinstance(ranges, SearchStrategy):
+        return ranges.map(lambda x: tuple(float(value) for value in x))
+    chosen = dict(ranges or {})
+    _check_names("State component", chosen, system.state_names)
+    return st.tuples(*(_values(name, chosen.get(name, (-2.0, 2.0))) for name in system.state_names))
+
+
+def parameters(
+    system: HybridSystem, ranges: Ranges | SearchStrategy[Any] | None = None
+) -> SearchStrategy[dict[str, float]]:
+    """Parameter values of a system, all of them, by name.
+
+    Parameters
+    ----------
+    system
+        The model.
+    ranges
+        By name: a range ``(low, high)``, a number to keep it fixed, or a strategy; within a fifth of the
+        declared value where left out. Or one strategy of dictionaries.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such parameter, or a range is none.
+    """
+    declared = dict(system.parameters)
+    if isinstance(ranges, SearchStrategy):
+        return ranges.map(lambda values: {**declared, **values})
+    chosen = dict(ranges or {})
+    _check_names("Parameter", chosen, declared)
+    drawn = {
+        name: _values(name, chosen[name]) if name in chosen else _grid(value, 0.2 * abs(value))
+        for name, value in declared.items()
+    }
+    return st.fixed_dictionaries(drawn)
+
+
+def cases(
+    system: HybridSystem,
+    *,
+    states: Ranges | SearchStrategy[Any] | None = None,
+    parameters: Ranges | SearchStrategy[Any] | None = None,
+    t_span: tuple[float, float] | None = None,
+    mode: str | None = None,
+    passable: Iterable[str] = (),
+    solver: RungeKutta = TIGHT,
+    engine: Engine = LIBRARY,
+) -> SearchStrategy[Case]:
+    """Runs of a system to check properties on, each from a mode whose guards allow its start.
+
+    Parameters
+    ----------
+    system
+        The model.
+    states, parameters
+        Ranges or strategies, as of :func:`states` and :func:`parameters`.
+    t_span
+        Runs start in the first half of it and last a fifth of what is left or more. By default two forcing
+        periods from 0, or about as long as the state needs to cross its ranges ten times.
+    mode
+        The only one to start in; by default any mode that allows the state.
+    passable
+        Names of transitions through whose guard the state may go on in the same mode, as through a membrane.
+    solver
+        Method and tolerances. They should be tight: what they leave open cannot be judged.
+    engine
+        What solves and linearises.
+
+    Raises
+    ------
+    ArgumentError
+        If a name does not exist, or a range or the span is none.
+    """
+    if mode is not None:
+        system.mode_index(mode)
+    through = tuple(passable)
+    for name in through:
+        system.transition_index(name)
+    state, values = _states(system, states), _parameters(system, parameters)
+    begin, end = _time_span(t_span) if t_span is not None else (0.0, None)
+
+    @st.composite
+    def drawn_case(draw: Any) -> Case:
+        p = draw(values)
+        last = default_duration(system, p) if end is None else end
+        t0 = begin + (last - begin) * draw(st.integers(0, GRID)) / (2 * GRID)
+        duration = (last - t0) * (0.2 + 0.8 * draw(st.integers(0, GRID)) / GRID)
+        fraction = draw(st.integers(1, 99)) / 100
+        choice = draw(st.integers(0, len(system.modes) - 1))
+        for _ in range(STARTS_TRIED):
+            x0 = draw(state)
+            case = Case(system, p, mode, x0, t0, t0 + duration, fraction, through, solver, engine)
+            allowed = [name for name in _allowed(case) if mode in (None, name)]
+            if allowed:
+                return attrs.evolve(case, mode=allowed[choice % len(allowed)])
+        return attrs.evolve(case, mode=None)
+
+    return drawn_case()
+
+
+# Inside cases() the names states and parameters are its arguments.
+_states, _parameters = states, parameters
+
+
+def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float:
+    """Two forcing periods, or about as long as the state needs to cross its default ranges ten times."""
+    period = system.forcing_period(values)
+    if period is not None:
+        return 2.0 * period
+    rng = np.random.default_rng(20240507)
+    vector = system.parameter_values(values)
+    times: list[float] = []
+    for mode in system.modes:
+        for x in rng.uniform(-2.0, 2.0, (8, system.dimension)):
+            f = evaluate(system, mode.field, 0.0, x, vector)
+            if f is not None:
+                times += [2.0 / abs(rate) for rate in f if rate != 0.0]
+    return 10.0 * float(np.median(times)) if times else 10.0
+
+
+def _allowed(case: Case) -> list[str]:
+    """Modes none of whose guards the start of a case is on or beyond."""
+    beyond = {
+        transition.source
+        for transition in case.system.transitions
+        if not guard_beyond(case, transition, case.t0, case.x0) < 0.0
+    }
+    return [name for name in case.system.mode_names if name not in beyond]
+
+
+def _check_names(what: str, chosen: Mapping[str, Any], known: Any) -> None:
+    for name in chosen:
+        if name not in known:
+            raise ArgumentError(unknown_name(what, name, known, f"{what}s"))
+
+
+def _values(name: str, given: Any) -> SearchStrategy[float]:
+    if isinstance(given, SearchStrategy):
+        return given.map(float)
+    if not isinstance(given, tuple | list):
+        return st.just(finite_number(f"Range of {name!r}", given))
+    ends = [finite_number(f"Range of {name!r}: each end", value) for value in given]
+    if len(ends) != 2 or ends[0] > ends[1]:
+        raise ArgumentError(f"Range of {name!r} must be (low, high), a number or a strategy; got {given!r}.")
+    return _grid(0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]))
+
+
+def _grid(centre: float, half: float) -> SearchStrategy[float]:
+    if half == 0.0:
+        return st.just(centre)
+    digits = 5 - int(np.floor(np.log10(half)))
+    return st.integers(-GRID, GRID).map(lambda i: round(centre + half * i / GRID, digits) if i else centre)
+
+
+def _time_span(t_span: Any) -> tuple[float, float]:
+    begin, end = (finite_number("t_span: each end", t) for t in t_span)
+    if not begin < end:
+        raise ArgumentError(f"t_span must be (t0, t1) with t0 < t1; got {t_span!r}.")
+    return begin, end

@@ -1,0 +1,200 @@
+"""The same system written differently: what follows from it must not change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import attrs
+import numpy as np
+
+from hybrid.compile import compile_system
+from hybrid.names import PARAMETERS, named_values
+from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
+
+AGAIN = " (copy)"
+
+
+@attrs.frozen(eq=False)
+class Altered:
+    """A system in which guards can be scaled, resets changed off the guard and flows cut, by parameters.
+
+    Each mode is there twice with the same field, and crossing the plane ``w . x = c`` leads from one to the
+    other without a reset. As long as ``w`` is zero nothing ever does.
+
+    Attributes
+    ----------
+    system
+        The altered system; with its own parameters as declared it is the original one.
+    resets_stay
+        Whether guards and resets are those of the original, since tracing cannot follow one of them.
+    normal, multiples
+        Names of the parameters that hold ``w``, and the multiples of the guard added to a reset, ``(n,)``.
+    offset, factor
+        Names of the parameters that hold ``c`` and the factor of all guards.
+    cuts
+        Names of the transitions at the plane.
+    original
+        Names of modes and of transitions that the original has, by those of the second copy and by their own.
+    """
+
+    system: HybridSystem
+    resets_stay: bool
+    normal: tuple[str, ...]
+    multiples: tuple[str, ...]
+    offset: str
+    factor: str
+    cuts: frozenset[str]
+    original: Mapping[str, str]
+
+    def extension(self, multiples: np.ndarray) -> dict[str, float]:
+        """Parameters that add multiples ``(n,)`` of the guard to each reset."""
+        return dict(zip(self.multiples, multiples, strict=True))
+
+    def cut(self, normal: np.ndarray, offset: float) -> dict[str, float]:
+        """Parameters that cut flows where they cross the plane ``normal . x = offset``."""
+        return {**dict(zip(self.normal, normal, strict=True)), self.offset: offset}
+
+    def scaled(self, factor: float) -> dict[str, float]:
+        """Parameters that multiply every guard by a positive factor."""
+        return {self.factor: factor}
+
+
+_ALTERED: WeakKeyDictionary[HybridSystem, Altered] = WeakKeyDictionary()
+_RENAMED: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
+_REORDERED: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
+
+
+def altered(system: HybridSystem) -> Altered:
+    """The system with the freedom to alter it, made once."""
+    if system not in _ALTERED:
+        _ALTERED[system] = _altered(system)
+    return _ALTERED[system]
+
+
+def renamed(system: HybridSystem) -> HybridSystem:
+    """The system with names of modes and transitions in the opposite alphabetical order, made once."""
+    if system not in _RENAMED:
+        _RENAMED[system] = attrs.evolve(
+            system,
+            modes=[attrs.evolve(mode, name=new_name(system.mode_names, mode.name)) for mode in system.modes],
+            transitions=[
+                attrs.evolve(
+                    transition,
+                    name=new_name(system.transition_names, transition.name),
+                    source=new_name(system.mode_names, transition.source),
+                    target=new_name(system.mode_names, transition.target),
+                    accumulates_to=transition.accumulates_to
+                    and new_name(system.mode_names, transition.accumulates_to),
+                )
+                for transition in system.transitions
+            ],
+        )
+    return _RENAMED[system]
+
+
+def new_name(names: tuple[str, ...], name: str) -> str:
+    """The name that a mode or transition has in the renamed system."""
+    return f"{len(names) - sorted(names).index(name):03d} {name}"
+
+
+def reordered(system: HybridSystem) -> HybridSystem:
+    """The system with its transitions listed the other way round, made once."""
+    if system not in _REORDERED:
+        _REORDERED[system] = attrs.evolve(system, transitions=system.transitions[::-1])
+    return _REORDERED[system]
+
+
+def _altered(system: HybridSystem) -> Altered:
+    stay = bool(compile_system(system).emitted.opaque)
+    components = range(system.dimension)
+    normal = tuple(_free_name(system, f"cut_normal_{i}") for i in components)
+    multiples = tuple(_free_name(system, f"multiple_of_guard_{i}") for i in components)
+    offset, factor = _free_name(system, "cut_offset"), _free_name(system, "factor_of_guards")
+
+    def plane(t: Any, x: Any, p: Any) -> Any:
+        return sum((getattr(p, name) * x[i] for i, name in enumerate(normal)), 0.0) - getattr(p, offset)
+
+    modes: list[Mode] = []
+    cuts: list[Transition] = []
+    transitions: list[Transition] = []
+    unaware = _unaware_of_more(system)
+    for mode in system.modes:
+        field = mode if stay else Mode(mode.name, unaware(mode.field), jacobian=unaware(mode.jacobian))
+        modes += [field, attrs.evolve(field, name=mode.name + AGAIN)]
+        there, back = f"into {mode.name + AGAIN}", f"back into {mode.name}"
+        cuts += [
+            Transition(mode.name, mode.name + AGAIN, Guard(plane, +1), name=there),
+            Transition(mode.name + AGAIN, mode.name, Guard(plane, -1), name=back),
+        ]
+    for transition in system.transitions:
+        changed = transition if stay else _freed(transition, unaware, factor, multiples)
+        again = attrs.evolve(changed, name=changed.name + AGAIN, source=changed.source + AGAIN)
+        if transition.source == transition.target:
+            again = attrs.evolve(again, target=changed.target + AGAIN)
+        transitions += [changed, again]
+    names = (*system.mode_names, *system.transition_names)
+    added = dict.fromkeys((*normal, *multiples), 0.0) | {offset: 1.0, factor: 1.0}
+    return Altered(
+        attrs.evolve(
+            system,
+            parameters={**system.parameters, **added},
+            modes=modes,
+            transitions=[*cuts, *transitions],
+        ),
+        stay,
+        normal,
+        multiples,
+        offset,
+        factor,
+        frozenset(cut.name for cut in cuts),
+        {name: name for name in names} | {name + AGAIN: name for name in names},
+    )
+
+
+def _free_name(system: HybridSystem, name: str) -> str:
+    while name in system.parameters:
+        name += "_"
+    return name
+
+
+def _unaware_of_more(system: HybridSystem) -> Callable[[Any], Any]:
+    """Turns a model function into one that sees only the parameters of the system it was written for."""
+    names = tuple(system.parameters)
+
+    def unaware(function: Callable[..., Any] | None) -> Callable[..., Any] | None:
+        if function is None:
+            return None
+        return lambda t, x, p: function(t, x, named_values(PARAMETERS, names, p[: len(names)]))
+
+    return unaware
+
+
+def _freed(
+    transition: Transition, unaware: Callable[[Any], Any], factor: str, multiples: tuple[str, ...]
+) -> Transition:
+    """A transition whose guard has a factor, and whose reset has multiples of the guard added."""
+    g, gradient = unaware(transition.guard.function), unaware(transition.guard.gradient)
+    reset = None if transition.reset is None else unaware(transition.reset.function)
+
+    def scaled_guard(t: Any, x: Any, p: Any) -> Any:
+        return getattr(p, factor) * g(t, x, p)
+
+    def scaled_gradient(t: Any, x: Any, p: Any) -> list[Any]:
+        return [getattr(p, factor) * slope for slope in gradient(t, x, p)]
+
+    def map_off_guard(t: Any, x: Any, p: Any) -> list[Any]:
+        values = x if reset is None else reset(t, x, p)
+        added = g(t, x, p)
+        return [value + getattr(p, name) * added for value, name in zip(values, multiples, strict=True)]
+
+    return attrs.evolve(
+        transition,
+        guard=Guard(
+            scaled_guard,
+            transition.guard.direction,
+            gradient=None if gradient is None else scaled_gradient,
+        ),
+        reset=None if transition.is_marker else Reset(map_off_guard),
+    )
