@@ -22,7 +22,7 @@ from hybrid import DOP853, simulate, stroboscopic_section
 from hybrid.arc import KINDS
 from hybrid.plot import COLOURS
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 
 PICTURE = ROOT / "docs" / "grazing_diagram.png"
 # Overdamped: without impacts small displacements decay like exp(-0.1 t) and exp(-t).

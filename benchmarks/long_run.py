@@ -18,7 +18,7 @@ from hybrid import DOP853, HybridSystem
 from hybrid.kernels import codes
 from hybrid.run import start
 from hybrid.solvers import RungeKutta
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 
 # Elastic, undamped and unforced; the period only counts the time.
 CONSERVATIVE = {"xi1": 0.0, "xi2": 0.0, "P": 0.0}

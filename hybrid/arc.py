@@ -225,6 +225,10 @@ class HybridArc:
     fundamental
         ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices,
         if they were asked for.
+    propagators
+        How each mode was advanced, by its name: ``"exact"``, ``"Taylor series"``, ``"Taylor series,
+        desingularised"`` or ``"Runge-Kutta pair"``. Where every mode is exact no crossing was missed that
+        rounding does not hide.
     steps, rejected
         Steps tried, and how many of them the error control rejected.
     """
@@ -239,6 +243,7 @@ class HybridArc:
     grazings: tuple[Grazing, ...]
     status: Status
     fundamental: np.ndarray | None
+    propagators: dict[str, str]
     steps: int
     rejected: int
     _pieces: Pieces | None = attrs.field(alias="pieces")

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _LOCK = threading.RLock()
+_SAID: set[str] = set()
 
 
 def cache_directory() -> Path:
@@ -53,8 +54,14 @@ def compiled_into(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def announced(message: str, after: float = 1.0) -> Iterator[None]:
-    """Print ``message`` to standard error if the block takes longer than ``after`` seconds."""
-    timer = threading.Timer(after, lambda: print(message, file=sys.stderr, flush=True))
+    """Print ``message`` to standard error, once a process, if the block takes longer than ``after``."""
+
+    def say() -> None:
+        if message not in _SAID:
+            _SAID.add(message)
+            print(message, file=sys.stderr, flush=True)
+
+    timer = threading.Timer(after, say)
     timer.daemon = True
     timer.start()
     try:

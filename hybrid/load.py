@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -16,8 +17,10 @@ MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) .
 
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
-    """The kernel module of that name, compiled now or taken from the cache."""
-    with compiled_into(cache_directory() / f"kernels-{_kernels_key()}"), announced(MESSAGE):
+    """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
+    folder = cache_directory() / f"kernels-{_kernels_key()}"
+    kept = any(folder.rglob(f"{module.rpartition('.')[2]}.*.nbi"))
+    with compiled_into(folder), nullcontext() if kept else announced(MESSAGE):
         return importlib.import_module(module)
 
 

@@ -12,7 +12,7 @@ import attrs
 import sympy
 from sympy.core.parameters import distribute
 
-from hybrid.kernels.codes import DESINGULARISED, EXACT, RUNGE_KUTTA, TAYLOR
+from hybrid.kernels.codes import DESINGULARISED, EXACT, PROPAGATORS, RUNGE_KUTTA, TAYLOR
 from hybrid.printer import assignments
 from hybrid.series import ONE_THEN_ZERO, Constants, NoSeries, Recurrences, directional, indented, loop
 from hybrid.symbolic import (
@@ -69,13 +69,7 @@ class Propagator:
     statements: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        names = {
-            RUNGE_KUTTA: "Runge-Kutta pair",
-            TAYLOR: "Taylor series",
-            EXACT: "exact",
-            DESINGULARISED: "Taylor series, desingularised",
-        }
-        return f"{names[self.kind]} ({self.reason})"
+        return f"{PROPAGATORS[self.kind]} ({self.reason})"
 
 
 def propagator(

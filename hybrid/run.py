@@ -232,6 +232,11 @@ class Trajectory:
         n = self.model.dimension
         return self.run.y[n:].reshape(self.tangents, n).T.copy()
 
+    def propagators(self) -> dict[str, str]:
+        """How each mode is advanced in this run."""
+        kinds = (codes.PROPAGATORS[kind] for kind in self.model.propagator)
+        return dict(zip(self.system.mode_names, kinds, strict=True))
+
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
         from hybrid.kernels.step import flow_jacobian

@@ -247,7 +247,7 @@ class Recurrences:
         name, row = self._kept(expression)
         self._bind(
             expression,
-            f"sqrt(out[0, {u}])" if exponent == sympy.Rational(1, 2) else f"out[0, {u}]**{k}",
+            _power_text(f"out[0, {u}]", exponent, k),
             "0.0",
             "for j in range(1, o + 1):",
             f"    {name} += (j*{k} - (o - j))*out[j, {u}]*out[o - j, {row}]",
@@ -346,6 +346,14 @@ class Recurrences:
             f"    {name} += j*out[j, {u_row}]*out[o - j, {slope}]",
             f"{name} /= o",
         )
+
+
+def _power_text(base: str, exponent: sympy.Expr, name: str) -> str:
+    """Text of a power, half-integer ones by a square root."""
+    if not (exponent.is_Rational and exponent.q == 2):
+        return f"{base}**{name}"
+    product = "*".join([base] * (abs(exponent.p) // 2) + [f"sqrt({base})"])
+    return product if exponent.is_positive else f"1.0/({product})"
 
 
 ONE_THEN_ZERO = "(1.0 if o == 1 else 0.0)"

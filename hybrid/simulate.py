@@ -168,6 +168,7 @@ class _Recorder:
             grazings=_grazings(trajectory.system, *join(self.grazings)),
             status=trajectory.status(code),
             fundamental=trajectory.tangent_matrix if trajectory.tangents else None,
+            propagators=trajectory.propagators(),
             steps=int(run.count[codes.STEPS]),
             rejected=int(run.count[codes.REJECTED]),
             pieces=pieces,

@@ -15,7 +15,7 @@ from benchmarks.stability.methods import EVENTS, LEAST, OURS, SCIPY, WITHOUT_PER
 from hybrid import HybridSystem
 from hybrid.kernels import codes
 from hybrid.run import start
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 
 # Two units of time a forcing period, and so few steps.
 PARAMETERS = {"w": 2.0, "d": 0.05}

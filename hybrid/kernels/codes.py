@@ -70,8 +70,9 @@ LIMIT_OF_CHATTER = 2
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 
-# Propagators of a mode.
+# Propagators of a mode, and how people read them.
 RUNGE_KUTTA = 0
 TAYLOR = 1
 EXACT = 2
 DESINGULARISED = 3
+PROPAGATORS = ("Runge-Kutta pair", "Taylor series", "exact", "Taylor series, desingularised")

@@ -309,3 +309,9 @@ def matrix_told(matrix: np.ndarray) -> str:
         formatter={"float_kind": lambda v: f"{v:.8g}"},
         max_line_width=10**6,
     ).replace("\n", "")
+
+
+def mode_after(jump: Jump) -> str:
+    """The mode that a jump leads to; runs are cut before a jump that ends them."""
+    assert jump.target is not None
+    return jump.target

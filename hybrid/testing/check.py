@@ -16,7 +16,7 @@ from hypothesis.strategies import SearchStrategy
 from hybrid.run import check_count
 from hybrid.solvers import RungeKutta
 from hybrid.system import HybridSystem
-from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError
+from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
 from hybrid.testing.invariance import (
@@ -296,7 +296,7 @@ class _Tally:
             return False
         self.fit += 1
         self.jumps.update(jump.transition for jump in arc.jumps)
-        self.visits.update([str(arc.mode[0]), *(jump.target for jump in arc.jumps)])
+        self.visits.update([str(arc.mode[0]), *map(mode_after, arc.jumps)])
         return True
 
     def report(self, without_elastic: bool) -> SystemReport:

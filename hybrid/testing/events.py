@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.roles import guard_role
-from hybrid.testing.case import Case, discard, guard_beyond
+from hybrid.testing.case import Case, discard, guard_beyond, mode_after
 from hybrid.testing.saltation import event_told
 
 JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
@@ -32,7 +32,7 @@ def check_jumps(case: Case) -> None:
         told = event_told(case, jump)
         if jump.source != mode:
             case.fail(JUMPS, told, f"the mode was {mode!r}", hint="events that fire out of turn.")
-        mode = jump.target
+        mode = mode_after(jump)
         slope = case.slope(guard_role(transition), jump.transition, jump.t, jump.x_minus)
         value = float(case.evaluate(transition.guard.function, jump.t, jump.x_minus)[0])
         band = np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1] * jump.t)
@@ -75,14 +75,17 @@ def check_sides(case: Case) -> None:
     guards = [
         transition
         for transition in case.system.transitions
-        if transition.guard.direction and not transition.is_marker and transition.name not in case.passable
+        if transition.guard.direction
+        and transition.guard.when is None
+        and not transition.is_marker
+        and transition.name not in case.passable
     ]
     if not guards:
         discard("no guard has a direction")
     times, mode = [case.t0, *run.arc.jumps.t, run.t1], case.mode
     for j in range(len(times) - 1):
         if j > 0:
-            mode = run.arc.jumps[j - 1].target
+            mode = mode_after(run.arc.jumps[j - 1])
         length = times[j + 1] - times[j]
         if not length > 1e-9 * (run.t1 - case.t0):
             continue

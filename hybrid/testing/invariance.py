@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.arc import HybridArc
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError, unknown_name
-from hybrid.testing.case import Case, Run, discard, matrix_told
+from hybrid.testing.case import Case, Run, discard, matrix_told, mode_after
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
 
 CUT = "Cutting a flow by an identity transition changes nothing"
@@ -226,7 +226,7 @@ class _Flip:
 def _mode_after(case: Case, j: int) -> str:
     """Mode of the run after ``j`` jumps."""
     assert case.mode is not None
-    return case.mode if j == 0 else case.run.arc.jumps[j - 1].target
+    return case.mode if j == 0 else mode_after(case.run.arc.jumps[j - 1])
 
 
 def _fired(arc: HybridArc) -> list[str]:

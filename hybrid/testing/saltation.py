@@ -8,7 +8,7 @@ from hybrid.arc import Jump
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.roles import field_role, guard_role, reset_role
-from hybrid.testing.case import Case, discard, matrix_told
+from hybrid.testing.case import Case, discard, matrix_told, mode_after
 from hybrid.testing.variants import altered
 
 SALTATION = "The saltation matrix is the derivative of the flow across the event"
@@ -239,7 +239,7 @@ class _Window:
             discard("events follow one another too closely")
         rates = [
             np.abs(_field_slope(case, mode, jump.t, x))
-            for mode, x in ((self.jump.source, self.jump.x_minus), (last.target, last.x_plus))
+            for mode, x in ((self.jump.source, self.jump.x_minus), (mode_after(last), last.x_plus))
         ]
         scale = self.run.scale
         fastest = max(float(np.max(np.sum(rate * scale / scale[:, None], axis=1))) for rate in rates)
@@ -295,7 +295,7 @@ class _Window:
         case, jump = self.case, self.jump
         gap = 1e-6 * self.width
         before = case.simulate(jump.t - gap, start=(self.begin, self.start, jump.source), tangent=True)
-        after = case.simulate(self.end, start=(jump.t, jump.x_plus, jump.target), tangent=True)
+        after = case.simulate(self.end, start=(jump.t, jump.x_plus, mode_after(jump)), tangent=True)
         rest = np.eye(len(self.start)) + gap * _field_slope(case, jump.source, jump.t, jump.x_minus)
         assert before.fundamental is not None
         assert after.fundamental is not None
@@ -336,7 +336,7 @@ def _field_slope(case: Case, mode: str, t: float, x: np.ndarray) -> np.ndarray:
 
 def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:
     modes = case.system.modes
-    source, target = (case.system.mode_index(name) for name in (jump.source, jump.target))
+    source, target = (case.system.mode_index(name) for name in (jump.source, mode_after(jump)))
     return (
         case.evaluate(modes[source].field, jump.t, jump.x_minus),
         case.evaluate(modes[target].field, jump.t, jump.x_plus),

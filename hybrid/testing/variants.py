@@ -84,7 +84,7 @@ def renamed(system: HybridSystem) -> HybridSystem:
                     transition,
                     name=new_name(system.transition_names, transition.name),
                     source=new_name(system.mode_names, transition.source),
-                    target=new_name(system.mode_names, transition.target),
+                    target=transition.target and new_name(system.mode_names, transition.target),
                     accumulates_to=transition.accumulates_to
                     and new_name(system.mode_names, transition.accumulates_to),
                 )
@@ -132,7 +132,7 @@ def _altered(system: HybridSystem) -> Altered:
         changed = transition if stay else _freed(transition, unaware, factor, multiples)
         again = attrs.evolve(changed, name=changed.name + AGAIN, source=changed.source + AGAIN)
         if transition.source == transition.target:
-            again = attrs.evolve(again, target=changed.target + AGAIN)
+            again = attrs.evolve(again, target=again.source)
         transitions += [changed, again]
     names = (*system.mode_names, *system.transition_names)
     added = dict.fromkeys((*normal, *multiples), 0.0) | {offset: 1.0, factor: 1.0}

@@ -31,7 +31,7 @@ def test_parameters_do_not_compile_anew():
 def test_repr():
     assert repr(compile_system(bouncing_ball())) == (
         "CompiledSystem of bouncing ball: 2 states\n"
-        "  mode flight: affine in the state\n"
+        "  mode flight: exact (polynomials of degree 2)\n"
         "  transition bounce: affine guard"
     )
     nameless = HybridSystem(
@@ -41,7 +41,7 @@ def test_repr():
     )
     assert repr(compile_system(nameless)) == (
         "CompiledSystem of a system: 1 states\n"
-        "  mode a: nonlinear in the state\n"
+        "  mode a: Taylor series (smooth, nonlinear in the state)\n"
         "  transition wave: guard fitted along each step"
     )
 

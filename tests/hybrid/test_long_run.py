@@ -11,7 +11,7 @@ from hybrid import DOP853, simulate, stroboscopic_section
 from hybrid.kernels import codes
 from hybrid.run import start
 from lyapunov import lyapunov_spectrum
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 
 # A power of two: this many periods are a time without a rounding.
 MILLION = 2**20

@@ -9,7 +9,7 @@ import hybrid
 import models
 from hybrid import HybridSystem, Mode, StatusCode, periodic_orbit, simulate
 from models import bouncing_ball, buck_converter, impact_oscillator, vibroimpact
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 from tests.cases import systems
 from tests.reference.load import complex_pairs, reference
 

@@ -12,7 +12,7 @@ import lyapunov
 import models
 from hybrid import StatusCode
 from lyapunov.spectrum import Estimate
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 from tests.cases import systems
 
 SHORT = {"intervals": 60, "transient": 20, "solver": hybrid.DOP853(rtol=1e-7, atol=1e-9)}

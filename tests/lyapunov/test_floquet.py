@@ -7,7 +7,7 @@ import numpy as np
 import hybrid
 import lyapunov
 import models
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 
 
 def test_logarithms_in_the_order_of_the_multipliers():

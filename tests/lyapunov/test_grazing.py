@@ -13,7 +13,7 @@ import pytest
 from hybrid import DOP853, simulate
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from models import impact_oscillator
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 
 # x'' + 1.1 x' + 0.1 x has the roots -0.1 and -1.
 DAMPED = {"k": 0.1, "c": 1.1, "w": 1.0, "d": 1.0, "r": 0.8}

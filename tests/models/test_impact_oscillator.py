@@ -8,7 +8,7 @@ import pytest
 import hybrid
 import lyapunov
 from models import impact_oscillator
-from models.impact_oscillator import one_impact_orbits
+from models.one_impact import one_impact_orbits
 from tests.reference.load import complex_pairs, reference
 
 REFERENCE = reference("impact_oscillator")

@@ -151,6 +151,14 @@ def test_the_compiled_system_says_what_it_chose():
     assert "mode contact: Taylor series, desingularised" in text
 
 
+def test_an_arc_says_how_it_was_computed():
+    system, x0 = models.vibroimpact(), FOUNDING["D=0.05"]["x0"]
+    arc = simulate(system, x0, (0.0, 0.1))
+    assert arc.propagators == {"free": "exact", "contact": "Taylor series, desingularised"}
+    arc = simulate(system, x0, (0.0, 0.1), solver=DOP853())
+    assert set(arc.propagators.values()) == {"Runge-Kutta pair"}
+
+
 def test_a_flight_without_end_is_followed_in_steps():
     """A section that is met again only after a very long polynomial flight."""
     system = HybridSystem(state=("x",), modes=[Mode("go", lambda t, x, p: (1.0,))])
