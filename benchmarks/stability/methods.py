@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers import GivenUp, Outcome
-from hybrid import DOP853, RadauIIA, Tsit5
+from hybrid import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.plot import COLOURS
 
 # Relative and absolute tolerances of the two runs of each method.
 TIGHT, LOOSE = {"rtol": 1e-10, "atol": 1e-12}, {"rtol": 1e-5, "atol": 1e-7}
 OURS: dict[str, Any] = {
     f"{method.__name__}, {name}": method(**tolerances)
-    for method in (DOP853, Tsit5, RadauIIA)
+    for method in (Taylor, DOP853, Tsit5, RadauIIA)
     for name, tolerances in (("tight", TIGHT), ("loose", LOOSE))
 }
 EVENTS, STRAIGHT, SMOOTHED = "SciPy, events", "SciPy, straight", "SciPy, smoothed"
@@ -31,6 +31,8 @@ LEAST = 1e-17
 
 LOOSELY = {"markerfacecolor": "white", "linestyle": "-."}
 STYLES: dict[str, dict[str, Any]] = {
+    "Taylor, tight": {"color": "0.1", "marker": "*"},
+    "Taylor, loose": {"color": "0.1", "marker": "*", **LOOSELY},
     "DOP853, tight": {"color": COLOURS[0], "marker": "o"},
     "DOP853, loose": {"color": COLOURS[0], "marker": "o", **LOOSELY},
     "Tsit5, tight": {"color": COLOURS[2], "marker": "s"},
