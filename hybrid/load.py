@@ -37,8 +37,10 @@ def address(kernel: Any) -> Any:
     pointer = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
     class Address(WrapperAddressProtocol):
+        address = int(pointer)
+
         def __wrapper_address__(self) -> int:
-            return int(pointer)
+            return self.address
 
         def signature(self) -> Any:
             return signature
