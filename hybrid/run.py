@@ -25,7 +25,7 @@ ISOLATION_DEPTH = 64
 UNLIMITED = np.iinfo(np.int64).max
 
 
-def method_tuple(solver: RungeKutta) -> Any:
+def kernel_method(solver: RungeKutta) -> Any:
     """The kernel's view of a solver: tableau and tolerances."""
     from hybrid.kernels.layout import Method
 
@@ -338,7 +338,7 @@ def start(
     model = compiled.model(parameters)
     if not isinstance(solver, Taylor):
         model = model.replace(propagator=np.full_like(model.propagator, codes.RUNGE_KUTTA))
-    method = method_tuple(solver)
+    method = kernel_method(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
     y = state if tangent is None else np.concatenate([state, tangent.T.ravel()])
     run = _fresh_run(system, model, y, tangents, t0)

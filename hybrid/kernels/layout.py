@@ -1,4 +1,4 @@
-"""The tuples that kernels pass around, and their numba types.
+"""The structures that kernels pass around, and their numba types.
 
 A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the state first, then ``k`` tangent vectors
 one after the other, so that each of them is contiguous. ``n`` is the dimension, ``k`` the number of tangents.
@@ -191,9 +191,7 @@ RECORD = Record.numba_type
 class Attempts(Structure):
     """The step of an implicit method, which need not be compiled where the method is explicit."""
 
-    attempt_implicit: types.FunctionType(
-        float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK)
-    )
+    attempt_implicit: types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
 
 
 ATTEMPTS = Attempts.numba_type
@@ -226,7 +224,8 @@ ADVANCE = types.FunctionType(
     int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
 )
 
-# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning.
+# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning. Kernels
+# allocate nothing and own nothing, so no references are counted.
 _MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False}
 # Called from Python, and kept on disk: these state their signatures.
 ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}

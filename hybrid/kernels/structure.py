@@ -9,6 +9,7 @@ of a loop; what the arrays hold may change freely.
 
 import numpy as np
 from numba import types
+from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
@@ -18,7 +19,6 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
-from numba.core.typing.templates import AttributeTemplate
 from numba.np.arrayobj import populate_array
 
 
@@ -53,7 +53,9 @@ class Structure:
     def __init__(self, **values):
         fields = self.numba_type.fields
         if values.keys() != fields.keys():
-            raise TypeError(f"{type(self).__name__} has the fields {', '.join(fields)}; got {', '.join(values)}.")
+            raise TypeError(
+                f"{type(self).__name__} has the fields {', '.join(fields)}; got {', '.join(values)}."
+            )
         self.__dict__.update(values)
         words = []
         for name, kind in fields.items():
@@ -105,8 +107,7 @@ class _Fields(AttributeTemplate):
     key = StructureType
 
     def generic_resolve(self, structure, field):
-        kind = structure.fields.get(field)
-        return _seen_by_kernels(kind)
+        return _seen_by_kernels(structure.fields.get(field))
 
 
 def _seen_by_kernels(kind):
