@@ -29,7 +29,7 @@ def _kernels_key() -> str:
 
 
 def address(kernel: Any) -> Any:
-    """A compiled kernel as a first-class function that may stand in a tuple of arguments."""
+    """A compiled kernel as a first-class function for an argument or for a structure."""
     from numba.core.types import WrapperAddressProtocol
 
     (signature,) = kernel.nopython_signatures

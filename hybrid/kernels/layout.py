@@ -128,7 +128,6 @@ class Work(Structure):
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
     the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
-    One array for all, since each one more is paid for wherever this tuple is passed.
 
     For Taylor series, else empty: ``series (order + 1, columns)``.
     """
@@ -234,5 +233,5 @@ PART = ENTRY | {"no_cpython_wrapper": True}
 # Called by other kernels only: it becomes part of them, so it is neither wrapped nor kept by itself and takes
 # its types from its callers. A process that finds its callers on disk never looks at it.
 KERNEL = _MATHEMATICS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-# Small and called at every stage: passing the tuples would cost as much as the work.
+# Small and called at every stage: the call would cost as much as the work.
 INLINE = KERNEL | {"forceinline": True}
