@@ -183,9 +183,13 @@ def to_bernstein(coefficients, degree):
     for k in range(1, degree + 1):
         share *= k / (degree - k + 1.0)
         coefficients[k] *= share
+    # Pascal's triangle. Only one entry is read in each turn: the one before is at hand.
     for level in range(1, degree + 1):
-        for j in range(degree, level - 1, -1):
-            coefficients[j] += coefficients[j - 1]
+        before = coefficients[level - 1]
+        for j in range(level, degree + 1):
+            entry = coefficients[j]
+            coefficients[j] = entry + before
+            before = entry
 
 
 @njit(**INLINE)
