@@ -18,7 +18,7 @@ from scipy.special import comb
 
 import models
 from benchmarks.common import heading, table
-from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Transition, Tsit5, simulate
+from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, Tsit5, simulate
 from hybrid.kernels.bernstein import NO_ROOT, first_crossing, restrict
 from hybrid.run import ISOLATION_DEPTH
 
@@ -162,7 +162,7 @@ def whole_runs(rng: np.random.Generator, pairs: int) -> list[list[str]]:
     rows = []
     for bent in (False, True):
         system = polynomial_motion(bent)
-        for method in (DOP853, Tsit5):
+        for method in (Taylor, DOP853, Tsit5):
             tally = Tally(pairs)
             begin = time.perf_counter()
             for row in values:
@@ -235,7 +235,7 @@ def event_times() -> list[list[str]]:
     # From the ground, so that the exact times are rational: 2 v (1 + e + ... + e^(k-1)) / g.
     speed = Fraction(3.0)
     rows = []
-    for method in (DOP853, Tsit5):
+    for method in (Taylor, DOP853, Tsit5):
         for rtol in TOLERANCES:
             solver = method(rtol=rtol, atol=rtol / 100)
             arc = simulate(ball, (0.0, 3.0), (0.0, 1.2223), parameters={"e": 0.5}, solver=solver)
