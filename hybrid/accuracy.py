@@ -120,16 +120,29 @@ def global_error(
     # In two directions, so that no component's difference is zero for all.
     signs = np.ones(system.dimension), (-1.0) ** np.arange(system.dimension)
     begin = str(arc.mode[0])
-    tighter = [run(rung, arc.x[0] + sign * aside, begin) for rung, sign in zip(rungs, signs, strict=True)]
-    if not all(_alike(arc, other) for other in tighter):
-        # A start on a guard may lie beyond it if it is moved.
-        tighter = [run(rung, arc.x[0], begin) for rung in rungs]
-    return _compare(arc, *tighter)
+
+    def moved(rung: RungeKutta, sign: np.ndarray) -> HybridArc:
+        for side in (sign, -sign):
+            other = run(rung, arc.x[0] + side * aside, begin)
+            # A start on a guard may lie beyond it if it is moved.
+            if _starts_alike(arc, other):
+                return other
+        return run(rung, arc.x[0], begin)
+
+    return _compare(arc, *map(moved, rungs, signs))
 
 
 def _tightened(solver: RungeKutta, factor: float) -> RungeKutta:
     rtol = max(solver.rtol / factor, LEAST_RTOL)
     return attrs.evolve(solver, rtol=rtol, atol=solver.atol * rtol / solver.rtol)
+
+
+def _starts_alike(one: HybridArc, other: HybridArc) -> bool:
+    """Whether the first jumps of two runs are the same, at nearly the same time."""
+    if not (len(one.jumps) and len(other.jumps)):
+        return len(one.jumps) == len(other.jumps)
+    near = abs(one.jumps.t[0] - other.jumps.t[0]) <= 1e-6 * (one.t[-1] - one.t[0])
+    return bool(near and one.jumps.transition[0] == other.jumps.transition[0])
 
 
 def _alike(one: HybridArc, other: HybridArc) -> bool:

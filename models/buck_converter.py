@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 
@@ -52,10 +50,11 @@ def buck_converter() -> HybridSystem:
     def excess(t, x, p):
         return control(x, p) - p.V_L - (p.V_U - p.V_L) * x.tau
 
-    # The smaller of two terms rises through zero where one does so while the other is positive.
-    ramp_ends = Guard(lambda t, x, p: x.tau - 1, direction=+1)
-    ends_above = Guard(lambda t, x, p: np.minimum(x.tau - 1, control(x, p) - p.V_L), direction=+1)
-    ends_below = Guard(lambda t, x, p: np.minimum(x.tau - 1, p.V_L - control(x, p)), direction=+1)
+    def ramp_ends(when=None):
+        return Guard(lambda t, x, p: x.tau - 1, direction=+1, when=when)
+
+    above = ramp_ends(when=lambda t, x, p: control(x, p) - p.V_L)
+    below = ramp_ends(when=lambda t, x, p: p.V_L - control(x, p))
     restart = Reset(lambda t, x, p: (x.v, x.i, 0.0))
     return HybridSystem(
         name="buck converter",
@@ -68,8 +67,8 @@ def buck_converter() -> HybridSystem:
         transitions=[
             Transition("off", "on", Guard(excess, direction=-1), name="close"),
             Transition("on", "off", Guard(excess, direction=+1), name="open"),
-            Transition("on", "off", ends_above, restart, name="reopen"),
-            Transition("on", "on", ends_below, restart, name="saturate"),
-            Transition("off", "off", ramp_ends, restart, name="skip"),
+            Transition("on", "off", above, restart, name="reopen"),
+            Transition("on", "on", below, restart, name="saturate"),
+            Transition("off", "off", ramp_ends(), restart, name="skip"),
         ],
     )  # fmt: skip

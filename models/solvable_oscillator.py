@@ -15,10 +15,8 @@ def solvable_oscillator() -> HybridSystem:
         \ddot u - 2 b\, \dot u + (w^2 + b^2)(u - s) = 0, \quad w = 2 \pi, \qquad
         s \mapsto \operatorname{sgn}(u) \text{ at } \dot u = 0
 
-    In mode ``plus`` the sign must change where the velocity rises through zero at negative ``u``. There, and
-    only there, the smaller of ``v`` and ``-u`` rises through zero, since ``u`` cannot fall through zero while
-    ``v`` is positive. A turning point at which ``s`` already has the sign of ``u``, such as the start, is no
-    zero of it.
+    In mode ``plus`` the sign must change where the velocity rises through zero, on condition that ``u`` is
+    negative there. A turning point where ``s`` already has the sign of ``u``, such as the start, is passed.
 
     Returns
     -------
@@ -50,7 +48,7 @@ def solvable_oscillator() -> HybridSystem:
         parameters={"b": 0.5},
         modes=[Mode("plus", field(1.0)), Mode("minus", field(-1.0))],
         transitions=[
-            Transition("plus", "minus", Guard(lambda t, x, p: np.minimum(x.v, -x.u), direction=+1)),
-            Transition("minus", "plus", Guard(lambda t, x, p: np.maximum(x.v, -x.u), direction=-1)),
+            Transition("plus", "minus", Guard(lambda t, x, p: x.v, +1, when=lambda t, x, p: -x.u)),
+            Transition("minus", "plus", Guard(lambda t, x, p: x.v, -1, when=lambda t, x, p: x.u)),
         ],
     )

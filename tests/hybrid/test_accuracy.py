@@ -45,7 +45,7 @@ def solvable_oscillator(rng, span=10):
         grown = (u - sign) * mp.exp(rate / 4)
         exact = times, (sign - grown * rate / w, -grown * (w + rate**2 / w))
     run = {"x0": (u0, 0.0), "t_span": (0.0, span + 0.25), "mode": "plus", "parameters": {"b": b}}
-    return systems.solvable_oscillator(), run, exact
+    return models.solvable_oscillator(), run, exact
 
 
 @functools.cache
@@ -100,7 +100,7 @@ def test_estimates_hold_the_rounding_of_polynomial_flight(rtol, method):
 
 def test_a_chaotic_run_beyond_its_digits_says_so():
     """After 80 units of time an error has grown by e^40."""
-    found = global_error(systems.solvable_oscillator(), (0.3, 0.0), (0.0, 80.25), mode="plus")
+    found = global_error(models.solvable_oscillator(), (0.3, 0.0), (0.0, 80.25), mode="plus")
     assert found.status.code == StatusCode.NOT_CONVERGED
     assert "Runs at tighter tolerances agree on the first" in str(found.status)
     assert found.jumps[0] < 1e-9

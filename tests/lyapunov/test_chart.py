@@ -13,7 +13,6 @@ import models
 from hybrid import StatusCode
 from lyapunov.spectrum import Estimate
 from models.one_impact import one_impact_orbits
-from tests.cases import systems
 
 SHORT = {"intervals": 60, "transient": 20, "solver": hybrid.DOP853(rtol=1e-7, atol=1e-9)}
 ARRAYS = ("exponents", "standard_error", "sum_rule", "jumps_per_interval", "x", "mode", "section")
@@ -206,7 +205,7 @@ def test_autonomous_systems_have_charts_too():
     """Exactly b, over whole times."""
     values = np.array([0.3, 0.4, 0.5])
     chart = lyapunov.chart(
-        systems.solvable_oscillator(),
+        models.solvable_oscillator(),
         {"b": values},
         (0.3, 0.0),
         mode="plus",
