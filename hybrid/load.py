@@ -29,7 +29,7 @@ def _kernels_key() -> str:
 
 
 def address(kernel: Any) -> Any:
-    """A compiled kernel as a first-class function that may stand in a tuple of arguments."""
+    """A compiled kernel as a first-class function for an argument or for a structure."""
     from numba.core.types import WrapperAddressProtocol
 
     (signature,) = kernel.nopython_signatures
@@ -37,8 +37,10 @@ def address(kernel: Any) -> Any:
     pointer = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
     class Address(WrapperAddressProtocol):
+        address = int(pointer)
+
         def __wrapper_address__(self) -> int:
-            return int(pointer)
+            return self.address
 
         def signature(self) -> Any:
             return signature

@@ -25,25 +25,25 @@ ISOLATION_DEPTH = 64
 UNLIMITED = np.iinfo(np.int64).max
 
 
-def method_tuple(solver: RungeKutta) -> Any:
+def kernel_method(solver: RungeKutta) -> Any:
     """The kernel's view of a solver: tableau and tolerances."""
     from hybrid.kernels.layout import Method
 
     tableau = solver.tableau
     return Method(
-        tableau.a,
-        tableau.b,
-        tableau.c,
-        tableau.error,
-        tableau.second_error,
-        tableau.quadrature,
-        tableau.interpolant,
-        int(tableau.implicit),
-        solver.order if isinstance(solver, Taylor) else 0,
-        1.0 / tableau.error_order,
-        solver.rtol,
-        solver.atol,
-        solver.max_step,
+        a=tableau.a,
+        b=tableau.b,
+        c=tableau.c,
+        error=tableau.error,
+        second_error=tableau.second_error,
+        quadrature=tableau.quadrature,
+        interpolant=tableau.interpolant,
+        implicit=int(tableau.implicit),
+        order=solver.order if isinstance(solver, Taylor) else 0,
+        exponent=1.0 / tableau.error_order,
+        rtol=solver.rtol,
+        atol=solver.atol,
+        max_step=solver.max_step,
     )
 
 
@@ -62,7 +62,7 @@ def driver_parts(series_only: bool, implicit: bool) -> Any:
     else:
         step = load_kernels("hybrid.kernels.runge_kutta").runge_kutta_step
     return Parts(
-        attempts=Attempts(address(attempt)),
+        attempts=Attempts(attempt_implicit=address(attempt)),
         runge_kutta_step=address(step),
         enter=address(jumps.enter),
         jump=address(jumps.jump),
@@ -337,8 +337,8 @@ def start(
     solver = check_solver(solver)
     model = compiled.model(parameters)
     if not isinstance(solver, Taylor):
-        model = model._replace(propagator=np.full_like(model.propagator, codes.RUNGE_KUTTA))
-    method = method_tuple(solver)
+        model = model.replace(propagator=np.full_like(model.propagator, codes.RUNGE_KUTTA))
+    method = kernel_method(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
     y = state if tangent is None else np.concatenate([state, tangent.T.ravel()])
     run = _fresh_run(system, model, y, tangents, t0)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.run import check_state, method_tuple, split_time, workspace
+from hybrid.run import check_state, kernel_method, split_time, workspace
 from hybrid.solvers import Tsit5
 from hybrid.system import HybridSystem, Transition, finite_number
 
@@ -58,7 +58,7 @@ def saltation_matrix(
     index = system.transition_index(transition)
     state = check_state(system, x)
     model = compiled.model(parameters)
-    work = workspace(method_tuple(Tsit5()), system.dimension, 0, 0)
+    work = workspace(kernel_method(Tsit5()), system.dimension, 0, 0)
     phase = split_time(finite_number("t", t), model.period)[1]
     source = system.mode_index(system.transitions[index].source)
     from hybrid.kernels.jump import saltation

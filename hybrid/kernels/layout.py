@@ -1,13 +1,12 @@
-"""The tuples that kernels pass around, and their numba types.
+"""The structures that kernels pass around, and their numba types.
 
 A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the state first, then ``k`` tangent vectors
 one after the other, so that each of them is contiguous. ``n`` is the dimension, ``k`` the number of tangents.
 """
 
-from typing import NamedTuple
-
-import numpy as np
 from numba import boolean, float64, int64, types, void
+
+from hybrid.kernels.structure import Structure
 
 EPSILON = 2.220446049250313e-16
 
@@ -15,13 +14,14 @@ VECTOR = float64[::1]
 MATRIX = float64[:, ::1]
 CUBE = float64[:, :, ::1]
 INDICES = int64[::1]
+INDEX_MATRIX = int64[:, ::1]
 
 VECTOR_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, VECTOR))
 SERIES_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, int64, MATRIX))
 MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 
 
-class Model(NamedTuple):
+class Model(Structure):
     """The roles of a compiled system, its parameters and its graph as index arrays.
 
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
@@ -33,58 +33,33 @@ class Model(NamedTuple):
     where they are polynomials, else 0. ``period`` is 0 without a forcing period.
     """
 
-    flow: object
-    flow_jacobian: object
-    variational_flow: object
-    guard: object
-    guard_gradient: object
-    reset: object
-    reset_jacobian: object
-    series: object
-    parameters: np.ndarray
-    dimension: int
-    first_outgoing: np.ndarray
-    outgoing: np.ndarray
-    target: np.ndarray
-    direction: np.ndarray
-    affine_guard: np.ndarray
-    boundary: np.ndarray
-    marker: np.ndarray
-    accumulates_to: np.ndarray
-    propagator: np.ndarray
-    degree: np.ndarray
-    period: float
+    flow: VECTOR_ROLE
+    flow_jacobian: MATRIX_ROLE
+    variational_flow: VECTOR_ROLE
+    guard: VECTOR_ROLE
+    guard_gradient: VECTOR_ROLE
+    reset: VECTOR_ROLE
+    reset_jacobian: MATRIX_ROLE
+    series: SERIES_ROLE
+    parameters: VECTOR
+    dimension: int64
+    first_outgoing: INDICES
+    outgoing: INDICES
+    target: INDICES
+    direction: INDICES
+    affine_guard: INDICES
+    boundary: INDICES
+    marker: INDICES
+    accumulates_to: INDICES
+    propagator: INDICES
+    degree: INDICES
+    period: float64
 
 
-MODEL = types.NamedTuple(
-    (
-        VECTOR_ROLE,
-        MATRIX_ROLE,
-        VECTOR_ROLE,
-        VECTOR_ROLE,
-        VECTOR_ROLE,
-        VECTOR_ROLE,
-        MATRIX_ROLE,
-        SERIES_ROLE,
-        VECTOR,
-        int64,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        float64,
-    ),
-    Model,
-)
+MODEL = Model.numba_type
 
 
-class Method(NamedTuple):
+class Method(Structure):
     """A Runge-Kutta method with its interpolant and its tolerances.
 
     ``a (S, S)``, ``b (s,)``, ``c (S,)`` with ``s`` stages for the step; row ``s`` is the derivative at the
@@ -96,42 +71,25 @@ class Method(NamedTuple):
     ``order`` is that of Taylor series.
     """
 
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-    error: np.ndarray
-    second_error: np.ndarray
-    quadrature: np.ndarray
-    interpolant: np.ndarray
-    implicit: int
-    order: int
-    exponent: float
-    rtol: float
-    atol: float
-    max_step: float
+    a: MATRIX
+    b: VECTOR
+    c: VECTOR
+    error: VECTOR
+    second_error: VECTOR
+    quadrature: VECTOR
+    interpolant: MATRIX
+    implicit: int64
+    order: int64
+    exponent: float64
+    rtol: float64
+    atol: float64
+    max_step: float64
 
 
-METHOD = types.NamedTuple(
-    (
-        MATRIX,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        VECTOR,
-        MATRIX,
-        int64,
-        int64,
-        float64,
-        float64,
-        float64,
-        float64,
-    ),
-    Method,
-)
+METHOD = Method.numba_type
 
 
-class Run(NamedTuple):
+class Run(Structure):
     """The mutable state of one trajectory: all that a run needs to be taken up again.
 
     ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
@@ -143,21 +101,21 @@ class Run(NamedTuple):
     ``trail (3, n + 1)`` follows the jumps of one transition to their limit.
     """
 
-    count: np.ndarray
-    clock: np.ndarray
-    y: np.ndarray
-    side: np.ndarray
-    on_guard: np.ndarray
-    first_step: np.ndarray
-    scale: np.ndarray
-    growth: np.ndarray
-    trail: np.ndarray
+    count: INDICES
+    clock: VECTOR
+    y: VECTOR
+    side: INDICES
+    on_guard: INDICES
+    first_step: VECTOR
+    scale: VECTOR
+    growth: VECTOR
+    trail: MATRIX
 
 
-RUN = types.NamedTuple((INDICES, VECTOR, VECTOR, INDICES, INDICES, VECTOR, VECTOR, VECTOR, MATRIX), Run)
+RUN = Run.numba_type
 
 
-class Work(NamedTuple):
+class Work(Structure):
     """Scratch memory, allocated once a run.
 
     ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
@@ -170,69 +128,40 @@ class Work(NamedTuple):
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
     the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
-    One array for all, since each one more is paid for wherever this tuple is passed.
 
     For Taylor series, else empty: ``series (order + 1, columns)``.
     """
 
-    stages: np.ndarray
-    speeds: np.ndarray
-    trial: np.ndarray
-    new: np.ndarray
-    error: np.ndarray
-    second_error: np.ndarray
-    jacobian: np.ndarray
-    reset_jacobian: np.ndarray
-    gradient: np.ndarray
-    scalar: np.ndarray
-    field: np.ndarray
-    field_after: np.ndarray
-    state: np.ndarray
-    settled: np.ndarray
-    saltation: np.ndarray
-    coefficients: np.ndarray
-    polynomial: np.ndarray
-    stack: np.ndarray
-    intervals: np.ndarray
-    nodes: np.ndarray
-    fit: np.ndarray
-    systems: np.ndarray
-    pivots: np.ndarray
-    series: np.ndarray
+    stages: MATRIX
+    speeds: VECTOR
+    trial: VECTOR
+    new: VECTOR
+    error: VECTOR
+    second_error: VECTOR
+    jacobian: MATRIX
+    reset_jacobian: MATRIX
+    gradient: VECTOR
+    scalar: VECTOR
+    field: VECTOR
+    field_after: VECTOR
+    state: VECTOR
+    settled: VECTOR
+    saltation: MATRIX
+    coefficients: MATRIX
+    polynomial: VECTOR
+    stack: MATRIX
+    intervals: MATRIX
+    nodes: VECTOR
+    fit: MATRIX
+    systems: MATRIX
+    pivots: INDICES
+    series: MATRIX
 
 
-WORK = types.NamedTuple(
-    (
-        MATRIX,  # stages
-        VECTOR,  # speeds
-        VECTOR,  # trial
-        VECTOR,  # new
-        VECTOR,  # error
-        VECTOR,  # second_error
-        MATRIX,  # jacobian
-        MATRIX,  # reset_jacobian
-        VECTOR,  # gradient
-        VECTOR,  # scalar
-        VECTOR,  # field
-        VECTOR,  # field_after
-        VECTOR,  # state
-        VECTOR,  # settled
-        MATRIX,  # saltation
-        MATRIX,  # coefficients
-        VECTOR,  # polynomial
-        MATRIX,  # stack
-        MATRIX,  # intervals
-        VECTOR,  # nodes
-        MATRIX,  # fit
-        MATRIX,  # systems
-        INDICES,  # pivots
-        MATRIX,  # series
-    ),
-    Work,
-)
+WORK = Work.numba_type
 
 
-class Record(NamedTuple):
+class Record(Structure):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
     ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
@@ -242,75 +171,61 @@ class Record(NamedTuple):
     ``(cycle, transition, jump count)`` and the state.
     """
 
-    used: np.ndarray
-    step_time: np.ndarray
-    step_place: np.ndarray
-    step_coefficients: np.ndarray
-    jump_time: np.ndarray
-    jump_place: np.ndarray
-    jump_states: np.ndarray
-    jump_saltation: np.ndarray
-    grazing_time: np.ndarray
-    grazing_place: np.ndarray
-    grazing_state: np.ndarray
+    used: INDICES
+    step_time: MATRIX
+    step_place: INDEX_MATRIX
+    step_coefficients: CUBE
+    jump_time: MATRIX
+    jump_place: INDEX_MATRIX
+    jump_states: CUBE
+    jump_saltation: CUBE
+    grazing_time: MATRIX
+    grazing_place: INDEX_MATRIX
+    grazing_state: MATRIX
 
 
-INDEX_MATRIX = int64[:, ::1]
-RECORD = types.NamedTuple(
-    (INDICES, MATRIX, INDEX_MATRIX, CUBE, MATRIX, INDEX_MATRIX, CUBE, CUBE, MATRIX, INDEX_MATRIX, MATRIX),
-    Record,
-)
+RECORD = Record.numba_type
 
 
-class Attempts(NamedTuple):
+class Attempts(Structure):
     """The step of an implicit method, which need not be compiled where the method is explicit."""
 
-    attempt_implicit: object
+    attempt_implicit: types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
 
 
-ATTEMPTS = types.NamedUniTuple(
-    types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK)), 1, Attempts
-)
+ATTEMPTS = Attempts.numba_type
 
 
-class Parts(NamedTuple):
+class Parts(Structure):
     """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
 
     What is linked into a kernel is optimised again with it; what comes as an argument is not, and the step of
     a Runge-Kutta method need not even be compiled where every mode has a series.
     """
 
-    attempts: Attempts
-    runge_kutta_step: object
-    enter: object
-    jump: object
-    finish_chatter: object
-    rest: object
-    first_in_order: object
+    attempts: ATTEMPTS
+    runge_kutta_step: types.FunctionType(
+        types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK)
+    )
+    enter: types.FunctionType(int64(MODEL, RUN, WORK))
+    jump: types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK))
+    finish_chatter: types.FunctionType(
+        boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK)
+    )
+    rest: types.FunctionType(void(MODEL, RUN, int64, int64, boolean, WORK))
+    first_in_order: types.FunctionType(int64(MODEL, RUN, RECORD, int64, WORK))
 
 
-PARTS = types.NamedTuple(
-    (
-        ATTEMPTS,
-        types.FunctionType(
-            types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK)
-        ),
-        types.FunctionType(int64(MODEL, RUN, WORK)),
-        types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK)),
-        types.FunctionType(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK)),
-        types.FunctionType(void(MODEL, RUN, int64, int64, boolean, WORK)),
-        types.FunctionType(int64(MODEL, RUN, RECORD, int64, WORK)),
-    ),
-    Parts,
-)
+PARTS = Parts.numba_type
 
 # The driver itself comes as an argument to those who call it, for the same reason.
 ADVANCE = types.FunctionType(
     int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
 )
 
-# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning.
-_MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}}
+# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning. Kernels
+# allocate nothing and own nothing, so no references are counted.
+_MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False}
 # Called from Python, and kept on disk: these state their signatures.
 ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}
 # Handed to the driver as a first-class function.
@@ -318,5 +233,5 @@ PART = ENTRY | {"no_cpython_wrapper": True}
 # Called by other kernels only: it becomes part of them, so it is neither wrapped nor kept by itself and takes
 # its types from its callers. A process that finds its callers on disk never looks at it.
 KERNEL = _MATHEMATICS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-# Small and called at every stage: passing the tuples would cost as much as the work.
+# Small and called at every stage: the call would cost as much as the work.
 INLINE = KERNEL | {"forceinline": True}

@@ -1,0 +1,86 @@
+"""Structures: what Python puts into one is what a kernel finds there."""
+
+import numpy as np
+import pytest
+
+numba = pytest.importorskip("numba")
+from numba import float64, int64, types  # noqa: E402
+
+from hybrid.kernels.layout import CUBE, INDICES, KERNEL, MATRIX, VECTOR  # noqa: E402
+from hybrid.kernels.structure import Structure  # noqa: E402
+
+
+@numba.cfunc(float64(float64))
+def double(x):
+    return 2.0 * x
+
+
+class Parcel(Structure):
+    count: int64
+    vector: VECTOR
+    function: types.FunctionType(float64(float64))
+    matrix: MATRIX
+    size: float64
+    cube: CUBE
+
+
+class Box(Structure):
+    places: INDICES
+    parcel: Parcel.numba_type
+
+
+def parcel():
+    return Parcel(
+        count=-7,
+        vector=np.arange(3.0),
+        function=double,
+        matrix=np.arange(6.0).reshape(2, 3),
+        size=0.1,
+        cube=np.arange(24.0).reshape(2, 3, 4),
+    )
+
+
+@numba.njit(**{key: value for key, value in KERNEL.items() if not key.startswith("no_c")})
+def read(box, out):
+    inner = box.parcel
+    out[0], out[1], out[2] = inner.count, inner.size, inner.function(inner.size)
+    out[3], out[4] = inner.matrix[1, 0], inner.cube[1, 2, 3]
+    out[5] = inner.matrix.shape[0] * 100 + inner.matrix.shape[1] * 10 + inner.vector.shape[0]
+    inner.vector[2] += inner.matrix[0].sum()
+    box.places[1] = 42
+
+
+def test_a_kernel_reads_every_kind_of_field_and_writes_into_arrays():
+    inner = parcel()
+    box = Box(places=np.zeros(2, dtype=np.int64), parcel=inner)
+    out = np.zeros(6)
+    read(box, out)
+    np.testing.assert_array_equal(out, [-7.0, 0.1, 0.2, 3.0, 23.0, 233.0])
+    np.testing.assert_array_equal(inner.vector, [0.0, 1.0, 5.0])
+    np.testing.assert_array_equal(box.places, [0, 42])
+
+
+def test_replace_changes_a_copy():
+    inner = parcel()
+    changed = inner.replace(count=3)
+    assert (inner.count, changed.count) == (-7, 3)
+    assert changed.vector is inner.vector
+
+
+def test_fields_are_fixed():
+    with pytest.raises(AttributeError, match=r"Parcel.count is fixed; replace\(count=...\) makes a copy."):
+        parcel().count = 3
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [np.arange(3), np.arange(6.0)[::2], np.zeros((1, 3)), [0.0, 1.0], np.arange(3, dtype=np.float32)],
+)
+def test_an_array_that_is_not_what_the_kernels_expect_is_refused(wrong):
+    with pytest.raises(TypeError, match="vector must be a contiguous array"):
+        parcel().replace(vector=wrong)
+
+
+def test_missing_fields_are_named():
+    with pytest.raises(TypeError, match="Box has the fields places, parcel; got places"):
+        Box(places=np.zeros(2, dtype=np.int64))
