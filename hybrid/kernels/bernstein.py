@@ -12,32 +12,44 @@ from hybrid.kernels.layout import INLINE, KERNEL
 NO_ROOT = 2.0
 # Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
 CLUSTER = 1e-14
+# A Newton step this short has entered the quadratic convergence to a root that is simple to rounding.
+SETTLED = 1e-8
 
 
 @njit(**KERNEL)
-def value_and_slope(coefficients, degree, theta, scratch):
-    """Value and derivative at ``theta`` by de Casteljau; ``coefficients``, ``scratch (degree + 1,)``."""
-    for i in range(degree + 1):
-        scratch[i] = coefficients[i]
-    slope = 0.0
-    for level in range(degree, 0, -1):
-        if level == 1:
-            slope = degree * (scratch[1] - scratch[0])
-        for i in range(level):
-            scratch[i] += theta * (scratch[i + 1] - scratch[i])
-    return scratch[0], slope
+def value_and_slope(coefficients, degree, theta):
+    """Value and derivative at ``theta`` on [0, 1]; ``coefficients (degree + 1,)``.
+
+    After one step of de Casteljau's what is left is of one degree less, and its basis, with only positive
+    members, is summed as it stands. From the nearer end on, each member is the one before times a ratio of
+    at most the degree.
+    """
+    if degree == 0:
+        return coefficients[0], 0.0
+    backwards = theta > 0.5
+    distance = 1.0 - theta if backwards else theta
+    basis, ratio = (1.0 - distance) ** (degree - 1), distance / (1.0 - distance)
+    value, slope = 0.0, 0.0
+    for j in range(degree):
+        row = degree - 1 - j if backwards else j
+        difference = coefficients[row + 1] - coefficients[row]
+        value += basis * (coefficients[row] + theta * difference)
+        slope += basis * difference
+        step = (degree - 1 - j) / (j + 1.0)
+        basis *= ratio * step
+    return value, degree * slope
 
 
 @njit(**KERNEL)
-def simple_root(coefficients, degree, sign_left, scratch):
+def simple_root(coefficients, degree, sign_left):
     """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
-    low, high = 0.0, 1.0
+    low, high, last = 0.0, 1.0, 1.0
     # The secant's root, unless an end is a root too: that one is not in the open interval.
     theta = coefficients[0] / (coefficients[0] - coefficients[degree])
     if not (low < theta < high):
         theta = 0.5
     for _ in range(100):
-        value, slope = value_and_slope(coefficients, degree, theta, scratch)
+        value, slope = value_and_slope(coefficients, degree, theta)
         if value == 0.0:
             return theta
         if (value > 0.0) == (sign_left > 0):
@@ -45,11 +57,16 @@ def simple_root(coefficients, degree, sign_left, scratch):
         else:
             high = theta
         newton = theta - value / slope if slope != 0.0 else -1.0
+        change = abs(newton - theta)
+        # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
+        if change <= 2e-16 * theta or (last < SETTLED and change > 0.25 * last):
+            return theta
         if not (low < newton < high):
             newton = 0.5 * (low + high)
-        if abs(newton - theta) <= 2e-16 * abs(newton) or high - low <= 2e-16 * high:
+            change = high - low
+        if high - low <= 2e-16 * high:
             return newton
-        theta = newton
+        theta, last = newton, change
     return theta
 
 
@@ -58,11 +75,10 @@ def first_crossing(coefficients, degree, side, direction, stack):
     """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
 
     ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
-    that differs at once is a crossing at 0, or 0 if there was none; ``stack (depth, >= degree + 3)``, its
-    last row scratch. Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero
+    that differs at once is a crossing at 0, or 0 if there was none; ``stack (depth, >= degree + 3)`` is
+    scratch. Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero
     at 1 exactly counts as crossed if the slope there leads across.
     """
-    scratch = stack[stack.shape[0] - 1]
     top = 0
     stack[0, 0] = 0.0
     stack[0, 1] = 1.0
@@ -105,7 +121,7 @@ def first_crossing(coefficients, degree, side, direction, stack):
             if direction == 0 or direction == last:
                 if variations > 1:
                     return start, side
-                return start + (end - start) * simple_root(row[2:], degree, first, scratch), side
+                return start + (end - start) * simple_root(row[2:], degree, first), side
         top -= 1
     if coefficients[degree] == 0.0:
         # Odd or even multiplicity at 1 cannot be told from the sign before it alone: look at the slope.
@@ -155,7 +171,7 @@ def lowest(coefficients, degree, side, stack):
             break
         start += theta * (1.0 - start)
         if not rising:
-            value, _ = value_and_slope(coefficients, degree, start, stack[stack.shape[0] - 1])
+            value, _ = value_and_slope(coefficients, degree, start)
             if best > 1.0 or side * value < side * depth:
                 best, depth = start, value
         start += CLUSTER

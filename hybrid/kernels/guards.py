@@ -191,7 +191,7 @@ def fit_polynomial(model, transition, t, h, start, end, offset, work):
     misfit = 0.0
     for i in range(degree):
         theta = 0.5 * (work.nodes[i] + work.nodes[i + 1])
-        fitted, _ = value_and_slope(work.polynomial, degree, theta, work.stack[0])
+        fitted, _ = value_and_slope(work.polynomial, degree, theta)
         value = value_on_interpolant(model, transition, t, h, start + (end - start) * theta, work) - offset
         misfit = max(misfit, abs(fitted - value))
         if not math.isfinite(value):

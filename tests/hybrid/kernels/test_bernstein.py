@@ -38,7 +38,7 @@ def stays(coefficients, side, band):
 
 @njit
 def value_and_slope(coefficients, theta):
-    return _value_and_slope(coefficients, coefficients.size - 1, theta, np.zeros(coefficients.size))
+    return _value_and_slope(coefficients, coefficients.size - 1, theta)
 
 
 def powers(roots, pairs=()):
