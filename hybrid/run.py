@@ -72,6 +72,13 @@ def driver_parts(series_only: bool, implicit: bool) -> Any:
     )
 
 
+def solver_parts(compiled: CompiledSystem, solver: RungeKutta) -> Any:
+    """The pieces that the driver needs for a system and a solver."""
+    kinds = [each.kind for each in compiled.emitted.propagators]
+    series_only = isinstance(solver, Taylor) and codes.RUNGE_KUTTA not in kinds
+    return driver_parts(series_only, bool(solver.tableau.implicit))
+
+
 def dense_degree(method: Any) -> int:
     """Degree of the polynomials that a record of steps holds."""
     return max(len(method.interpolant) - 1, HIGHEST_ORDER if method.order else 0)
@@ -357,7 +364,7 @@ def start(
         run,
         work,
         tangents,
-        driver_parts(codes.RUNGE_KUTTA not in model.propagator, bool(solver.tableau.implicit)),
+        solver_parts(compiled, solver),
         solver.max_steps,
         phase0,
     )

@@ -201,8 +201,8 @@ class Recurrences:
             expression,
             f"out[0, {left}]*out[0, {right}]",
             "0.0",
-            "for j in range(o + 1):",
-            f"    {name} += out[j, {left}]*out[o - j, {right}]",
+            "for j in range(u + ONE):",
+            f"    {name} += out[j, {left}]*out[u - j, {right}]",
         )
 
     def _square(self, expression: sympy.Expr, base: sympy.Expr) -> str:
@@ -211,8 +211,8 @@ class Recurrences:
             expression,
             f"out[0, {row}]*out[0, {row}]",
             "0.0",
-            "for j in range((o + 1)//2):",
-            f"    {name} += out[j, {row}]*out[o - j, {row}]",
+            "for j in range((u + ONE)//TWO):",
+            f"    {name} += out[j, {row}]*out[u - j, {row}]",
             f"{name} += {name}",
             "if o % 2 == 0:",
             f"    {name} += out[o//2, {row}]*out[o//2, {row}]",
@@ -226,8 +226,8 @@ class Recurrences:
             expression,
             f"{text or '1.0'}/out[0, {divisor}]",
             text or "0.0",
-            "for j in range(1, o + 1):",
-            f"    {name} -= out[j, {divisor}]*out[o - j, {row}]",
+            "for j in range(ONE, u + ONE):",
+            f"    {name} -= out[j, {divisor}]*out[u - j, {row}]",
             f"{name} /= out[0, {divisor}]",
         )
         self._store(expression)
@@ -249,8 +249,8 @@ class Recurrences:
             expression,
             _power_text(f"out[0, {u}]", exponent, k),
             "0.0",
-            "for j in range(1, o + 1):",
-            f"    {name} += (j*{k} - (o - j))*out[j, {u}]*out[o - j, {row}]",
+            "for j in range(ONE, u + ONE):",
+            f"    {name} += (j*{k} - (u - j))*out[j, {u}]*out[u - j, {row}]",
             f"{name} /= o*out[0, {u}]",
         )
         self._store(expression)
@@ -276,8 +276,8 @@ class Recurrences:
                 expression,
                 f"exp({argument})",
                 "0.0",
-                "for j in range(1, o + 1):",
-                f"    {name} += j*out[j, {u_row}]*out[o - j, {row}]",
+                "for j in range(ONE, u + ONE):",
+                f"    {name} += j*out[j, {u_row}]*out[u - j, {row}]",
                 f"{name} /= o",
             )
         self._store(expression)
@@ -300,9 +300,9 @@ class Recurrences:
             self.higher += [
                 f"{s_name} = 0.0",
                 f"{c_name} = 0.0",
-                "for j in range(1, o + 1):",
-                f"    {s_name} += j*out[j, {u_row}]*out[o - j, {c_row}]",
-                f"    {c_name} {sign or '+'}= j*out[j, {u_row}]*out[o - j, {s_row}]",
+                "for j in range(ONE, u + ONE):",
+                f"    {s_name} += j*out[j, {u_row}]*out[u - j, {c_row}]",
+                f"    {c_name} {sign or '+'}= j*out[j, {u_row}]*out[u - j, {s_row}]",
                 f"{s_name} /= o",
                 f"{c_name} /= o",
             ]
@@ -320,15 +320,15 @@ class Recurrences:
         self.first += [f"{name} = {function}({argument})", f"{slope_name} = 1.0 {sign or '+'} {name}*{name}"]
         self.higher += [
             f"{name} = 0.0",
-            "for j in range(1, o + 1):",
-            f"    {name} += j*out[j, {u_row}]*out[o - j, {slope_row}]",
+            "for j in range(ONE, u + ONE):",
+            f"    {name} += j*out[j, {u_row}]*out[u - j, {slope_row}]",
             f"{name} /= o",
         ]
         self._store(expression)
         self.higher += [
             f"{slope_name} = 0.0",
-            "for j in range(o + 1):",
-            f"    {slope_name} {sign or '+'}= out[j, {row}]*out[o - j, {row}]",
+            "for j in range(u + ONE):",
+            f"    {slope_name} {sign or '+'}= out[j, {row}]*out[u - j, {row}]",
         ]
         self._store(slope)
         return name
@@ -342,8 +342,8 @@ class Recurrences:
             expression,
             f"{MATH_FUNCTIONS[expression.func]}({argument})",
             "0.0",
-            "for j in range(1, o + 1):",
-            f"    {name} += j*out[j, {u_row}]*out[o - j, {slope}]",
+            "for j in range(ONE, u + ONE):",
+            f"    {name} += j*out[j, {u_row}]*out[u - j, {slope}]",
             f"{name} /= o",
         )
 
@@ -431,6 +431,7 @@ def loop(
         *indented(
             [
                 "shrink = 1.0/o",
+                "u = np.uint64(o)",
                 *(f"out[o, {target}] = shrink*{block.prefix}r{i}" for i, target in enumerate(targets)),
                 *block.higher,
                 *carried,

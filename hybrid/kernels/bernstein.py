@@ -12,6 +12,8 @@ from hybrid.kernels.layout import INLINE, KERNEL
 NO_ROOT = 2.0
 # Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
 CLUSTER = 1e-14
+# A Newton step this short has entered the quadratic convergence to a root that is simple to rounding.
+SETTLED = 1e-8
 
 
 @njit(**KERNEL)
@@ -33,14 +35,15 @@ def value_and_slope(coefficients, degree, theta):
         difference = coefficients[row + 1] - coefficients[row]
         value += basis * (coefficients[row] + theta * difference)
         slope += basis * difference
-        basis *= ratio * (degree - 1 - j) / (j + 1.0)
+        step = (degree - 1 - j) / (j + 1.0)
+        basis *= ratio * step
     return value, degree * slope
 
 
 @njit(**KERNEL)
 def simple_root(coefficients, degree, sign_left):
     """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
-    low, high = 0.0, 1.0
+    low, high, last = 0.0, 1.0, 1.0
     # The secant's root, unless an end is a root too: that one is not in the open interval.
     theta = coefficients[0] / (coefficients[0] - coefficients[degree])
     if not (low < theta < high):
@@ -54,11 +57,16 @@ def simple_root(coefficients, degree, sign_left):
         else:
             high = theta
         newton = theta - value / slope if slope != 0.0 else -1.0
+        change = abs(newton - theta)
+        # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
+        if change <= 2e-16 * theta or (last < SETTLED and change > 0.25 * last):
+            return theta
         if not (low < newton < high):
             newton = 0.5 * (low + high)
-        if abs(newton - theta) <= 2e-16 * abs(newton) or high - low <= 2e-16 * high:
+            change = high - low
+        if high - low <= 2e-16 * high:
             return newton
-        theta = newton
+        theta, last = newton, change
     return theta
 
 

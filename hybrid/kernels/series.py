@@ -37,6 +37,8 @@ SHARE = 1e-3
 SAFETY = 0.9
 # Terms at the end of a series that have to be small.
 TAIL = 8
+# Share of a guard's value that the high powers of its series may reach together to be left out of a proof.
+NEGLIGIBLE = 0.1
 # A flight without end is followed for this many times the time in which the state changes by its size.
 LONG = 100.0
 
@@ -63,10 +65,7 @@ def slope_at(series, column, order, s):
 def values_at(series, order, s, length, out):
     """Values of the first ``length`` series, into ``out``."""
     for i in range(length):
-        out[i] = series[order, i]
-    for o in range(order - 1, -1, -1):
-        for i in range(length):
-            out[i] = out[i] * s + series[o, i]
+        out[i] = value_at(series, i, order, s)
 
 
 @njit(**INLINE)
@@ -183,12 +182,13 @@ def to_bernstein(coefficients, degree):
     for k in range(1, degree + 1):
         share *= k / (degree - k + 1.0)
         coefficients[k] *= share
-    # Pascal's triangle. Only one entry is read in each turn: the one before is at hand.
-    for level in range(1, degree + 1):
-        before = coefficients[level - 1]
-        for j in range(level, degree + 1):
-            entry = coefficients[j]
-            coefficients[j] = entry + before
+    for level in range(degree):
+        # A view of what changes: its indices are plainly not negative, and need no check in the inner loop.
+        row = coefficients[level : degree + 1]
+        before = row[0]
+        for j in range(1, degree + 1 - level):
+            entry = row[j]
+            row[j] = entry + before
             before = entry
 
 
@@ -208,6 +208,22 @@ def powers_on_step(series, column, order, h, known_roots, coefficients):
     for k in range(1, degree + 1 - known_roots):
         reach += abs(coefficients[k])
     return degree - known_roots, reach
+
+
+@njit(**INLINE)
+def stays_clear(powers, degree, side, band, scratch):
+    """The second cheap proof that a guard keeps beyond ``band`` on its side of zero over a whole step.
+
+    Its leading powers must, by their Bernstein coefficients, even if all the others are against them.
+    """
+    leading, rest = degree, 0.0
+    while leading > 1 and rest + abs(powers[leading]) <= NEGLIGIBLE * abs(powers[0]):
+        rest += abs(powers[leading])
+        leading -= 1
+    for k in range(leading + 1):
+        scratch[k] = powers[k]
+    to_bernstein(scratch, leading)
+    return stays(scratch, leading, side, band + rest)
 
 
 @njit(**KERNEL)
@@ -243,6 +259,8 @@ def earliest_on_series(model, method, run, order, t, h, length, kind, work):
             if reach + abs(work.polynomial[0]) <= rounding:
                 continue
             run.on_guard[transition] = 0
+        if stays_clear(work.polynomial, degree, side, band, work.stack[0]):
+            continue
         to_bernstein(work.polynomial, degree)
         if stays(work.polynomial, degree, side, band):
             continue
@@ -283,10 +301,9 @@ def accept_series(model, run, tangents, order, h, work):
         on_guard += run.on_guard[model.outgoing[slot]]
     for i in range(n):
         # What the state is a sum of is what its rounding is judged by.
-        size, power = 0.0, 1.0
-        for o in range(order + 1):
-            size += abs(series[o, i]) * power
-            power *= h
+        size = abs(series[order, i])
+        for o in range(order - 1, -1, -1):
+            size = size * h + abs(series[o, i])
         run.scale[i] = max(run.scale[i] if on_guard > 0 else 0.0, size)
     length = n * (1 + tangents)
     values_at(series, order, h, length, run.y)
