@@ -4,6 +4,7 @@ A model is a graph: modes are smooth vector fields, transitions are guards and r
 it the import of the compiler, waits for the first call that needs it.
 """
 
+from hybrid.answer import Answer
 from hybrid.arc import Grazing, HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
@@ -15,9 +16,11 @@ from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.work_precision import WorkPrecision, work_precision
 
 __all__ = [
     "DOP853",
+    "Answer",
     "ArgumentError",
     "CompiledSystem",
     "Grazing",
@@ -37,6 +40,7 @@ __all__ = [
     "Taylor",
     "Transition",
     "Tsit5",
+    "WorkPrecision",
     "compile_system",
     "filippov",
     "periodic_orbit",
@@ -44,4 +48,5 @@ __all__ = [
     "saltation_matrix",
     "simulate",
     "stroboscopic_section",
+    "work_precision",
 ]
