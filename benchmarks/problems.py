@@ -16,7 +16,7 @@ from hybrid import Answer, Guard, HybridSystem, Mode, Reset, Transition
 
 
 def problems() -> dict[str, Problem]:
-    """By short name; what stands before the dash is the chart."""
+    """By short name; what stands before the first dash is the chart."""
     made = {}
     for D in ("0", "0.05"):
         facts = _stored("founding_system")["transients"][D]
@@ -34,14 +34,18 @@ def problems() -> dict[str, Problem]:
         made[f"founding-{D}-100"] = Problem(
             f"{title}, 100 periods", t_span=(0.0, 100 * period), reference=Answer(facts["x100"]), **common
         )
-        made[f"tangent-{D}"] = Problem(
+        made[f"founding-{D}-tangent"] = Problem(
             f"{title}, fundamental matrix of 10 periods",
             t_span=(0.0, 10 * period),
             reference=tangent,
             tangent=True,
             **common,
         )
-    return made | {"impact": _impact_oscillator(), "buck": _buck_converter(), "stick_slip": _stick_slip()}
+    return made | {
+        "others-impact": _impact_oscillator(),
+        "others-buck": _buck_converter(),
+        "others-stick-slip": _stick_slip(),
+    }
 
 
 def _stored(name: str) -> Any:
@@ -103,6 +107,7 @@ def _buck_converter() -> Problem:
         mode="off",
         peers=plain,
         straight=HybridSystem(state=("v", "i"), parameters=p, modes=[Mode("all", switched)]),
+        left_out=(0.25,),
     )
 
 

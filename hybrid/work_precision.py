@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from hybrid.answer import QUANTITIES, Answer, as_answer, errors_of, rounding_of
 from hybrid.arc import HybridArc
 from hybrid.errors import ArgumentError, unknown_name
+from hybrid.run import check_count
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta, Taylor, Tsit5
 from hybrid.system import HybridSystem
@@ -45,11 +46,12 @@ class WorkPrecision:
         the ``fundamental`` matrix the largest difference relative to the largest entry of the true one; of
         the ``exponents`` the largest. nan where a method does not have the quantity or did not arrive.
     seconds, compile_seconds
-        Median time of a run, and what the first run took more, ``(rows,)``.
+        Median time of a run, until it was given up where it was, and what the first run took more,
+        ``(rows,)``.
     steps, events
         Steps and events of a run, nan where unknown, ``(rows,)``.
     status
-        ``"SUCCESS"``, the name of another status code, or what was raised, ``(rows,)``.
+        ``"SUCCESS"``, the name of another status code, or the first line of what was raised, ``(rows,)``.
     reference_error
         Error of the reference itself, by quantity: nothing below it was measured.
     """
@@ -234,8 +236,10 @@ def work_precision(
         raise ArgumentError("methods must hold at least one solver or function; got none.")
     if not (len(tolerances) and all(tolerance > 0 for tolerance in tolerances)):
         raise ArgumentError(f"tolerances must be positive and at least one; got {tuple(tolerances)!r}.")
-    if not repeats >= 1:
-        raise ArgumentError(f"repeats must be at least 1; got {repeats!r}.")
+    check_count("repeats", repeats, 1)
+    for quantity in reference_error or ():
+        if quantity not in QUANTITIES:
+            raise ArgumentError(unknown_name("Quantity", quantity, QUANTITIES, "Quantities"))
     n, span = system.dimension, float(t_span[1]) - float(t_span[0])
     if reference is None:
         truth, check = (
@@ -331,6 +335,7 @@ def _measured(
         own = result.seconds if isinstance(result, Answer) else None
         return result, seconds if own is None else own
 
+    begin = clock()
     try:
         _, first = timed()
         result, seconds = timed()
@@ -340,7 +345,8 @@ def _measured(
     except ArgumentError:
         raise
     except Exception as error:  # another package's failure is a result of the comparison
-        return _Row(name, tolerance, status=f"{type(error).__name__}: {error}")
+        said = f"{type(error).__name__}: {error}".strip().splitlines()[0]
+        return _Row(name, tolerance, seconds=clock() - begin, status=said)
     answer = as_answer(name, result, *shape)
     seconds = float(np.median(times))
     return _Row(

@@ -6,7 +6,6 @@ import os
 
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -23,6 +22,8 @@ from hybrid import Answer
 
 jax.config.update("jax_enable_x64", True)
 MOST_STEPS = 65536
+# Tighter and it gives up now and then, on the rounding of its interpolant.
+ROOT = optimistix.Newton(1e-8, 1e-8)
 SOLVERS = {"Dopri8": diffrax.Dopri8, "Tsit5": diffrax.Tsit5}
 
 
@@ -36,25 +37,25 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
     ]
 
     def with_solver(name: str) -> Callable[[float], Answer]:
-        @functools.cache
-        def stays(rtol: float) -> list[Any]:
-            root = optimistix.Newton(1e-15, 1e-15)
-            return [
-                _stay(SOLVERS[name](), field, rtol, diffrax.Event(conditions, root, direction))
-                for field, conditions, direction in zip(fields, guards, ways, strict=True)
-            ]
+        stays = [
+            _stay(SOLVERS[name](), field, diffrax.Event(conditions, ROOT, direction))
+            for field, conditions, direction in zip(fields, guards, ways, strict=True)
+        ]
 
         def run(rtol: float) -> Answer:
-            t, end = problem.t_span
+            # As arrays: a number of Python's would be compiled in.
+            t, end, tolerance = map(jnp.asarray, (*problem.t_span, rtol))
             mode, x, times, steps = problem.first_mode, jnp.array(problem.x0, dtype=float), [], 0
             while True:
-                t, x, mask, taken = stays(rtol)[mode](t, end, x)
+                t, x, mask, taken, good = stays[mode](t, end, x, tolerance)
+                if not good:
+                    raise RuntimeError("the event's root was not found, or the steps ran out")
                 steps += int(taken)
                 fired = np.flatnonzero([bool(hit) for hit in mask])
                 if not fired.size:
-                    return Answer(x, times=times, steps=steps)
-                t, exit_ = float(t), int(fired[0])
-                times.append(t)
+                    return Answer(np.asarray(x), times=times, steps=steps)
+                exit_ = int(fired[0])
+                times.append(float(t))
                 if resets[mode][exit_] is not None:
                     x = resets[mode][exit_](t, x, None)
                 mode = given.exits[mode][exit_].target
@@ -64,16 +65,16 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
     return {f"diffrax {name}": with_solver(name) for name in SOLVERS}
 
 
-def _stay(solver: Any, field: Any, rtol: float, event: Any) -> Any:
-    control = diffrax.PIDController(rtol=rtol, atol=rtol * ATOL_OVER_RTOL)
-
+def _stay(solver: Any, field: Any, event: Any) -> Any:
     @eqx.filter_jit
-    def run(t0: Any, t1: Any, x0: Any) -> Any:
+    def run(t0: Any, t1: Any, x0: Any, rtol: Any) -> Any:
+        control = diffrax.PIDController(rtol=rtol, atol=rtol * ATOL_OVER_RTOL)
         solution = diffrax.diffeqsolve(
             diffrax.ODETerm(field), solver, t0, t1, None, x0,
-            stepsize_controller=control, event=event, max_steps=MOST_STEPS,
+            stepsize_controller=control, event=event, max_steps=MOST_STEPS, throw=False,
         )  # fmt: skip
-        return solution.ts[-1], solution.ys[-1], solution.event_mask, solution.stats["num_steps"]
+        good = diffrax.is_okay(solution.result)
+        return solution.ts[-1], solution.ys[-1], solution.event_mask, solution.stats["num_steps"], good
 
     return run
 
@@ -85,4 +86,4 @@ def _function(expressions: Sequence[sympy.Expr]) -> Any:
 
 def _scalar(expression: sympy.Expr) -> Any:
     inner = _function([expression])
-    return lambda t, x, args, **_: inner(t, x, args)[0]
+    return lambda t, y, args, **_: inner(t, y, args)[0]

@@ -67,7 +67,8 @@ class _Stay:
         start = np.zeros(n)
         if gap is not None:
             symbols |= {W: hy.make_vars("w"), given.t: hy.make_vars("t"), END: hy.expression(t_end)}
-            smooth = [e.subs(sympy.Max(0, gap) ** sympy.Rational(3, 2), W**3) for e in field]
+            # Not w**3: the series of a power divides by its base, which is zero at the start.
+            smooth = [e.subs(sympy.Max(0, gap) ** sympy.Rational(3, 2), W * gap) for e in field]
             rate = sum(gap.diff(s) * e for s, e in zip(given.x, smooth, strict=True))
             field = (*(2 * W * e for e in smooth), rate, 2 * W)
             names, start = [*names, "w", "t"], np.zeros(n + 2)

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from collections.abc import Callable
 
+import numpy as np
 import sympy
 
 from benchmarks.peers.problem import ATOL_OVER_RTOL, Problem, equations
@@ -40,7 +41,7 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
             atol=rtol * ATOL_OVER_RTOL,
             t0=problem.t_span[0],
             t1=problem.t_span[1],
-            x0=" ".join(map(repr, map(float, problem.x0[: len(given.x)]))),
+            x0=" ".join(map(repr, problem.straight_start.tolist())),
         )
         done = subprocess.run(
             ["octave", "--no-gui", "--quiet", "--eval", script],
@@ -50,9 +51,11 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
             timeout=PATIENCE,
         )
         state, steps, seconds = done.stdout.strip().splitlines()
-        return Answer(list(map(float, state.split())), steps=int(steps), seconds=float(seconds))
+        return problem.straight_answer(
+            np.array(state.split(), dtype=float), steps=int(steps), seconds=float(seconds)
+        )
 
-    return {"Octave ode23s, straight through": run}
+    return {"Octave ode23s, through": run}
 
 
 def version() -> str:

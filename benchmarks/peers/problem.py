@@ -33,6 +33,8 @@ class Problem:
         The model the peers solve: ``system``, or one with the same motion and simpler guards.
     straight
         One mode with the discontinuity inside; None where the state jumps.
+    left_out
+        Values at the end of the last components of the state, where ``straight`` does without them.
     tangent
         Whether the fundamental matrix is computed.
     """
@@ -45,11 +47,19 @@ class Problem:
     mode: str | None = None
     peers: HybridSystem | None = None
     straight: HybridSystem | None = None
+    left_out: Sequence[float] = ()
     tangent: bool = False
 
     @property
     def model(self) -> HybridSystem:
         return self.peers or self.system
+
+    @property
+    def straight_start(self) -> np.ndarray:
+        return np.array(self.x0[: len(self.x0) - len(self.left_out)], dtype=float)
+
+    def straight_answer(self, state: np.ndarray, **facts: Any) -> Answer:
+        return Answer([*state, *self.left_out], **facts)
 
     @property
     def first_mode(self) -> int:

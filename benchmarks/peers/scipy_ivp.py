@@ -43,7 +43,7 @@ def counted(field: Field, count: list[int], most: int) -> Field:
     def evaluate(t: float, x: np.ndarray) -> Sequence[float]:
         count[0] += 1
         if count[0] > most:
-            raise GivenUp
+            raise GivenUp(f"more than {most} evaluations of the field")
         return field(t, x)
 
     return evaluate
@@ -140,13 +140,12 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
     def not_stopping(method: str) -> Callable[[float], Answer]:
         def run(rtol: float) -> Answer:
             options = {"method": method, "rtol": rtol, "atol": rtol * ATOL_OVER_RTOL}
-            n = problem.straight.dimension
-            found = straight(through, problem.x0[:n], problem.t_span, **options)
-            return Answer(found.x, steps=found.steps)
+            found = straight(through, problem.straight_start, problem.t_span, **options)
+            return problem.straight_answer(found.x, steps=found.steps)
 
         return run
 
-    return made | {f"SciPy {method}, straight through": not_stopping(method) for method in STRAIGHT}
+    return made | {f"SciPy {method}, through": not_stopping(method) for method in STRAIGHT}
 
 
 def at_event(reset: Callable[[float, np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
