@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import time
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -76,7 +77,8 @@ def measure(problem: Problem, found: list[Any], repeats: int) -> WorkPrecision:
         mode=problem.mode,
         tangent=problem.tangent,
         repeats=repeats,
-        longest=2.0,
+        longest=1.0,
+        clock=time.process_time,
     )
 
 
@@ -117,7 +119,7 @@ def main() -> None:
     parser.add_argument("--full", action="store_true", help="print every run, too")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder of the pictures")
     arguments = parser.parse_args()
-    heading("Error against time: this library and its peers, one thread each.")
+    heading("Error against processor time: this library and its peers, one thread each.")
     found = list(peers(arguments.peers))
     print(f"Load at the start: {os.getloadavg()[0]:.1f}\n")
     results: dict[str, dict[str, WorkPrecision]] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -335,9 +336,12 @@ def _measured(
         own = result.seconds if isinstance(result, Answer) else None
         return result, seconds if own is None else own
 
+    first = float("nan")
+    # If the first run fails, so does the second, which tells how long that takes without compiling.
+    with suppress(Exception):
+        first = timed()[1]
     begin = clock()
     try:
-        _, first = timed()
         result, seconds = timed()
         times = [seconds]
         while len(times) < repeats and times[-1] <= longest:
