@@ -17,30 +17,30 @@ from hybrid import Answer, Guard, HybridSystem, Mode, Reset, Transition
 
 def problems() -> dict[str, Problem]:
     """By short name; what stands before the first dash is the chart."""
-    made = {}
+    founding = {}
     for D in ("0", "0.05"):
         facts = _stored("founding_system")["transients"][D]
         system = attrs.evolve(
             models.vibroimpact(), parameters={**models.vibroimpact().parameters, "D": float(D)}
         )
         period = system.forcing_period()
-        ten = Answer(facts["x10"], times=facts["times10"])
-        tangent = Answer(facts["x10"], times=facts["times10"], fundamental=facts["fundamental10"])
-        common = {"system": system, "x0": facts["x0"], "mode": "free", "straight": _always_touching(system)}
-        title = f"Founding system, D = {D} m"
-        made[f"founding-{D}-10"] = Problem(
-            f"{title}, 10 periods", t_span=(0.0, 10 * period), reference=ten, **common
-        )
-        made[f"founding-{D}-100"] = Problem(
-            f"{title}, 100 periods", t_span=(0.0, 100 * period), reference=Answer(facts["x100"]), **common
-        )
-        made[f"founding-{D}-tangent"] = Problem(
-            f"{title}, fundamental matrix of 10 periods",
-            t_span=(0.0, 10 * period),
-            reference=tangent,
-            tangent=True,
-            **common,
-        )
+        shape = {"system": system, "x0": facts["x0"], "mode": "free", "straight": _always_touching(system)}
+        ten, hundred = {"t_span": (0.0, 10 * period)}, {"t_span": (0.0, 100 * period)}
+        title, times = f"Founding system, D = {D} m", facts["times10"]
+        matrix = Answer(facts["x10"], times=times, fundamental=facts["fundamental10"])
+        founding |= {
+            f"founding-10-{D}": Problem(
+                f"{title}, 10 periods", reference=Answer(facts["x10"], times=times), **shape, **ten
+            ),
+            f"founding-tangent-{D}": Problem(
+                f"{title}, fundamental matrix of 10 periods", reference=matrix, tangent=True, **shape, **ten
+            ),
+            f"founding-100-{D}": Problem(
+                f"{title}, 100 periods", reference=Answer(facts["x100"]), **shape, **hundred
+            ),
+        }
+    # The long runs last.
+    made = dict(sorted(founding.items(), key=lambda item: item[1].t_span[1]))
     return made | {
         "others-impact": _impact_oscillator(),
         "others-buck": _buck_converter(),

@@ -77,7 +77,7 @@ def measure(problem: Problem, found: list[Any], repeats: int) -> WorkPrecision:
         mode=problem.mode,
         tangent=problem.tangent,
         repeats=repeats,
-        longest=1.0,
+        longest=0.5,
         clock=time.process_time,
     )
 
@@ -108,7 +108,6 @@ def draw(results: dict[str, WorkPrecision], path: Path) -> None:
         ax.set_title(title, loc="left", fontsize=10)
     figure.savefig(path, dpi=90, metadata={"Software": None})
     plt.close(figure)
-    print(f"Picture: {path.name}")
 
 
 def main() -> None:
@@ -127,14 +126,15 @@ def main() -> None:
         if arguments.only and not name.startswith(tuple(arguments.only)):
             continue
         result = measure(problem, found, arguments.repeats)
-        results.setdefault(name.split("-")[0], {})[problem.title] = result
+        group = name.split("-")[0]
+        results.setdefault(group, {})[problem.title] = result
         floor = ", ".join(f"{quantity} {error:.0e}" for quantity, error in result.reference_error.items())
         print(f"{problem.title} (error of the reference: {floor})", flush=True)
         if arguments.full:
             print(result)
         compare(result)
-    for group, charts in results.items():
-        draw(charts, arguments.out / f"work_precision_{group}.png")
+        # After every problem, so that a run that is broken off leaves a picture.
+        draw(results[group], arguments.out / f"work_precision_{group}.png")
     print(f"Load at the end: {os.getloadavg()[0]:.1f}")
 
 
