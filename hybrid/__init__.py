@@ -5,6 +5,7 @@ it the import of the compiler, waits for the first call that needs it.
 """
 
 from hybrid.accuracy import GlobalError, global_error
+from hybrid.answer import Answer
 from hybrid.arc import Grazing, HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
@@ -16,9 +17,11 @@ from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.work_precision import WorkPrecision, work_precision
 
 __all__ = [
     "DOP853",
+    "Answer",
     "ArgumentError",
     "CompiledSystem",
     "GlobalError",
@@ -39,6 +42,7 @@ __all__ = [
     "Taylor",
     "Transition",
     "Tsit5",
+    "WorkPrecision",
     "compile_system",
     "filippov",
     "global_error",
@@ -47,4 +51,5 @@ __all__ = [
     "saltation_matrix",
     "simulate",
     "stroboscopic_section",
+    "work_precision",
 ]

@@ -1,4 +1,4 @@
-"""Pictures of arcs and mode graphs with matplotlib, which is imported when the first one is drawn."""
+"""Pictures of arcs, mode graphs, work and precision; matplotlib is imported when the first one is drawn."""
 
 from __future__ import annotations
 
@@ -17,11 +17,16 @@ if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.axes import Axes
 
+    from hybrid.work_precision import WorkPrecision
+
 # Okabe and Ito's palette, told apart with any colour vision, the faintest hues last: a colour a mode.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 JUMP_COLOUR = "0.35"
 # Points drawn within each step of the solver, from the dense output.
 POINTS_A_STEP = 8
+MARKERS = "osD^vP*"
+# Height of a line of small text in points, to keep labels apart.
+LABEL_HEIGHT = 9.0
 # Arrows of a guard's direction.
 DIRECTIONS = {-1: "↓", 0: "↕", 1: "↑"}
 # Degrees between the loops of one mode.
@@ -171,6 +176,79 @@ def plot_graph(system: HybridSystem, ax: Axes | None = None) -> Axes:
     _frame(ax, np.array(list(where.values())), bool(loops))
     ax.text(0.5, 0.0, _key(system), transform=ax.transAxes, ha="center", va="top", fontsize=8, color="0.35")
     return ax
+
+
+def plot_work_precision(result: WorkPrecision, ax: Axes | None = None, quantity: str = "state") -> Axes:
+    """Draw error over time on logarithmic scales: a line a method, the reference's own error grey.
+
+    Nearer to the lower left is better. Runs that failed are left out, and errors of exactly zero.
+
+    Parameters
+    ----------
+    result
+        From :func:`hybrid.work_precision`.
+    ax
+        Axes to draw into; by default those of a new figure.
+    quantity
+        Which error: ``"state"``, ``"times"``, ``"saltation"``, ``"fundamental"`` or ``"exponents"``.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ArgumentError
+        If the quantity was not measured.
+    """
+    error = result.error_of(quantity)
+    (ax,) = _axes(ax, 1, figsize=(6.4, 4.6))
+    ends = []
+    for index, method in enumerate(result.methods):
+        rows = result.rows_of(method) & np.isfinite(error) & (error > 0)
+        if not np.any(rows):
+            continue
+        colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index // len(COLOURS) % len(MARKERS)]
+        ax.loglog(result.seconds[rows], error[rows], marker=marker, color=colour, markersize=4, linewidth=1.4)
+        ends.append((float(result.seconds[rows][-1]), float(error[rows][-1]), method, colour))
+    floor = result.reference_error[quantity]
+    if ends and np.isfinite(floor) and floor > 0:
+        low = ax.get_ylim()[0]
+        ax.axhspan(min(floor, low) / 10, floor, color="0.88", linewidth=0, zorder=0)
+        ax.set_ylim(bottom=min(low, floor / 3))
+    ax.set_xlabel("seconds")
+    ax.set_ylabel(f"error of the {quantity}")
+    _plain(ax)
+    _label_ends(ax, ends)
+    return ax
+
+
+def _label_ends(ax: Axes, ends: list[tuple[float, float, str, str]]) -> None:
+    """Names to the right of their points, pushed apart where one would cover another."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    # Limits before the layout, or it would shift what the labels were placed by.
+    low, high = ax.get_xlim()
+    ax.set_xlim(low, high * (high / low) ** 0.45)
+    figure.draw_without_rendering()
+    point = figure.dpi / 72
+    placed: list[tuple[float, float, float]] = []
+    for seconds, error, method, colour in sorted(ends, key=lambda end: end[1]):
+        x, y = ax.transData.transform((seconds, error)) / point
+        width, height = 0.55 * LABEL_HEIGHT * len(method), y
+        for left, right, other in sorted(placed, key=lambda label: label[2]):
+            if left < x + width and x < right and abs(height - other) < LABEL_HEIGHT:
+                height = other + LABEL_HEIGHT
+        placed.append((x, x + width, height))
+        ax.annotate(
+            method,
+            (seconds, error),
+            (6.0, height - y),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+            color=colour,
+        )
 
 
 def _places(graph: nx.MultiDiGraph) -> dict[str, np.ndarray]:

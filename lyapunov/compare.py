@@ -13,8 +13,8 @@ from hybrid.errors import unknown_name
 from hybrid.progress import progress_bar
 from hybrid.solvers import RungeKutta
 from hybrid.status import SUCCESS
+from hybrid.text import table
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
-from lyapunov.text import table
 
 
 @attrs.frozen(eq=False, repr=False)

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.text import table
 from lyapunov.demo_paper import DOUBTFUL, PAPER, ROWS
 from lyapunov.demo_study import STARTS, Regime
 from lyapunov.demo_tangents import TRAP_OMEGA, Explanation, Trap
 from lyapunov.floquet import floquet_exponents
 from lyapunov.statistics import running_tapered_mean
-from lyapunov.text import table
 
 # An explanation is worth the name if it leaves at most this part of the disagreement.
 EXPLAINS = 0.5

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks.peers import Edge, with_events
+from benchmarks.peers.scipy_ivp import Edge, with_events
 from benchmarks.stability.methods import EVENTS, LEAST, OURS, SCIPY, Curves
 from benchmarks.stability.wall import G
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate

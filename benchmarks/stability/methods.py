@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers import GivenUp, Outcome
+from benchmarks.peers.scipy_ivp import GivenUp, Outcome
 from hybrid import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.plot import COLOURS
 

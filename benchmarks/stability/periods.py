@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 import models
-from benchmarks.peers import Edge, with_events
+from benchmarks.peers.scipy_ivp import Edge, with_events
 from benchmarks.stability.methods import EVENTS, LEAST, OURS, SCIPY, WITHOUT_PERIOD, Curves
 from hybrid import HybridSystem
 from hybrid.kernels import codes

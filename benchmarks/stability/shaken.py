@@ -9,7 +9,7 @@ import attrs
 import mpmath
 import numpy as np
 
-from benchmarks.peers import Edge, straight, with_events
+from benchmarks.peers.scipy_ivp import Edge, straight, with_events
 from benchmarks.stability.methods import (
     EVENTS,
     IMPLICIT,

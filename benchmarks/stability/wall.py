@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.peers import Edge, straight, with_events
+from benchmarks.peers.scipy_ivp import Edge, straight, with_events
 from benchmarks.stability.methods import (
     EVENTS,
     LOOSE,

@@ -31,6 +31,7 @@ def answers() -> dict:
         "trace": trace,
         "D=0.05": _orbit_facts(FoundingSystem("0.05"), with_gap, periods=1),
         "D=0": _orbit_facts(FoundingSystem("0"), without, periods=2),
+        "transients": {D: _transient(FoundingSystem(D)) for D in ("0", "0.05")},
     }
 
 
@@ -127,15 +128,16 @@ class FoundingSystem:
         return series
 
     def advance(self, x, periods):
-        """State after whole forcing periods from free flight at phase 0, and the number of impacts."""
-        t, t_end, impacts = mp.mpf(0), 2 * mp.pi * periods / OMEGA, 0
+        """State after whole forcing periods from free flight at phase 0, times of impacts and releases."""
+        t, t_end, times = mp.mpf(0), 2 * mp.pi * periods / OMEGA, []
         while True:
             flight = self.free(x, t)
             hit = self.impact_time(flight, t, t_end)
             if hit is None:
-                return flight(t_end), impacts
+                return flight(t_end), times
             t, x = self.contact(flight(hit), hit)
-            impacts += 1
+            assert t < t_end, "the end falls into a contact"
+            times += [hit, t]
 
     def jacobian(self, x, periods):
         """Central differences of :meth:`advance`; their error is of order ``step^2``."""
@@ -158,10 +160,10 @@ def _orbit_facts(system, guess, periods):
     with mp.workdps(50):
         x = guess
         for _ in range(5):
-            image, impacts = system.advance(x, periods)
+            image, _ = system.advance(x, periods)
             M = system.jacobian(x, periods)
             x = x + mp.lu_solve(mp.eye(4) - M, image - x)
-        image, impacts = system.advance(x, periods)
+        image, times = system.advance(x, periods)
         multipliers, _ = mp.eig(system.jacobian(x, periods))
         T = 2 * mp.pi * periods / OMEGA
         exponents = sorted((mp.log(abs(m)) / T for m in multipliers), reverse=True)
@@ -169,8 +171,24 @@ def _orbit_facts(system, guess, periods):
         return {
             "x0": [float(v) for v in x],
             "periods": periods,
-            "impacts": impacts,
+            "impacts": len(times) // 2,
             "residual": float(mp.norm(image - x)),
             "multipliers": [[m.real, m.imag] for m in multipliers],
             "exponents": [float(e) for e in exponents],
+        }
+
+
+def _transient(system):
+    """From near rest, no contact yet: 10 periods with all times and the fundamental matrix, 100 periods."""
+    with mp.workdps(50):
+        x = mp.matrix(["0", "0.001", "0", "0"])
+        end, times = system.advance(x, 10)
+        M = system.jacobian(x, 10)
+        late, _ = system.advance(x, 100)
+        return {
+            "x0": [float(v) for v in x],
+            "x10": [float(v) for v in end],
+            "times10": [float(t) for t in times],
+            "fundamental10": [[float(v) for v in row] for row in M.tolist()],
+            "x100": [float(v) for v in late],
         }

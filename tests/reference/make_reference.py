@@ -1,7 +1,7 @@
 """Write the JSON files beside this script: exact or high-precision answers, computed without the library.
 
 All are computed with thirty digits or more and rounded to doubles at the end, so every digit counts.
-Run ``python tests/reference/make_reference.py``; it takes about two minutes.
+Run ``python tests/reference/make_reference.py``; it takes some minutes.
 """
 
 from __future__ import annotations

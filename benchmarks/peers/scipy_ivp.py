@@ -1,4 +1,4 @@
-"""How these problems are solved today with SciPy: events and restarts, straight through, smoothed."""
+"""SciPy: events and restarts, the documented way, or straight through the discontinuity."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
+
+from benchmarks.peers.problem import ATOL_OVER_RTOL, Problem, equations, returning
+from hybrid import Answer
 
 Field = Callable[[float, np.ndarray], Sequence[float]]
 # More right-hand sides than this and the run is given up, if the caller has no other limit.
@@ -27,19 +30,20 @@ class Edge(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """End state, times of events, right-hand sides evaluated; whether a restart failed to move on."""
+    """End state, times of events, right-hand sides evaluated, mode at the end, steps."""
 
     x: np.ndarray
     events: np.ndarray
     evaluations: int
     mode: int
+    steps: int
 
 
 def counted(field: Field, count: list[int], most: int) -> Field:
     def evaluate(t: float, x: np.ndarray) -> Sequence[float]:
         count[0] += 1
         if count[0] > most:
-            raise GivenUp
+            raise GivenUp(f"more than {most} evaluations of the field")
         return field(t, x)
 
     return evaluate
@@ -56,7 +60,7 @@ def straight(
     """One call, no events: the error control is left to cope with the discontinuity."""
     count = [0]
     solution = solve_ivp(counted(field, count, most_evaluations), t_span, x0, **options)
-    return Outcome(solution.y[:, -1], np.array([]), count[0], 0)
+    return Outcome(solution.y[:, -1], np.array([]), count[0], 0, len(solution.t) - 1)
 
 
 def with_events(
@@ -72,11 +76,13 @@ def with_events(
 ) -> Outcome:
     """Terminal events of the current mode, its reset, and a new call from there: the documented way."""
     (t, end), x, count, times = t_span, np.array(x0, dtype=float), [0], []
+    steps = 0
     while t < end and len(times) < most_events:
         events = [terminal(edge) for edge in edges[mode]]
         field = counted(fields[mode], count, most_evaluations)
         solution = solve_ivp(field, (t, end), x, events=events, **options)
         t, x = float(solution.t[-1]), solution.y[:, -1]
+        steps += len(solution.t) - 1
         if solution.status != 1:
             break
         fired = next(i for i, found in enumerate(solution.t_events) if len(found))
@@ -85,7 +91,7 @@ def with_events(
         if edge.reset is not None:
             x = np.array(edge.reset(x), dtype=float)
         mode = edge.target
-    return Outcome(x, np.array(times), count[0], mode)
+    return Outcome(x, np.array(times), count[0], mode, steps)
 
 
 def terminal(edge: Edge) -> Any:
@@ -94,3 +100,54 @@ def terminal(edge: Edge) -> Any:
 
     event.terminal, event.direction = True, edge.direction  # type: ignore[attr-defined]
     return event
+
+
+WITH_EVENTS = ("RK45", "DOP853", "LSODA", "Radau")
+STRAIGHT = ("DOP853", "LSODA", "Radau")
+
+
+def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
+    """SciPy's methods with events and restarts, and straight through; functions compiled with numba."""
+    given = equations(problem.model)
+    fields = [returning(field) for field in given.fields]
+    edges = [
+        [
+            Edge(
+                returning([leave.guard], scalar=True),
+                leave.direction,
+                leave.target,
+                None if leave.reset is None else at_event(returning(leave.reset)),
+            )
+            for leave in exits
+        ]
+        for exits in given.exits
+    ]
+
+    def stopping(method: str) -> Callable[[float], Answer]:
+        def run(rtol: float) -> Answer:
+            options = {"method": method, "rtol": rtol, "atol": rtol * ATOL_OVER_RTOL}
+            start = problem.first_mode
+            found = with_events(fields, edges, problem.x0, problem.t_span, mode=start, **options)
+            return Answer(found.x, times=found.events, steps=found.steps)
+
+        return run
+
+    made = {f"SciPy {method}": stopping(method) for method in WITH_EVENTS}
+    if problem.straight is None:
+        return made
+    through = returning(equations(problem.straight).fields[0])
+
+    def not_stopping(method: str) -> Callable[[float], Answer]:
+        def run(rtol: float) -> Answer:
+            options = {"method": method, "rtol": rtol, "atol": rtol * ATOL_OVER_RTOL}
+            found = straight(through, problem.straight_start, problem.t_span, **options)
+            return problem.straight_answer(found.x, steps=found.steps)
+
+        return run
+
+    return made | {f"SciPy {method}, through": not_stopping(method) for method in STRAIGHT}
+
+
+def at_event(reset: Callable[[float, np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    """Resets of these problems do not depend on time."""
+    return lambda x: reset(0.0, x)

@@ -1,0 +1,155 @@
+"""A problem as every peer gets it: a model's fields, guards and resets as expressions, and what is true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+import sympy
+
+from hybrid import Answer, HybridSystem
+from hybrid import symbolic as sym
+from hybrid.trace import model_symbols, trace
+
+# Ratio of absolute to relative tolerance, the same for all.
+ATOL_OVER_RTOL = 1e-2
+
+
+@attrs.frozen(eq=False)
+class Problem:
+    """One run of one system.
+
+    Attributes
+    ----------
+    title
+        For tables and charts.
+    system, x0, t_span, mode
+        The run, as :func:`hybrid.simulate` takes it.
+    reference
+        What is true.
+    peers
+        The model the peers solve: ``system``, or one with the same motion and simpler guards.
+    straight
+        One mode with the discontinuity inside; None where the state jumps.
+    left_out
+        Values at the end of the last components of the state, where ``straight`` does without them.
+    tangent
+        Whether the fundamental matrix is computed.
+    """
+
+    title: str
+    system: HybridSystem
+    x0: Sequence[float]
+    t_span: tuple[float, float]
+    reference: Answer | None
+    mode: str | None = None
+    peers: HybridSystem | None = None
+    straight: HybridSystem | None = None
+    left_out: Sequence[float] = ()
+    tangent: bool = False
+
+    @property
+    def model(self) -> HybridSystem:
+        return self.peers or self.system
+
+    @property
+    def straight_start(self) -> np.ndarray:
+        return np.array(self.x0[: len(self.x0) - len(self.left_out)], dtype=float)
+
+    def straight_answer(self, state: np.ndarray, **facts: Any) -> Answer:
+        return Answer([*state, *self.left_out], **facts)
+
+    @property
+    def first_mode(self) -> int:
+        return 0 if self.mode is None else self.model.mode_index(self.mode)
+
+
+class Leave(NamedTuple):
+    """Where a mode is left: expressions of guard and reset, direction, index of the mode that follows."""
+
+    guard: sympy.Expr
+    direction: int
+    target: int
+    reset: tuple[sympy.Expr, ...] | None
+
+
+class Equations(NamedTuple):
+    """Fields and exits by mode, in the symbols ``t`` and ``x``, the parameters replaced by their values."""
+
+    t: sympy.Symbol
+    x: tuple[sympy.Symbol, ...]
+    fields: tuple[tuple[sympy.Expr, ...], ...]
+    exits: tuple[tuple[Leave, ...], ...]
+
+
+def equations(system: HybridSystem) -> Equations:
+    """The equations of a model as plain SymPy."""
+    names = tuple(system.parameters)
+    symbols = model_symbols(system.dimension, len(names))
+    values = dict(zip(symbols.p, map(sympy.Float, system.parameter_values()), strict=True))
+
+    def expressions(function: Callable[..., Any]) -> tuple[sympy.Expr, ...]:
+        return tuple(_plain(e.subs(values)) for e in trace(function, system.state, names))
+
+    exits = tuple(
+        tuple(
+            Leave(
+                expressions(transition.guard.function)[0],
+                transition.guard.direction,
+                system.mode_index(transition.target or mode),
+                None if transition.reset is None else expressions(transition.reset.function),
+            )
+            for transition in system.transitions
+            if transition.source == mode
+        )
+        for mode in system.mode_names
+    )
+    fields = tuple(expressions(mode.field) for mode in system.modes)
+    return Equations(symbols.t, symbols.x, fields, exits)
+
+
+def _plain(expression: sympy.Expr) -> sympy.Expr:
+    """Choices and kinks as SymPy's own, which its printers know."""
+    for ours, theirs in (
+        (sym.Maximum, sympy.Max),
+        (sym.Absolute, sympy.Abs),
+        (sym.Sign, sympy.sign),
+        (sym.Remainder, sympy.Mod),
+        (sym.Less, lambda a, b: sympy.Piecewise((1, a < b), (0, True))),
+        (sym.Select, lambda condition, a, b: sympy.Piecewise((a, condition > 0), (b, True))),
+    ):
+        expression = expression.replace(ours, theirs)
+    return expression
+
+
+def compiled(expressions: Sequence[sympy.Expr]) -> Callable[[float, np.ndarray, np.ndarray], None]:
+    """``fill(t, x, out)``, compiled with numba."""
+    import numba
+
+    shared, results = sympy.cse(expressions)
+    lines = [f"    {name} = {sympy.pycode(value)}" for name, value in shared]
+    lines += [f"    out[{i}] = {sympy.pycode(value)}" for i, value in enumerate(results)]
+    namespace: dict[str, Any] = {"math": __import__("math")}
+    exec("def fill(t, x, out):\n" + "\n".join(lines), namespace)
+    return numba.njit(namespace["fill"])
+
+
+def returning(expressions: Sequence[sympy.Expr], scalar: bool = False) -> Callable[[float, np.ndarray], Any]:
+    """``f(t, x)``, compiled with numba: an array, or the one value."""
+    import numba
+
+    fill, n = compiled(expressions), len(expressions)
+
+    @numba.njit
+    def values(t: float, x: np.ndarray) -> np.ndarray:
+        out = np.empty(n)
+        fill(t, x, out)
+        return out
+
+    @numba.njit
+    def value(t: float, x: np.ndarray) -> float:
+        return values(t, x)[0]
+
+    return value if scalar else values
