@@ -63,7 +63,7 @@ def simple_root(coefficients, degree, sign_left):
             return theta
         if not (low < newton < high):
             newton = 0.5 * (low + high)
-            change = high - low
+            change = 1.0
         if high - low <= 2e-16 * high:
             return newton
         theta, last = newton, change
