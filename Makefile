@@ -15,7 +15,7 @@ demo: $(VENV)/.installed
 	$(BIN)/python -m lyapunov $(ARGS)
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n auto $(ARGS)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -59,7 +59,7 @@ def simple_root(coefficients, degree, sign_left):
         newton = theta - value / slope if slope != 0.0 else -1.0
         change = abs(newton - theta)
         # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
-        if change <= 2e-16 * theta or (last < SETTLED and change > 0.25 * last):
+        if change <= 2e-16 * theta or (last < SETTLED * theta and change > 0.25 * last):
             return theta
         if not (low < newton < high):
             newton = 0.5 * (low + high)
