@@ -42,9 +42,9 @@ def problems() -> dict[str, Problem]:
     # The long runs last.
     made = dict(sorted(founding.items(), key=lambda item: item[1].t_span[1]))
     return made | {
-        "others-impact": _impact_oscillator(),
-        "others-buck": _buck_converter(),
-        "others-stick-slip": _stick_slip(),
+        "impact": _impact_oscillator(),
+        "buck": _buck_converter(),
+        "stick_slip": _stick_slip(),
     }
 
 

@@ -98,12 +98,14 @@ def compare(result: WorkPrecision) -> None:
 
 
 def draw(results: dict[str, WorkPrecision], path: Path) -> None:
-    rows = (len(results) + 1) // 2
-    figure, grid = plt.subplots(rows, 2, figsize=(15, 5.4 * rows), layout="constrained", squeeze=False)
-    for ax in grid.T.ravel()[len(results) :]:
+    columns = min(len(results), 2)
+    rows = -(-len(results) // columns)
+    figure, grid = plt.subplots(
+        rows, columns, figsize=(7.5 * columns, 5.4 * rows), layout="constrained", squeeze=False
+    )
+    for ax in grid.ravel()[len(results) :]:
         ax.set_axis_off()
-    # Column by column.
-    for ax, (title, result) in zip(grid.T.ravel(), results.items(), strict=False):
+    for ax, (title, result) in zip(grid.ravel(), results.items(), strict=False):
         result.plot(ax, "fundamental" if "fundamental" in result.error else "state")
         ax.set_title(title, loc="left", fontsize=10)
     figure.savefig(path, dpi=90, metadata={"Software": None})
@@ -126,7 +128,7 @@ def main() -> None:
         if arguments.only and not name.startswith(tuple(arguments.only)):
             continue
         result = measure(problem, found, arguments.repeats)
-        group = name.split("-")[0]
+        group = name.split("-", maxsplit=1)[0]
         results.setdefault(group, {})[problem.title] = result
         floor = ", ".join(f"{quantity} {error:.0e}" for quantity, error in result.reference_error.items())
         print(f"{problem.title} (error of the reference: {floor})", flush=True)

@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 import sksundae
 
-from benchmarks.peers.problem import ATOL_OVER_RTOL, Leave, Problem, compiled, equations, returning
+from benchmarks.peers.problem import (
+    ATOL_OVER_RTOL,
+    Leave,
+    Problem,
+    compiled,
+    equations,
+    limit_events,
+    returning,
+)
 from hybrid import Answer
 
 MOST_STEPS = 1_000_000
@@ -38,6 +46,7 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
                     return Answer(x, times=times)
                 fired = int(np.flatnonzero(solution.i_events[-1])[0])
                 times.append(t)
+                limit_events(times)
                 if resets[mode][fired] is not None:
                     x = resets[mode][fired](t, x)
                 mode = given.exits[mode][fired].target

@@ -17,7 +17,7 @@ import numpy as np
 import optimistix
 import sympy
 
-from benchmarks.peers.problem import ATOL_OVER_RTOL, Problem, equations
+from benchmarks.peers.problem import ATOL_OVER_RTOL, Problem, equations, limit_events
 from hybrid import Answer
 
 jax.config.update("jax_enable_x64", True)
@@ -56,6 +56,7 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
                     return Answer(np.asarray(x), times=times, steps=steps)
                 exit_ = int(fired[0])
                 times.append(float(t))
+                limit_events(times)
                 if resets[mode][exit_] is not None:
                     x = resets[mode][exit_](t, x, None)
                 mode = given.exits[mode][exit_].target

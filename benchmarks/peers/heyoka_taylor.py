@@ -15,7 +15,7 @@ import heyoka as hy
 import numpy as np
 import sympy
 
-from benchmarks.peers.problem import Equations, Problem, equations, returning
+from benchmarks.peers.problem import Equations, Problem, equations, limit_events, returning
 from hybrid import Answer
 
 DIRECTIONS = {
@@ -46,6 +46,7 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
             if fired is None:
                 return Answer(x, times=times, steps=steps)
             times.append(t)
+            limit_events(times)
             if resets[mode][fired] is not None:
                 x = resets[mode][fired](t, x)
             mode = given.exits[mode][fired].target

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable
 
 import numpy as np
@@ -50,6 +51,8 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
             text=True,
             check=True,
             timeout=PATIENCE,
+            # Where it leaves its workspace when it is broken off.
+            cwd=tempfile.gettempdir(),
         )
         state, steps, seconds = done.stdout.strip().splitlines()
         return problem.straight_answer(

@@ -16,6 +16,15 @@ from hybrid.trace import model_symbols, trace
 # Ratio of absolute to relative tolerance, the same for all.
 ATOL_OVER_RTOL = 1e-2
 
+# A mode that starts on one of its guards can fire again and again at one instant.
+MOST_EVENTS = 2000
+
+
+def limit_events(times: Sequence[float]) -> None:
+    """RuntimeError if a run has more events than any of these problems."""
+    if len(times) > MOST_EVENTS:
+        raise RuntimeError(f"more than {MOST_EVENTS} events, the last at t = {times[-1]:.6g}")
+
 
 @attrs.frozen(eq=False)
 class Problem:

@@ -103,6 +103,7 @@ def terminal(edge: Edge) -> Any:
 
 
 WITH_EVENTS = ("RK45", "DOP853", "LSODA", "Radau")
+MOST_THROUGH = 200_000
 STRAIGHT = ("DOP853", "LSODA", "Radau")
 
 
@@ -140,7 +141,9 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
     def not_stopping(method: str) -> Callable[[float], Answer]:
         def run(rtol: float) -> Answer:
             options = {"method": method, "rtol": rtol, "atol": rtol * ATOL_OVER_RTOL}
-            found = straight(through, problem.straight_start, problem.t_span, **options)
+            found = straight(
+                through, problem.straight_start, problem.t_span, most_evaluations=MOST_THROUGH, **options
+            )
             return problem.straight_answer(found.x, steps=found.steps)
 
         return run

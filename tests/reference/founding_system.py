@@ -16,6 +16,7 @@ M2, OMEGA2, XI2 = mp.mpf(100), mp.mpf("5.646"), mp.mpf("0.036")
 P, OMEGA = mp.mpf(500), mp.mpf("7.4")
 CHI = M2 / M1
 TAYLOR_ORDER = 40
+SAMPLES_A_PERIOD = 200
 
 
 def answers() -> dict:
@@ -79,13 +80,17 @@ class FoundingSystem:
     def impact_time(self, flight, t0, t_end):
         """First time in ``(t0, t_end)`` at which ``x1 - x2`` rises through zero, or None."""
         gap = lambda t: flight(t)[0] - flight(t)[1]  # noqa: E731
-        samples = [t0 + (t_end - t0) * mp.mpf(i) / 300 for i in range(1, 301)]
-        with mp.workdps(15):
-            gaps = [gap(t) for t in samples]
-        for left, right, a, b in zip(samples, samples[1:], gaps, gaps[1:], strict=False):
-            if a < 0 <= b:
+        # Fine enough for the shortest stay apart that these motions have, however far the end is.
+        step = 2 * mp.pi / OMEGA / SAMPLES_A_PERIOD
+        left, before = t0 + step / 100, mp.mpf(-1)
+        while left < t_end:
+            right = min(left + step, t_end)
+            with mp.workdps(15):
+                after = gap(right)
+            if before < 0 <= after:
                 tolerance = mp.mpf(10) ** (-2 * mp.mp.dps + 10)  # of the gap squared
                 return mp.findroot(gap, (left, right), solver="illinois", tol=tolerance)
+            left, before = right, after
         return None
 
     def contact(self, x, t0):
