@@ -25,9 +25,10 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
 )
-from hybrid.kernels.guards import error_band, note_grazing, rounding_band
+from hybrid.kernels.guards import error_band, guard_speed, guard_value, note_grazing, rounding_band
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.record import remember_grazing, start_record
+from hybrid.kernels.step import rates
 
 # Series that can be trusted to the last digit are taken to this order, and cut off below rounding.
 EXACT_ORDER = 28
@@ -335,6 +336,24 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
 
 
 @njit(**KERNEL)
+def reach_guard(model, run, tangents, transition, t, work):
+    """Bring the state onto the guard by an Euler step in time, whose length is returned.
+
+    A contact ends where the root of its guard vanishes. The guard differs from the square of the root by the
+    error of the step, and beyond its rounding it would count as not yet, or once more, crossed.
+    """
+    field = work.stages[0]
+    rates(model, run.count[MODE], t, run.y, tangents, field)
+    speed = guard_speed(model, transition, t, run.y, field, work.gradient)
+    if speed == 0.0:
+        return 0.0
+    correction = -guard_value(model, transition, t, run.y, work.scalar) / speed
+    for i in range(model.dimension * (1 + tangents)):
+        run.y[i] += correction * field[i]
+    return correction
+
+
+@njit(**KERNEL)
 def series_step(model, method, run, record, tangents, remaining, work):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
@@ -389,6 +408,8 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if record.step_time.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
+    if fired != NO_TRANSITION and clock >= 0:
+        span += reach_guard(model, run, tangents, fired, t + span, work)
     return GO_ON, span
 
 

@@ -165,3 +165,16 @@ def test_a_flight_without_end_is_followed_in_steps():
     system = HybridSystem(state=("x",), modes=[Mode("go", lambda t, x, p: (1.0,))])
     section = hybrid.poincare_section(system, (0.0,), Guard(lambda t, x, p: x.x - 1e7, +1), points=1)
     assert section.t[0] == pytest.approx(1e7, rel=1e-14)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_a_contact_is_left_once(tolerance):
+    """What the root of a guard loses to the tolerance must not make the guard fire again."""
+    arc = simulate(
+        models.vibroimpact(),
+        (0.0, 0.001, 0.0, 0.0),
+        (0.0, 40 * np.pi / 7.4),
+        solver=Taylor(rtol=tolerance, atol=1e-2 * tolerance),
+    )
+    assert np.all(np.diff(arc.jumps.t) > 1e-5)
+    assert [jump.transition for jump in arc.jumps] == ["impact", "release"] * (len(arc.jumps) // 2)
