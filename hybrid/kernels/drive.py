@@ -174,3 +174,8 @@ def advance(
             run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
             run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
+            # A crossing refused where it was refused before: the state does not get away from its guard.
+            if run.count[PENDING] == NO_TRANSITION and span == 0.0:
+                run.count[JUMPS_HERE] += 1
+                if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
+                    return STUCK
