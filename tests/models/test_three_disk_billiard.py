@@ -73,4 +73,5 @@ def test_closed_pocket():
     assert result.jumps_per_interval == pytest.approx(perimeter / (math.pi * area), rel=0.02)
     assert result.exponents[0] > 1.0
     np.testing.assert_allclose(result.exponents + result.exponents[::-1], 0.0, atol=1e-9)
-    np.testing.assert_allclose(result.exponents[1:3], 0.0, atol=1e-9)
+    # Speed and direction of flight neither grow nor shrink; vectors turn into them like one over the time.
+    np.testing.assert_allclose(result.exponents[1:3], 0.0, atol=3e-3)
