@@ -12,7 +12,7 @@ import attrs
 import sympy
 from sympy.core.parameters import distribute
 
-from hybrid.kernels.codes import DESINGULARISED, EXACT, PROPAGATORS, RUNGE_KUTTA, TAYLOR
+from hybrid.kernels.codes import DESINGULARISED, EXACT, HIGHEST_ORDER, PROPAGATORS, RUNGE_KUTTA, TAYLOR
 from hybrid.printer import assignments
 from hybrid.series import ONE_THEN_ZERO, Constants, NoSeries, Recurrences, directional, indented, loop
 from hybrid.symbolic import (
@@ -31,7 +31,6 @@ ROOT = sympy.Symbol("w", positive=True)
 ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 # Columns between those of the guards and the others: the time since the step's start, the integral of div f.
 CLOCK, DIVERGENCE, OTHERS = range(3)
-HIGHEST_DEGREE = 28
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
 
@@ -94,7 +93,7 @@ def _series(
     for boundary in boundaries:
         if boundary.guard is None:
             raise NoSeries("a guard of it is not traced")
-        guards.append(_simplified(boundary.guard, []))
+        guards.append(boundary.guard)
     z = _singular_base(field, known)
     if z is not None:
         columns, statements = _write_desingularised(field, guards, z, symbols)
@@ -109,7 +108,7 @@ def _series(
         return Propagator(TAYLOR, 0, columns, "affine, its forcing has no short series", statements)
     powers = [_polynomial(guard, symbols) for guard in guards] or [1]
     degree = _degree(field, jacobian, symbols) * max(powers) * (0 not in powers)
-    if degree > HIGHEST_DEGREE:
+    if degree > HIGHEST_ORDER:
         degree = 0
     how = f"polynomials of degree {degree}" if degree else "affine in the state"
     return Propagator(EXACT, degree, columns, how, statements)

@@ -14,7 +14,6 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.solvers import RungeKutta, Taylor
-from hybrid.solvers.taylor import HIGHEST_ORDER
 from hybrid.status import Status, StatusCode, run_status
 from hybrid.system import HybridSystem
 
@@ -81,7 +80,7 @@ def solver_parts(compiled: CompiledSystem, solver: RungeKutta) -> Any:
 
 def dense_degree(method: Any) -> int:
     """Degree of the polynomials that a record of steps holds."""
-    return max(len(method.interpolant) - 1, HIGHEST_ORDER if method.order else 0)
+    return max(len(method.interpolant) - 1, codes.HIGHEST_ORDER if method.order else 0)
 
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
@@ -119,7 +118,7 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
         fit=np.linalg.inv(_bernstein_basis(nodes)),
         systems=systems,
         pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
-        series=np.zeros((HIGHEST_ORDER + 1, length + columns) if method.order else (0, 0)),
+        series=np.zeros((codes.HIGHEST_ORDER + 1, length + columns) if method.order else (0, 0)),
     )
 
 

@@ -70,6 +70,9 @@ LIMIT_OF_CHATTER = 2
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 
+# Highest order of a series, and the order of exact ones: what the memory for them is laid out for.
+HIGHEST_ORDER = 28
+
 # Propagators of a mode, and how people read them.
 RUNGE_KUTTA = 0
 TAYLOR = 1

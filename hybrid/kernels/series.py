@@ -16,6 +16,7 @@ from hybrid.kernels.codes import (
     EXACT,
     GO_ON,
     GRAZING_PLACE,
+    HIGHEST_ORDER,
     MODE,
     NEXT_STEP,
     NO_TRANSITION,
@@ -30,8 +31,7 @@ from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.step import rates
 
-# Series that can be trusted to the last digit are taken to this order, and cut off below rounding.
-EXACT_ORDER = 28
+# Series that can be trusted to the last digit are cut off below rounding.
 EXACT_TOLERANCE = 1e-17
 # Share of the largest component that is an absolute tolerance for the others.
 SHARE = 1e-3
@@ -364,7 +364,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     mode, t, series = run.count[MODE], run.clock[PHASE], work.series
     kind, degree = model.propagator[mode], model.degree[mode]
     exact = kind == EXACT
-    order = EXACT_ORDER if exact else method.order
+    order = HIGHEST_ORDER if exact else method.order
     if degree > 0:
         order = degree
     guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import attrs
 
+from hybrid.kernels.codes import HIGHEST_ORDER
 from hybrid.solvers.dop853 import DOP853
 from hybrid.solvers.runge_kutta import RungeKutta
 from hybrid.solvers.tableau import Tableau
 
 LOWEST_ORDER = 12
-HIGHEST_ORDER = 28
 
 
 @attrs.frozen
