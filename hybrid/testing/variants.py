@@ -194,6 +194,7 @@ def _freed(
         guard=Guard(
             scaled_guard,
             transition.guard.direction,
+            when=unaware(transition.guard.when),
             gradient=None if gradient is None else scaled_gradient,
         ),
         reset=None if transition.is_marker else Reset(map_off_guard),

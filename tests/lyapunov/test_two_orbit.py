@@ -16,7 +16,9 @@ PERIOD = 2 * np.pi
 @pytest.fixture(scope="module")
 def stable():
     """The impact oscillator on its stable orbit; two orbits at rounding would coincide sooner or later."""
-    return lyapunov.two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=300)
+    return lyapunov.two_orbit_exponents(
+        models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=300, solver=hybrid.DOP853()
+    )
 
 
 @pytest.fixture(scope="module")
