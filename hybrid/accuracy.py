@@ -122,12 +122,14 @@ def global_error(
     begin = str(arc.mode[0])
 
     def moved(rung: RungeKutta, sign: np.ndarray) -> HybridArc:
+        # A start on a guard may lie beyond it if it is moved, or off the surface that its mode keeps to.
+        others = []
         for side in (sign, -sign):
-            other = run(rung, arc.x[0] + side * aside, begin)
-            # A start on a guard may lie beyond it if it is moved.
-            if _starts_alike(arc, other):
-                return other
-        return run(rung, arc.x[0], begin)
+            others.append(run(rung, arc.x[0] + side * aside, begin))
+            if _alike(arc, others[-1]):
+                return others[-1]
+        near = (other for other in others if _starts_alike(arc, other))
+        return next(near, None) or run(rung, arc.x[0], begin)
 
     return _compare(arc, *map(moved, rungs, signs))
 
