@@ -44,7 +44,7 @@ NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC = CONTINUITY, ORDER, ELASTIC
 
 
 DOWNHILL = {"states": {"theta": (-0.3, 0.4), "omega": (0.5, 2.0)}}
-BUCK = {"states": {"v": (11.4, 12.2), "i": (0.4, 0.7), "tau": (0.0, 0.5)}, "t_span": (0.0, 8e-4)}
+BUCK = {"states": {"v": (11.4, 12.4), "i": (0.4, 0.7), "tau": (0.0, 0.5)}, "t_span": (0.0, 1.6e-3)}
 
 
 def friction():
@@ -119,7 +119,7 @@ def rattler():
         ),
         (
             models.buck_converter(),
-            {**BUCK, "parameters": {**models.buck_converter().parameters, "E": (24.0, 26.0)}},
+            {**BUCK, "examples": 30, "parameters": {**models.buck_converter().parameters, "E": (24.0, 26.0)}},
             {NOT_CONTINUOUS, NOT_ELASTIC},
         ),
     ],
@@ -129,7 +129,7 @@ def rattler():
     ],
 )  # fmt: skip
 def test_ours(system, options, unchecked):
-    report = check_system(system, examples=15, **options)
+    report = check_system(system, **{"examples": 15, **options})
     assert set(report.unchecked) == unchecked
     assert not report.never_seen
 
