@@ -16,7 +16,7 @@ import numpy as np
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 from hybrid.errors import ArgumentError
 from hybrid.kernels.codes import NO_MODE
-from hybrid.load import load_kernels
+from hybrid.load import kernels_key, load_kernels
 
 if TYPE_CHECKING:
     from hybrid.emit import Emitted
@@ -63,12 +63,11 @@ class CompiledSystem:
             )
         return "\n".join(lines)
 
-    @property
-    def series_columns(self) -> int:
+    def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need besides state and tangent vectors."""
         sources = [transition.source for transition in self.system.transitions]
         return max(
-            each.columns + sources.count(name)
+            each.columns + tangents * each.columns_per_tangent + sources.count(name)
             for name, each in zip(self.system.mode_names, self.emitted.propagators, strict=True)
         )
 
@@ -144,7 +143,8 @@ def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
     if emitted.opaque:
         return _decorated(_executed(emitted), cached=False)
     if emitted.source not in _ROLES:
-        folder = cache_directory() / "models"
+        # Series call a kernel, which becomes part of them.
+        folder = cache_directory() / f"models-{kernels_key()}"
         namespace = _imported(_written(emitted.source, folder))
         with compiled_into(folder):
             _ROLES[emitted.source] = _decorated(namespace, cached=True)

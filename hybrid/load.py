@@ -18,14 +18,14 @@ MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) .
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
     """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
-    folder = cache_directory() / f"kernels-{_kernels_key()}"
+    folder = cache_directory() / f"kernels-{kernels_key()}"
     kept = any(folder.rglob(f"{module.rpartition('.')[2]}.*.nbi"))
     with compiled_into(folder), nullcontext() if kept else announced(MESSAGE):
         return importlib.import_module(module)
 
 
 @cache
-def _kernels_key() -> str:
+def kernels_key() -> str:
     """Key of all kernel sources together, read once for all modules that are loaded."""
     sources = sorted((Path(__file__).parent / "kernels").glob("*.py"))
     return source_key(*(path.read_text(encoding="utf-8") for path in sources))

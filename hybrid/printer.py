@@ -49,8 +49,7 @@ IMPORTS = (
     "    acos, acosh, asin, asinh, atan, atan2, atanh, copysign, cos, cosh, exp, expm1, fmod, hypot, inf,\n"
     "    log, log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
     ")\n"
-    # Orders in convolutions are unsigned: no index need be asked in each turn whether it is negative.
-    "ONE, TWO = np.uint64(1), np.uint64(2)\n"
+    "from hybrid.kernels.convolution import convolve\n"
 )
 
 COMPARISONS: dict[type[sympy.Basic], str] = {sym.Less: "<", sym.LessEqual: "<=", sym.Equal: "=="}

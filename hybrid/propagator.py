@@ -12,9 +12,29 @@ import attrs
 import sympy
 from sympy.core.parameters import distribute
 
-from hybrid.kernels.codes import DESINGULARISED, EXACT, HIGHEST_ORDER, PROPAGATORS, RUNGE_KUTTA, TAYLOR
+from hybrid.kernels.codes import (
+    DESINGULARISED,
+    EXACT,
+    HIGHEST_ORDER,
+    NARROW,
+    PROPAGATORS,
+    RUNGE_KUTTA,
+    TAYLOR,
+)
 from hybrid.printer import assignments
-from hybrid.series import ONE_THEN_ZERO, Constants, NoSeries, Recurrences, directional, indented, loop
+from hybrid.series import (
+    ONE_THEN_ZERO,
+    PAIRS,
+    Constants,
+    NoSeries,
+    Recurrences,
+    directional,
+    indented,
+    padded,
+    padded_for_all,
+    state_loop,
+    tangent_loop,
+)
 from hybrid.symbolic import (
     Absolute,
     Less,
@@ -53,19 +73,20 @@ class Propagator:
         A code of ``hybrid.kernels.codes``: RUNGE_KUTTA, TAYLOR, EXACT or DESINGULARISED.
     degree
         Degree in time of every solution, and of every guard along it, if those are polynomials, else 0.
-    columns
-        Columns that the series need beside those of state, tangents and guards.
     reason
         What tracing found.
     statements
         Body of the mode in the role ``series``.
+    columns, columns_per_tangent
+        Columns that the series need beside those of state, tangents and guards.
     """
 
     kind: int
     degree: int
-    columns: int
     reason: str
     statements: tuple[str, ...] = ()
+    columns: int = 0
+    columns_per_tangent: int = 0
 
     def __str__(self) -> str:
         return f"{PROPAGATORS[self.kind]} ({self.reason})"
@@ -76,13 +97,13 @@ def propagator(
 ) -> Propagator:
     """The propagator of a mode from its traced field (None if it could not be traced) and its guards."""
     if field is None:
-        return Propagator(RUNGE_KUTTA, 0, 0, "its field is not traced")
+        return Propagator(RUNGE_KUTTA, 0, "its field is not traced")
     known = [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
     try:
         with distribute(False):
             return _series(field, boundaries, known, symbols)
     except NoSeries as reason:
-        return Propagator(RUNGE_KUTTA, 0, 0, str(reason))
+        return Propagator(RUNGE_KUTTA, 0, str(reason))
 
 
 def _series(
@@ -96,22 +117,22 @@ def _series(
         guards.append(boundary.guard)
     z = _singular_base(field, known)
     if z is not None:
-        columns, statements = _write_desingularised(field, guards, z, symbols)
+        written = _write_desingularised(field, guards, z, symbols)
         return Propagator(
-            DESINGULARISED, 0, columns, "half-integer powers of a guard, on the clock dt = 2 w ds", statements
+            DESINGULARISED, 0, "half-integer powers of a guard, on the clock dt = 2 w ds", *written
         )
-    columns, statements = _write(field, guards, symbols)
+    written = _write(field, guards, symbols)
     jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
     if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
-        return Propagator(TAYLOR, 0, columns, "smooth, nonlinear in the state", statements)
+        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *written)
     if not all(_elementary(entry, symbols) for entry in field):
-        return Propagator(TAYLOR, 0, columns, "affine, its forcing has no short series", statements)
+        return Propagator(TAYLOR, 0, "affine, its forcing has no short series", *written)
     powers = [_polynomial(guard, symbols) for guard in guards] or [1]
     degree = _degree(field, jacobian, symbols) * max(powers) * (0 not in powers)
     if degree > HIGHEST_ORDER:
         degree = 0
     how = f"polynomials of degree {degree}" if degree else "affine in the state"
-    return Propagator(EXACT, degree, columns, how, statements)
+    return Propagator(EXACT, degree, how, *written)
 
 
 def _simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
@@ -200,7 +221,7 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 
 def _write(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
-) -> tuple[int, tuple[str, ...]]:
+) -> tuple[tuple[str, ...], int, int]:
     body = _Body(len(symbols.x), len(guards))
     block = body.block({x: str(i) for i, x in enumerate(symbols.x)}, (symbols.t, ONE_THEN_ZERO))
     seeds = _seeds(symbols)
@@ -212,7 +233,7 @@ def _write(
 
 def _write_desingularised(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols
-) -> tuple[int, tuple[str, ...]]:
+) -> tuple[tuple[str, ...], int, int]:
     """Series on the clock ``dt = 2 w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
 
     All fields are multiplied by ``2 w``, and ``dw/ds = dz/dt``. The root is never started at zero exactly:
@@ -221,8 +242,12 @@ def _write_desingularised(
     body = _Body(len(symbols.x), len(guards))
     clock, root = body.column(CLOCK), body.column(OTHERS)
     body.columns = OTHERS + 1
+    harmonics = _harmonics(field, symbols)
+    field = [rate.xreplace(harmonics) for rate in field]
+    driven = [(symbol, body.allot()) for symbol in harmonics.values()]
     block = body.block(
-        {**{x: str(i) for i, x in enumerate(symbols.x)}, ROOT: root}, (symbols.t, f"out[o, {clock}]")
+        {**{x: str(i) for i, x in enumerate(symbols.x)}, ROOT: root, **dict(driven)},
+        (symbols.t, f"out[o, {clock}]"),
     )
     seeds = _seeds(symbols)
     slope = z.diff(symbols.t) + sympy.Add(
@@ -236,16 +261,35 @@ def _write_desingularised(
     size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in symbols.x))
     columns, starts = _state(symbols)
     body.preamble += [*assignments(["z", "size"], [z, size]), f"root = sqrt(max(z, {FLOOR}*size, 1e-300))"]
+    turning = [2 * ROOT * function.diff(symbols.t).xreplace(harmonics) for function in harmonics]
+    begun = [f"start{i}" for i in range(len(harmonics))]
+    body.preamble += assignments(begun, list(harmonics))
     return body.assemble(
         block,
-        [*columns, clock, root],
-        [*rates, 2 * ROOT, _in_roots(slope, z)],
-        [*starts, "0.0", "root"],
+        [*columns, clock, root, *(column for _, column in driven)],
+        [*rates, 2 * ROOT, _in_roots(slope, z), *turning],
+        [*starts, "0.0", "root", *begun],
         crossing,
         trace,
         tangents,
         seeds,
     )
+
+
+def _harmonics(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr, sympy.Symbol]:
+    """Symbols for the sines, cosines and exponentials of linear functions of time, closed under ``d/dt``.
+
+    On a clock of their own they are states like others: their rates share the factor of all rates.
+    """
+    found: dict[sympy.Expr, sympy.Symbol] = {}
+    nodes = {node for entry in field for node in entry.atoms(*ELEMENTARY)}
+    for node in sorted(nodes, key=sympy.default_sort_key):
+        slope = node.args[0].diff(symbols.t)
+        if slope == 0 or slope.has(symbols.t) or node.has(*symbols.x):
+            continue
+        for function in PAIRS.get(node.func, (node.func,))[:2]:
+            found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))
+    return found
 
 
 def _on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
@@ -303,25 +347,32 @@ class _Body:
         trace: sympy.Expr,
         tangents: Sequence[sympy.Expr],
         seeds: dict[sympy.Symbol, sympy.Symbol],
-    ) -> tuple[int, tuple[str, ...]]:
-        """The number of columns and the statements: state and guards first, then what rests on them."""
+    ) -> tuple[tuple[str, ...], int, int]:
+        """The statements and the numbers of columns: state and guards first, then what rests on them."""
         n = self.n
         rows = {seed: f"v + {i}" for i, seed in enumerate(seeds.values())}
         vector = Recurrences(rows, None, self.allot, "b", self.constants, block)
-        along = [f"v + {i}" for i in range(n)]
-        carried = loop(along, tangents, [f"x[{column}]" for column in along], vector)
+        block.expect(rates)
+        carried = tangent_loop(n, tangents, vector)
         volume = Recurrences({}, None, self.allot, "d", self.constants, block)
-        spread = loop([self.column(DIVERGENCE)], [trace], ["0.0"], volume)
+        spread = state_loop([self.column(DIVERGENCE)], [trace], ["0.0"], volume)
         for place, guard in enumerate(guards):
             block.keep(guard, f"len(x) + {place}")
-        moved = loop(columns, rates, starts, block)
+        moved = state_loop(columns, rates, starts, block)
+        for i, rights in enumerate(block.blocks.values()):
+            self.preamble.append(f"{block.prefix}b{i} = {self.column(self.columns)}")
+            self.columns += padded(len(rights))
+        widths = [len(rights) for rights in vector.blocks.values()]
+        places = [f"first{i} = {self._place(widths[:i])}" for i in range(len(widths))]
         lines = [
             *self.preamble,
             *self.constants.statements(),
             *moved,
             f"if len(x) > {n}:",
-            *indented(spread),
-            f"for v in range({n}, len(x), {n}):",
-            *indented(carried),
+            *indented([*spread, f"n = {n}", f"count = len(x)//{n} - 1", *places, *carried]),
         ]
-        return self.columns, tuple(lines)
+        return tuple(lines), self.columns + len(widths) * (NARROW - 1), sum(widths)
+
+    def _place(self, widths: Sequence[int]) -> str:
+        """Text of the column behind blocks of some widths for each tangent vector."""
+        return " + ".join([self.column(self.columns), *map(padded_for_all, widths)])

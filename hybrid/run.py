@@ -118,7 +118,7 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
         fit=np.linalg.inv(_bernstein_basis(nodes)),
         systems=systems,
         pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
-        series=np.zeros((codes.HIGHEST_ORDER + 1, length + columns) if method.order else (0, 0)),
+        series=np.zeros((codes.HIGHEST_ORDER + 2, length + columns) if method.order else (0, 0)),
     )
 
 
@@ -353,7 +353,7 @@ def start(
     tangents = 0 if tangent is None else tangent.shape[1]
     y = state if tangent is None else np.concatenate([state, tangent.T.ravel()])
     run = _fresh_run(system, model, y, tangents, t0)
-    work = workspace(method, system.dimension, tangents, compiled.series_columns)
+    work = workspace(method, system.dimension, tangents, compiled.series_columns(tangents))
     run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
     phase0 = split_time(t0, model.period)[1]
     return Trajectory(

@@ -8,11 +8,13 @@ order, products and functions a convolution.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
+from hybrid.kernels.codes import NARROW
 from hybrid.printer import MATH_FUNCTIONS, assignments
 from hybrid.symbolic import ZERO
 
@@ -39,9 +41,12 @@ class NoSeries(Exception):
 class Recurrences:
     """The statements that compute the coefficients of some expressions, order by order.
 
-    The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, row]``;
-    expressions that enter a convolution are kept in a row of their own. ``first`` are the statements for
-    order zero, ``higher`` those for the others, which follow in a loop over ``o``.
+    The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
+    ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
+    ``o``. Convolutions are taken in two parts: the terms at their ends hold what this order brings, all those
+    between hold lower orders only and are summed before anything else. Those that share a factor are summed
+    together: ``blocks`` lists, by the column of that factor, what it is multiplied by, side by side in
+    columns of their own.
 
     Parameters
     ----------
@@ -75,10 +80,20 @@ class Recurrences:
         self.known = known
         self.first: list[str] = []
         self.higher: list[str] = []
+        self.blocks: dict[str, list[sympy.Expr]] = {}
         self.variables: dict[sympy.Expr, str] = {}
+        self.slopes: dict[sympy.Expr, str] = {}
+        self.shared: Counter[sympy.Expr] = Counter()
         self.own = frozenset(rows)
         if known is None and time is not None:
             self.own |= {time[0]}
+
+    def expect(self, expressions: Iterable[sympy.Expr]) -> None:
+        """Count the factors of products to come: one that many share goes into their common block."""
+        for expression in expressions:
+            for node in sympy.preorder_traversal(expression):
+                if node.is_Mul:
+                    self.shared.update(node.args)
 
     def coefficient(self, expression: sympy.Expr) -> str:
         """Text of the coefficient of order ``o``."""
@@ -128,14 +143,37 @@ class Recurrences:
     def _name(self, expression: sympy.Expr) -> str:
         return self.variables.setdefault(expression, f"{self.prefix}{len(self.variables)}")
 
-    def _kept(self, expression: sympy.Expr) -> tuple[str, str]:
+    def _kept(self, expression: sympy.Expr, column: str | None = None) -> tuple[str, str]:
         """Name and column of an expression whose recurrence reads its own earlier coefficients."""
-        self.rows[expression] = self.allot()
+        self.rows[expression] = column or self.allot()
         return self._name(expression), self.rows[expression]
 
     def _store(self, *expressions: sympy.Expr) -> None:
         for expression in expressions:
             self._both(f"out[o, {self.rows[expression]}] = {self.variables[expression]}")
+
+    def _place(self, left: str, right: sympy.Expr) -> tuple[str, str]:
+        """The inner sum of a convolution with the column ``left``, and the column for its other factor."""
+        rights = self.blocks.setdefault(left, [])
+        if right not in rights:
+            rights.append(right)
+        block, place = list(self.blocks).index(left), rights.index(right)
+        return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {place}"
+
+    def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
+        """``_place``, and the coefficient of the other factor, which is written there."""
+        value = self.coefficient(right)
+        inner, column = self._place(left, right)
+        self._both(f"out[o, {column}] = {value}")
+        return inner, column, value
+
+    def _slope(self, u: sympy.Expr) -> str:
+        """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""
+        if u not in self.slopes:
+            value = self.coefficient(u)
+            self.slopes[u] = self.allot()
+            self._both(f"out[o, {self.slopes[u]}] = o*{value}")
+        return self.slopes[u]
 
     def _operation(self, expression: sympy.Expr) -> str:
         if self.time is not None and expression == self.time[0]:
@@ -191,44 +229,30 @@ class Recurrences:
             return self._quotient(expression, above, sympy.Mul(*(1 / f for f in below)))
         if len(below) > 1:
             return self._quotient(expression, None, sympy.Mul(*(1 / f for f in below)))
-        *others, last = sorted(factors, key=lambda factor: bool(factor.free_symbols & self.own))
-        return self._convolution(expression, sympy.Mul(*others), last)
+        # What is known goes first, then what most products share.
+        *others, last = sorted(
+            factors, key=lambda factor: (-bool(factor.free_symbols & self.own), self.shared[factor])
+        )
+        return self._convolution(expression, last, sympy.Mul(*others))
 
     def _convolution(self, expression: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> str:
-        left, right = self.row(a), self.row(b)
-        name = self._name(expression)
+        left = self.row(a)
+        inner, right, value = self._beside(left, b)
         return self._bind(
             expression,
             f"out[0, {left}]*out[0, {right}]",
-            "0.0",
-            "for j in range(u + ONE):",
-            f"    {name} += out[j, {left}]*out[u - j, {right}]",
-        )
-
-    def _square(self, expression: sympy.Expr, base: sympy.Expr) -> str:
-        row, name = self.row(base), self._name(expression)
-        return self._bind(
-            expression,
-            f"out[0, {row}]*out[0, {row}]",
-            "0.0",
-            "for j in range((u + ONE)//TWO):",
-            f"    {name} += out[j, {row}]*out[u - j, {row}]",
-            f"{name} += {name}",
-            "if o % 2 == 0:",
-            f"    {name} += out[o//2, {row}]*out[o//2, {row}]",
+            f"{inner} + out[0, {left}]*{value} + out[o, {left}]*out[0, {right}]",
         )
 
     def _quotient(self, expression: sympy.Expr, above: sympy.Expr | None, below: sympy.Expr) -> str:
         text = None if above is None else self.coefficient(above)
         divisor = self.row(below)
-        name, row = self._kept(expression)
+        inner, column = self._place(divisor, expression)
+        name, column = self._kept(expression, column)
         self._bind(
             expression,
             f"{text or '1.0'}/out[0, {divisor}]",
-            text or "0.0",
-            "for j in range(ONE, u + ONE):",
-            f"    {name} -= out[j, {divisor}]*out[u - j, {row}]",
-            f"{name} /= out[0, {divisor}]",
+            f"({text or '0.0'} - {inner} - out[o, {divisor}]*out[0, {column}])/out[0, {divisor}]",
         )
         self._store(expression)
         return name
@@ -240,20 +264,21 @@ class Recurrences:
         if exponent.is_Integer and exponent.is_negative:
             return self._quotient(expression, None, base**-exponent)
         if exponent.is_Integer:
-            if exponent.p % 2:
-                return self._convolution(expression, base ** (exponent - 1), base)
-            return self._square(expression, base ** (exponent // 2))
-        u, k = self.row(base), self.constants.name(exponent)
-        name, row = self._kept(expression)
+            half = base ** (exponent // 2)
+            return self._convolution(
+                expression, *((base, base ** (exponent - 1)) if exponent.p % 2 else (half, half))
+            )
+        u, slope, k = self.row(base), self._slope(base), self.constants.name(exponent)
+        inner, column = self._place(u, expression)
+        moving, copy = self._place(slope, expression)
+        name, column = self._kept(expression, column)
         self._bind(
             expression,
             _power_text(f"out[0, {u}]", exponent, k),
-            "0.0",
-            "for j in range(ONE, u + ONE):",
-            f"    {name} += (j*{k} - (u - j))*out[j, {u}]*out[u - j, {row}]",
-            f"{name} /= o*out[0, {u}]",
+            f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})/(o*out[0, {u}])",
         )
         self._store(expression)
+        self._both(f"out[o, {copy}] = {name}")
         return name
 
     def _rate(self, u: sympy.Expr) -> str | None:
@@ -267,19 +292,15 @@ class Recurrences:
     def _exponential(self, expression: sympy.Expr, u: sympy.Expr) -> str:
         rate = self._rate(u)
         argument = self.coefficient(u)
-        u_row = None if rate else self.row(u)
-        name, row = self._kept(expression)
         if rate:
-            self._bind(expression, f"exp({argument})", f"{rate}*out[o - 1, {row}]/o")
+            name, column = self._kept(expression)
+            value = f"{rate}*out[o - 1, {column}]/o"
         else:
-            self._bind(
-                expression,
-                f"exp({argument})",
-                "0.0",
-                "for j in range(ONE, u + ONE):",
-                f"    {name} += j*out[j, {u_row}]*out[u - j, {row}]",
-                f"{name} /= o",
-            )
+            slope = self._slope(u)
+            inner, column = self._place(slope, expression)
+            name, column = self._kept(expression, column)
+            value = f"({inner} + out[o, {slope}]*out[0, {column}])/o"
+        self._bind(expression, f"exp({argument})", value)
         self._store(expression)
         return name
 
@@ -289,62 +310,51 @@ class Recurrences:
         s, c = odd(u), even(u)
         rate = self._rate(u)
         argument = self.coefficient(u)
-        u_row = None if rate else self.row(u)
-        (s_name, s_row), (c_name, c_row) = self._kept(s), self._kept(c)
-        self.first.append(f"{s_name} = {odd.__name__}({argument})")
-        self.first.append(f"{c_name} = {even.__name__}({argument})")
         if rate:
-            self.higher.append(f"{s_name} = {rate}*out[o - 1, {c_row}]/o")
-            self.higher.append(f"{c_name} = {sign}{rate}*out[o - 1, {s_row}]/o")
+            (s_name, s_column), (c_name, c_column) = self._kept(s), self._kept(c)
+            values = [f"{rate}*out[o - 1, {c_column}]/o", f"{sign}{rate}*out[o - 1, {s_column}]/o"]
         else:
-            self.higher += [
-                f"{s_name} = 0.0",
-                f"{c_name} = 0.0",
-                "for j in range(ONE, u + ONE):",
-                f"    {s_name} += j*out[j, {u_row}]*out[u - j, {c_row}]",
-                f"    {c_name} {sign or '+'}= j*out[j, {u_row}]*out[u - j, {s_row}]",
-                f"{s_name} /= o",
-                f"{c_name} /= o",
+            slope = self._slope(u)
+            (s_sum, s_column), (c_sum, c_column) = (self._place(slope, each) for each in (s, c))
+            (s_name, _), (c_name, _) = self._kept(s, s_column), self._kept(c, c_column)
+            values = [
+                f"({c_sum} + out[o, {slope}]*out[0, {c_column}])/o",
+                f"{sign}({s_sum} + out[o, {slope}]*out[0, {s_column}])/o",
             ]
+        self.first += [f"{s_name} = {odd.__name__}({argument})", f"{c_name} = {even.__name__}({argument})"]
+        self.higher += [f"{s_name} = {values[0]}", f"{c_name} = {values[1]}"]
         self._store(s, c)
         return self.variables[expression]
 
     def _own_square(self, expression: sympy.Expr) -> str:
-        sign = OWN_SQUARE[expression.func]
+        sign = OWN_SQUARE[expression.func] or "+"
         (u,) = expression.args
-        argument, u_row = self.coefficient(u), self.row(u)
-        slope = 1 - expression**2 if sign else 1 + expression**2
+        argument, rate = self.coefficient(u), self._slope(u)
+        slope = 1 - expression**2 if sign == "-" else 1 + expression**2
+        moving, slope_column = self._place(rate, slope)
         name, row = self._kept(expression)
-        slope_name, slope_row = self._kept(slope)
-        function = expression.func.__name__
-        self.first += [f"{name} = {function}({argument})", f"{slope_name} = 1.0 {sign or '+'} {name}*{name}"]
-        self.higher += [
-            f"{name} = 0.0",
-            "for j in range(ONE, u + ONE):",
-            f"    {name} += j*out[j, {u_row}]*out[u - j, {slope_row}]",
-            f"{name} /= o",
+        slope_name, _ = self._kept(slope, slope_column)
+        inner, copy = self._place(row, expression)
+        self.first += [
+            f"{name} = {expression.func.__name__}({argument})",
+            f"{slope_name} = 1.0 {sign} {name}*{name}",
         ]
-        self._store(expression)
         self.higher += [
-            f"{slope_name} = 0.0",
-            "for j in range(u + ONE):",
-            f"    {slope_name} {sign or '+'}= out[j, {row}]*out[u - j, {row}]",
+            f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])/o",
+            f"{slope_name} = {sign}({inner} + 2.0*out[0, {row}]*{name})",
         ]
-        self._store(slope)
+        self._store(expression, slope)
+        self._both(f"out[o, {copy}] = {name}")
         return name
 
     def _by_derivative(self, expression: sympy.Expr) -> str:
         (u,) = expression.args
-        argument, u_row = self.coefficient(u), self.row(u)
-        slope = self.row(expression.fdiff())
-        name = self._name(expression)
+        argument, rate = self.coefficient(u), self._slope(u)
+        inner, slope, _ = self._beside(rate, expression.fdiff())
         return self._bind(
             expression,
             f"{MATH_FUNCTIONS[expression.func]}({argument})",
-            "0.0",
-            "for j in range(ONE, u + ONE):",
-            f"    {name} += j*out[j, {u_row}]*out[u - j, {slope}]",
-            f"{name} /= o",
+            f"({inner} + out[o, {rate}]*out[0, {slope}])/o",
         )
 
 
@@ -416,7 +426,26 @@ def indented(statements: Iterable[str]) -> list[str]:
     return [f"    {statement}" for statement in statements]
 
 
-def loop(
+def padded(width: int) -> int:
+    """The width of a block, filled up to whole vectors."""
+    return -(-width // NARROW) * NARROW
+
+
+def padded_for_all(width: int) -> str:
+    """Text of the padded width of a block for all ``count`` tangent vectors."""
+    return f"(count*{width} + {NARROW - 1})//{NARROW}*{NARROW}"
+
+
+def inner_sums(block: Recurrences) -> list[str]:
+    """Statements that name the inner sums, which stand where the coefficients of this order will be."""
+    return [
+        f"{block.prefix}s{i}_{place} = out[o, {block.prefix}b{i} + {place}]"
+        for i, rights in enumerate(block.blocks.values())
+        for place in range(len(rights))
+    ]
+
+
+def state_loop(
     targets: Sequence[str], rates: Sequence[sympy.Expr], starts: Sequence[str], block: Recurrences
 ) -> list[str]:
     """Statements for the series of ``y' = rates`` from ``starts``, in the columns ``targets``."""
@@ -431,10 +460,46 @@ def loop(
         *indented(
             [
                 "shrink = 1.0/o",
-                "u = np.uint64(o)",
                 *(f"out[o, {target}] = shrink*{block.prefix}r{i}" for i, target in enumerate(targets)),
+                *(
+                    f"convolve(out, o, {left}, {block.prefix}b{i}, {padded(len(rights))})"
+                    for i, (left, rights) in enumerate(block.blocks.items())
+                ),
+                *inner_sums(block),
                 *block.higher,
                 *carried,
+            ]
+        ),
+    ]
+
+
+def tangent_loop(n: int, rates: Sequence[sympy.Expr], block: Recurrences) -> list[str]:
+    """Statements for the series of ``count`` tangent vectors: all of them order by order.
+
+    The blocks of all vectors lie side by side, so that each factor is multiplied with all at once.
+    """
+    values = [block.coefficient(rate) for rate in rates]
+    prefix = block.prefix
+    each = [
+        "v = n + i*n",
+        *(f"{prefix}b{i} = first{i} + i*{len(rights)}" for i, rights in enumerate(block.blocks.values())),
+    ]
+    later = [f"out[o + 1, v + {i}] = shrink*{value}" for i, value in enumerate(values)]
+    return [
+        "o = 0",
+        "shrink = 1.0",
+        "for i in range(count):",
+        *indented([*each, *(f"out[0, v + {i}] = x[v + {i}]" for i in range(n)), *block.first, *later]),
+        "for o in range(1, order + 1):",
+        *indented(
+            [
+                "shrink = 1.0/(o + 1)",
+                *(
+                    f"convolve(out, o, {left}, first{i}, {padded_for_all(len(rights))})"
+                    for i, (left, rights) in enumerate(block.blocks.items())
+                ),
+                "for i in range(count):",
+                *indented([*each, *inner_sums(block), *block.higher, *later]),
             ]
         ),
     ]

@@ -73,6 +73,9 @@ NO_MODE = -1
 # Highest order of a series, and the order of exact ones: what the memory for them is laid out for.
 HIGHEST_ORDER = 28
 
+# Columns of series that are multiplied at once: blocks of them are filled up to this width.
+NARROW = 4
+
 # Propagators of a mode, and how people read them.
 RUNGE_KUTTA = 0
 TAYLOR = 1

@@ -57,9 +57,9 @@ def series_of(system, x, *, t=0.0, mode=0, tangents=0, parameters=()):
     exec(emitted.source, scope)
     n = system.dimension
     y = np.concatenate([x, *np.eye(n)[:tangents]])
-    out = np.full((ORDER + 1, 80), np.nan)
+    out = np.full((ORDER + 2, 80), np.nan)
     scope["series"](mode, t, y, np.array(parameters), ORDER, out)
-    return out
+    return out[: ORDER + 1]
 
 
 def system_of(field, *transitions, state=("x", "y"), **options):
