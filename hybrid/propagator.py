@@ -22,19 +22,8 @@ from hybrid.kernels.codes import (
     TAYLOR,
 )
 from hybrid.printer import assignments
-from hybrid.series import (
-    ONE_THEN_ZERO,
-    PAIRS,
-    Constants,
-    NoSeries,
-    Recurrences,
-    directional,
-    indented,
-    padded,
-    padded_for_all,
-    state_loop,
-    tangent_loop,
-)
+from hybrid.series import ONE_THEN_ZERO, PAIRS, Constants, NoSeries, Recurrences, directional
+from hybrid.series_loops import indented, padded, padded_for_all, state_loop, tangent_loop
 from hybrid.symbolic import (
     Absolute,
     Less,

@@ -93,6 +93,7 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
     systems[-1:] = -1.0
     nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
+    width_of_series = length + columns + codes.NARROW - 1
     width = max(dense_degree(method), FIT_DEGREE) + 4
     return Work(
         stages=np.zeros((stages, length + 1)),
@@ -118,7 +119,9 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
         fit=np.linalg.inv(_bernstein_basis(nodes)),
         systems=systems,
         pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
-        series=np.zeros((codes.HIGHEST_ORDER + 2, length + columns) if method.order else (0, 0)),
+        # Whole vectors of columns are evaluated: a few more than there are.
+        series=np.zeros((codes.HIGHEST_ORDER + 2, width_of_series) if method.order else (0, 0)),
+        weights=np.zeros(width_of_series),
     )
 
 

@@ -79,6 +79,18 @@ def first_crossing(coefficients, degree, side, direction, stack):
     scratch. Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero
     at 1 exactly counts as crossed if the slope there leads across.
     """
+    start, end, top, side = bracket_crossing(coefficients, degree, side, direction, stack)
+    if start == end:
+        return start, side
+    return start + (end - start) * simple_root(stack[top][2:], degree, -side), side
+
+
+@njit(**KERNEL)
+def bracket_crossing(coefficients, degree, side, direction, stack):
+    """Where ``first_crossing`` is: ``(start, end, row, side after it)``, a place if the ends agree.
+
+    Else it is the one root in between, and ``stack[row, 2:]`` the polynomial there.
+    """
     top = 0
     stack[0, 0] = 0.0
     stack[0, 1] = 1.0
@@ -104,7 +116,7 @@ def first_crossing(coefficients, degree, side, direction, stack):
         if first != side:
             side = first
             if direction == 0 or direction == first:
-                return start, side
+                return start, start, top, side
         if variations > 1 and end - start > CLUSTER:
             middle = 0.5 * (start + end)
             left = stack[top + 1]
@@ -119,9 +131,7 @@ def first_crossing(coefficients, degree, side, direction, stack):
         if last != side:
             side = last
             if direction == 0 or direction == last:
-                if variations > 1:
-                    return start, side
-                return start + (end - start) * simple_root(row[2:], degree, first), side
+                return start, start if variations > 1 else end, top, side
         top -= 1
     if coefficients[degree] == 0.0:
         # Odd or even multiplicity at 1 cannot be told from the sign before it alone: look at the slope.
@@ -130,8 +140,8 @@ def first_crossing(coefficients, degree, side, direction, stack):
         if after != side:
             side = after
             if direction == 0 or direction == after:
-                return 1.0, side
-    return NO_ROOT, side
+                return 1.0, 1.0, 0, side
+    return NO_ROOT, NO_ROOT, 0, side
 
 
 @njit(**INLINE)

@@ -129,7 +129,8 @@ class Work(Structure):
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
     the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
 
-    For Taylor series, else empty: ``series (order + 2, columns)``, the last row scratch.
+    For Taylor series, else empty: ``series (order + 2, columns)``, the last row scratch,
+    and ``weights (columns,)`` of its columns in the control of the step.
     """
 
     stages: MATRIX
@@ -156,6 +157,7 @@ class Work(Structure):
     systems: MATRIX
     pivots: INDICES
     series: MATRIX
+    weights: VECTOR
 
 
 WORK = Work.numba_type

@@ -110,7 +110,7 @@ class TestJerk:
     def test_spectrum(self):
         """Linz and Sprott (1999) print (0.0362, 0, -0.6362), from a run of unknown length."""
         result = lyapunov.lyapunov_spectrum(
-            systems.jerk(), self.START, mode="left", interval=2.0, intervals=10_000
+            systems.jerk(), self.START, mode="left", interval=2.0, intervals=40_000
         )
         np.testing.assert_allclose(result.exponents, [0.0369, 0.0, -0.6369], atol=6e-3)
         assert result.exponents.sum() == pytest.approx(-0.6, abs=1e-6)

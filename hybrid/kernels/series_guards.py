@@ -1,0 +1,192 @@
+"""Guards along a series: their polynomials, the proofs that they keep clear, the earliest crossing."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.bernstein import NO_ROOT, SETTLED, bracket_crossing, stays
+from hybrid.kernels.codes import (
+    DESINGULARISED,
+    EXACT,
+    GRAZING_PLACE,
+    MODE,
+    NO_TRANSITION,
+)
+from hybrid.kernels.guards import error_band, note_grazing, rounding_band
+from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+
+# Share of a guard's value that the high powers of its series may reach together to be left out of a proof.
+NEGLIGIBLE = 0.1
+
+
+@njit(**INLINE)
+def value_at(series, column, order, s):
+    """Value of one series."""
+    total = series[order, column]
+    for o in range(order - 1, -1, -1):
+        total = total * s + series[o, column]
+    return total
+
+
+@njit(**INLINE)
+def slope_at(series, column, order, s):
+    """Derivative of one series."""
+    total = order * series[order, column]
+    for o in range(order - 1, 0, -1):
+        total = total * s + o * series[o, column]
+    return total
+
+
+@njit(**INLINE)
+def to_bernstein(coefficients, degree):
+    """Turn power coefficients on ``[0, 1]`` into Bernstein coefficients, in place."""
+    share = 1.0
+    for k in range(1, degree + 1):
+        share *= k / (degree - k + 1.0)
+        coefficients[k] *= share
+    for level in range(degree):
+        # A view of what changes: its indices are plainly not negative, and need no check in the inner loop.
+        row = coefficients[level : degree + 1]
+        before = row[0]
+        for j in range(1, degree + 1 - level):
+            entry = row[j]
+            row[j] = entry + before
+            before = entry
+
+
+@njit(**INLINE)
+def powers_on_step(series, column, order, h, known_roots, coefficients):
+    """Power coefficients on ``[0, 1]`` of a series, divided by its variable for each known root at 0.
+
+    Returns the degree, and the sum of the magnitudes of all but the first coefficient.
+    """
+    degree = order
+    while degree > known_roots and series[degree, column] == 0.0:
+        degree -= 1
+    power, reach = h**known_roots, 0.0
+    for k in range(known_roots, degree + 1):
+        coefficients[k - known_roots] = series[k, column] * power
+        power *= h
+    for k in range(1, degree + 1 - known_roots):
+        reach += abs(coefficients[k])
+    return degree - known_roots, reach
+
+
+@njit(**INLINE)
+def stays_clear(powers, degree, side, band, scratch):
+    """The second cheap proof that a guard keeps beyond ``band`` on its side of zero over a whole step.
+
+    Its leading powers must, by their Bernstein coefficients, even if all the others are against them.
+    """
+    leading, rest = degree, 0.0
+    while leading > 1 and rest + abs(powers[leading]) <= NEGLIGIBLE * abs(powers[0]):
+        rest += abs(powers[leading])
+        leading -= 1
+    for k in range(leading + 1):
+        scratch[k] = powers[k]
+    to_bernstein(scratch, leading)
+    return stays(scratch, leading, side, band + rest)
+
+
+@njit(**KERNEL)
+def root_between(series, column, order, known_roots, h, low, high, left, right):
+    """The one root of a series in an open interval of the step ``h``.
+
+    ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
+    variable for each known root at 0. Newton, kept inside its bracket; in the end on the series as it is,
+    which at 0 is zero up to rounding only.
+    """
+    s = simple_root_of(series, column, order, known_roots, low, high, left, right)
+    for _ in range(3 if known_roots > 0 else 0):
+        slope = slope_at(series, column, order, s)
+        shift = -value_at(series, column, order, s) / slope if slope != 0.0 else 0.0
+        if not abs(shift) <= 1e-6 * h or not 0.0 <= s + shift <= h:
+            break
+        s += shift
+        if abs(shift) <= EPSILON * s:
+            break
+    return s
+
+
+@njit(**INLINE)
+def simple_root_of(series, column, order, known_roots, low, high, left, right):
+    """``root_between`` of the series divided by what is known."""
+    s, last = low + (high - low) * (left / (left - right)), high - low
+    if not low < s < high:
+        s = 0.5 * (low + high)
+    for _ in range(100):
+        value, slope = series[order, column], 0.0
+        for o in range(order - 1, known_roots - 1, -1):
+            slope = slope * s + value
+            value = value * s + series[o, column]
+        if value == 0.0:
+            return s
+        if (value > 0.0) == (left > 0.0):
+            low = s
+        else:
+            high = s
+        newton = s - value / slope if slope != 0.0 else -1.0
+        change = abs(newton - s)
+        # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
+        if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
+            return s
+        if not low < newton < high:
+            newton = 0.5 * (low + high)
+            change = high - low
+        if high - low <= EPSILON * high:
+            return newton
+        s, last = newton, change
+    return s
+
+
+@njit(**KERNEL)
+def earliest_on_series(model, method, run, order, t, h, length, kind, work):
+    """Earliest crossing on a step over the guards of the mode, and its transition.
+
+    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)`` if there is none. Sides, and what is
+    held to be zero, are brought up to date as by ``guards.earliest_crossing``. The polynomials are the
+    guards themselves, up to the remainder of the series.
+    """
+    mode, series = run.count[MODE], work.series
+    earliest, fired = NO_ROOT, NO_TRANSITION
+    run.clock[GRAZING_PLACE] = NO_ROOT
+    first = model.first_outgoing[mode]
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        on_guard, side = run.on_guard[transition], run.side[transition]
+        column = length + slot - first
+        degree, reach = powers_on_step(series, column, order, h, on_guard, work.polynomial)
+        nearest = work.polynomial[0] * side
+        # The cheap proof: the guard cannot come back to zero within this step.
+        if on_guard == 0 and nearest > 2.0 * reach:
+            continue
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        rounding = rounding_band(model, run, t, work.gradient)
+        band = rounding
+        if kind != EXACT:
+            band = error_band(method, run, work.gradient, model.dimension)
+        # Along the root of a guard, what is small for the guard is not as small.
+        if kind == DESINGULARISED:
+            rounding, band = math.sqrt(rounding), math.sqrt(band)
+        if on_guard > 0:
+            if reach + abs(work.polynomial[0]) <= rounding:
+                continue
+            run.on_guard[transition] = 0
+        if stays_clear(work.polynomial, degree, side, band, work.stack[0]):
+            continue
+        to_bernstein(work.polynomial, degree)
+        if stays(work.polynomial, degree, side, band):
+            continue
+        theta, end, row, side = bracket_crossing(
+            work.polynomial, degree, side, model.direction[transition], work.stack
+        )
+        if theta < end:
+            ends = work.stack[row, 2], work.stack[row, 2 + degree]
+            theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
+        if theta > 1.0 and side == run.side[transition] and on_guard == 0:
+            note_grazing(run, transition, degree, side, band, 0.0, 1.0, work)
+        if theta == NO_ROOT:
+            run.side[transition] = side
+        elif theta < earliest:
+            earliest, fired = theta, transition
+    return earliest, fired
