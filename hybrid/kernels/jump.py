@@ -347,14 +347,14 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     chatter_matrix(model, run, transition, work)
     add_change_of_duration(model, method, run, target, span, work)
     begin_instant(run, model.dimension, tangents, work)
+    forward(run, model.period, span)
+    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
     if tangents > 0:
         n = model.dimension
         carry_tangents(model, run, tangents, orthonormal, work)
         model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
         drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
         drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
-    forward(run, model.period, span)
-    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
     move(model, run, transition, target, x_limit)
     return True
 
