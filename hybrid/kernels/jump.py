@@ -38,11 +38,13 @@ from hybrid.kernels.codes import (
     PHASE_OF_RUN,
     PREVIOUS_MODE,
     RESTING,
+    RESUMING,
     SINGULAR_JUMPS,
     STEPS,
     TRANSVERSE,
 )
 from hybrid.kernels.guards import (
+    acceleration_rounding,
     allowed,
     error_band,
     guard_acceleration,
@@ -53,29 +55,10 @@ from hybrid.kernels.guards import (
     speed_rounding,
     widen_scale,
 )
-from hybrid.kernels.layout import ENTRY, EPSILON, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.locked import begin_instant, follow, map_of_instant, restore_tangents
 from hybrid.kernels.record import start_record
 from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, multiply, orthonormalise
-
-
-@njit(**KERNEL)
-def acceleration_rounding(model, run, t, work):
-    """How far from zero rounding of state and time alone can leave the acceleration of the same guard.
-
-    Its Jacobian and field are current: ``guard_acceleration`` has just been called.
-    """
-    n = model.dimension
-    size = 0.0
-    for i in range(n):
-        bend = abs(work.jacobian[i, n])
-        for j in range(n):
-            spread = abs(work.field[j]) + abs(work.jacobian[j, n] * t)
-            for k in range(n):
-                spread += abs(work.jacobian[j, k]) * run.scale[k]
-            bend += abs(work.jacobian[i, j]) * spread
-        size += abs(work.gradient[i]) * bend
-    return 16 * EPSILON * size
 
 
 @njit(int64(MODEL, RUN, WORK), **ENTRY)
@@ -85,14 +68,15 @@ def enter(model, run, work):
     The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, from its
     acceleration where the speed vanishes too, and where that does as well the next step shows which way it
     leaves: until then it counts as not crossed. A guard that the state has come to lie on or beyond fires at
-    once, except the transition that has just fired: if the state moves on through its guard the crossing is
-    done, and if it rests there the answer is ``RESTING``: the transition would fire for ever. One that fires
-    because the state lies beyond its guard is locked to this instant, not to the guard. A guard that
-    fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump. A
-    transition whose condition does not hold here does not fire: its guard has then been crossed.
+    once, except one whose crossing has just been refused here, and the transition that has just fired: if the
+    state moves on through its guard the crossing is done, and if it rests there the answer is ``RESTING``:
+    the transition would fire for ever. One that fires because the state lies beyond its guard is locked to
+    this instant, not to the guard. A guard that fires both ways does so at once if it was crossed, on the
+    way, at the very instant of another's jump. A transition whose condition does not hold here does not fire:
+    its guard has then been crossed.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
-    landed = run.count[JUMPS] > 0
+    landed, resumed = run.count[JUMPS] > 0, run.count[PHASE_OF_RUN] == RESUMING
     fires, locked, stuck = NO_TRANSITION, 0, False
     model.flow(mode, t, run.y, model.parameters, work.field)
     if run.count[STEPS] == 0:
@@ -103,11 +87,12 @@ def enter(model, run, work):
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
         band = rounding_band(model, run, t, work.gradient)
         on_guard = abs(value) <= band
-        resting, order = False, 0
+        resting, order, still = False, 0, 0.0
         trend = value
         if on_guard:
             trend, order = speed, 1
-            if abs(speed) <= speed_rounding(model, run, mode, t, work):
+            still = speed_rounding(model, run, mode, t, work)
+            if abs(speed) <= still:
                 resting, order = True, 2
                 trend = guard_acceleration(model, transition, mode, t, run.y, work)
                 if abs(trend) <= acceleration_rounding(model, run, t, work):
@@ -115,11 +100,17 @@ def enter(model, run, work):
         direction = model.direction[transition]
         before = run.side[transition] if run.count[PREVIOUS_MODE] == mode else 0
         side = 1 if trend > 0.0 else (-1 if trend < 0.0 else -direction)
-        if order == 3 and landed and transition == run.count[LAST_FIRED]:
+        crossed = order == 3 and landed and transition == run.count[LAST_FIRED]
+        if crossed:
             # A root of third order: what follows is beyond the guard, and has been crossed already.
             side = direction if direction != 0 else -before
-        run.side[transition] = side
+        # A crossing that was refused at this point, or was made without speed, must not be found here again.
+        passed = on_guard and resumed and before == 0
+        passed = passed or (crossed and abs(run.clock[LAST_TRANSVERSALITY]) <= still)
+        run.side[transition] = 0 if passed else side
         run.on_guard[transition] = order
+        if passed:
+            continue
         inbound = side == direction or (direction == 0 and on_guard and side * before < 0)
         if not inbound or model.marker[transition] == 1:
             continue

@@ -277,13 +277,13 @@ def earliest_on_series(model, method, run, order, t, h, length, kind, work):
 
 @njit(**INLINE)
 def refined(series, column, order, s, h):
-    """A root of a series near ``s``, refined to rounding."""
+    """A root of a series near ``s``, refined to rounding; not to one at 0, where the step begins."""
     for _ in range(3):
         slope = slope_at(series, column, order, s)
         if slope == 0.0:
             break
         shift = -value_at(series, column, order, s) / slope
-        if not abs(shift) <= 1e-6 * h or not 0.0 <= s + shift <= h:
+        if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
             break
         s += shift
         if abs(shift) <= EPSILON * s:
