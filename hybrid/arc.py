@@ -31,10 +31,12 @@ class Jump:
     x_minus, x_plus
         States ``(n,)`` before and after.
     saltation
-        Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
+        Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order. Where a jump sets
+        off others at once, by landing beyond their guards, their time is that of its own guard: the product
+        of the matrices is then the tangent map of all of them, if those before the last can be inverted.
     transversality
         ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the
-        saltation matrix grows without bound.
+        saltation matrix grows without bound, unless the jump was set off by another.
     """
 
     t: float
@@ -88,7 +90,7 @@ class Jumps(Sequence[Jump]):
     x_minus, x_plus
         ``(jumps, n)``.
     saltation
-        ``(jumps, n, n)``.
+        ``(jumps, n, n)``, as in :class:`Jump`.
     """
 
     system: HybridSystem

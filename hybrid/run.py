@@ -393,6 +393,9 @@ def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t
         scale=np.abs(y[: system.dimension]),
         growth=np.zeros(tangents),
         trail=np.zeros((3, system.dimension + 1)),
+        before=np.zeros(system.dimension * tangents),
+        growth_before=np.zeros(tangents),
+        instant=np.zeros(system.dimension * (1 + system.dimension)),
     )
 
 

@@ -25,7 +25,9 @@ def saltation_matrix(
     """Saltation matrix ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``.
 
     It carries a perturbation of the state just before the jump, at the unperturbed jump's time, to the
-    perturbation just after. The time terms serve moving guards and time-dependent resets.
+    perturbation just after. The time terms serve moving guards and time-dependent resets. A jump that another
+    sets off at once, by landing beyond its guard, does not happen at the time of that guard: its
+    ``saltation`` in a run is another matrix.
 
     Parameters
     ----------

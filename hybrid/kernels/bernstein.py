@@ -75,9 +75,10 @@ def first_crossing(coefficients, degree, side, direction, stack):
     """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
 
     ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
-    that differs at once is a crossing at 0, or 0 if there was none; ``stack (depth, >= degree + 3)`` is
-    scratch. Returns ``(NO_ROOT, side at the end)`` where nothing crosses in that direction. A zero
-    at 1 exactly counts as crossed if the slope there leads across.
+    that differs at once is a crossing at 0, or 0 if there was none, and then roots that cannot be told from 0
+    are no crossings; ``stack (depth, >= degree + 3)`` is scratch. Returns ``(NO_ROOT, side at the end)``
+    where nothing crosses in that direction. A zero at 1 exactly counts as crossed if the slope there leads
+    across.
     """
     start, end, top, side = bracket_crossing(coefficients, degree, side, direction, stack)
     if start == end:
@@ -91,7 +92,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
 
     Else it is the one root in between, and ``stack[row, 2:]`` the polynomial there.
     """
-    top = 0
+    top, unknown = 0, side == 0
     stack[0, 0] = 0.0
     stack[0, 1] = 1.0
     for i in range(degree + 1):
@@ -130,7 +131,8 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
             continue
         if last != side:
             side = last
-            if direction == 0 or direction == last:
+            at_start = unknown and start == 0.0 and variations > 1
+            if not at_start and direction in (0, last):
                 return start, start if variations > 1 else end, top, side
         top -= 1
     if coefficients[degree] == 0.0:

@@ -223,7 +223,8 @@ def add_change_of_duration(model, method, run, target, span, work):
     A state that chatters longer drifts longer with the mean field of the chatter, and shorter with that of
     the limit mode; where the two agree, up to what the error of the limit makes of them, nothing is added.
     The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the height
-    through its energy. To be called after ``chatter_matrix``, whose slope and gradient it uses.
+    through its energy; its derivative, that of the instant of the limit, goes to ``run.instant``. To be
+    called after ``chatter_matrix``, whose slope and gradient it uses.
     """
     n, transition = model.dimension, run.count[LAST_FIRED]
     ratio, speed = run.clock[RESTITUTION], run.trail[BEFORE, n]
@@ -234,6 +235,8 @@ def add_change_of_duration(model, method, run, target, span, work):
     model.flow_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
     by_speed = 2.0 * side / (pull * (1.0 - ratio))
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
+    for j in range(n):
+        run.instant[j] = by_speed * work.error[j] + by_height * work.gradient[j]
     for i in range(n):
         excess = mean[i] - work.field_after[i]
         # Rounding of the fields and of the impulse, a quotient by the speed, and the error of the limit.
@@ -244,7 +247,7 @@ def add_change_of_duration(model, method, run, target, span, work):
             blurred += steepness * (method.atol + method.rtol * run.scale[j])
         if abs(excess) > blurred:
             for j in range(n):
-                work.saltation[i, j] += excess * (by_speed * work.error[j] + by_height * work.gradient[j])
+                work.saltation[i, j] += excess * run.instant[j]
 
 
 @njit(**KERNEL)

@@ -13,10 +13,12 @@ TERMINAL = 8
 GO_ON = -1
 
 # What the next call of the driver has to do before it can step: nothing, evaluate the rates anew
-# (the tangent vectors were changed from outside), or take its sides at every guard of a new mode.
+# (the tangent vectors were changed from outside), or take its sides at every guard, of a new mode or where a
+# crossing was refused.
 READY = 0
 STALE = 1
 ENTERING = 2
+RESUMING = 3
 NO_TRANSITION = -1
 # Instead of a transition: the state rests on the guard that has just fired.
 RESTING = -2
@@ -41,7 +43,8 @@ SIMULTANEOUS = 15
 ORDER_MATTERED = 16
 GRAZING_GUARD = 17
 LAST_KIND = 18
-COUNTERS = 19
+LOCKED = 19
+COUNTERS = 20
 
 # Slots of Run.clock.
 PHASE = 0
@@ -60,7 +63,9 @@ EARLIER_JUMP_CYCLE = 12
 EARLIER_JUMP_PHASE = 13
 RESTITUTION = 14
 LAST_TRANSVERSALITY = 15
-CLOCKS = 16
+LOG_DETERMINANT_BEFORE = 16
+ILL_CONDITIONED_GROWTH_BEFORE = 17
+CLOCKS = 18
 
 # Kinds of jumps.
 TRANSVERSE = 0

@@ -3,7 +3,6 @@
 from numba import int64, njit
 
 from hybrid.kernels.codes import (
-    ENTERING,
     MODE,
     NO_MODE,
     NO_TRANSITION,
@@ -11,9 +10,11 @@ from hybrid.kernels.codes import (
     PHASE,
     PHASE_OF_RUN,
     PREVIOUS_MODE,
+    RESUMING,
     SIMULTANEOUS,
 )
 from hybrid.kernels.guards import (
+    acceleration_rounding,
     allowed,
     guard_acceleration,
     guard_speed,
@@ -91,7 +92,8 @@ def order_matters(model, run, one, other, work):
 def turns_back(model, run, transition, work):
     """Whether a guard only touches zero here: it moves to where it was, or turns there if it is at rest.
 
-    At the bottom of a dip that is no deeper than rounding either end may be found first.
+    At the bottom of a dip that is no deeper than rounding either end may be found first. A guard that is at
+    rest and turns no faster than rounding would have it has been crossed, by its third derivative.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     model.flow(mode, t, run.y, model.parameters, work.field)
@@ -100,7 +102,8 @@ def turns_back(model, run, transition, work):
     before = run.side[transition] if direction == 0 else -direction
     if abs(speed) > speed_rounding(model, run, mode, t, work):
         return speed * before > 0.0
-    return guard_acceleration(model, transition, mode, t, run.y, work) * before > 0.0
+    acceleration = guard_acceleration(model, transition, mode, t, run.y, work)
+    return acceleration * before > acceleration_rounding(model, run, t, work)
 
 
 @njit(int64(MODEL, RUN, RECORD, int64, WORK), **PART)
@@ -108,7 +111,8 @@ def first_in_order(model, run, record, fired, work):
     """Of the transitions due where the run landed, the one listed first; notes whether order matters.
 
     None if ``fired`` may not fire or has only touched, and no other is due: the run then takes its sides anew
-    at this point, with the crossing behind it.
+    at this point. What comes before the guard there, and what after it, may differ by rounding alone, so its
+    side is left to the next step: the crossing is behind, and cannot be found where it was refused.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     fires = allowed(model, fired, t, run.y, work.scalar)
@@ -121,7 +125,8 @@ def first_in_order(model, run, record, fired, work):
         if other == NO_TRANSITION:
             sides_at_point(model, run, work)
             run.count[PREVIOUS_MODE] = mode
-            run.count[PHASE_OF_RUN] = ENTERING
+            run.side[fired] = 0
+            run.count[PHASE_OF_RUN] = RESUMING
         return other
     other = companion(model, run, mode, t, run.y, fired, False, work)
     if other == NO_TRANSITION:

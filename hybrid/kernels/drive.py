@@ -27,6 +27,7 @@ from hybrid.kernels.codes import (
     PREVIOUS_MODE,
     RECORD_FULL,
     RESTING,
+    RESUMING,
     RUNGE_KUTTA,
     STALE,
     STEPS,
@@ -126,7 +127,7 @@ def advance(
                 return ACCUMULATION
             continue
         mode = run.count[MODE]
-        if run.count[PHASE_OF_RUN] == ENTERING:
+        if run.count[PHASE_OF_RUN] in (ENTERING, RESUMING):
             if not finite(run, length):
                 return NON_FINITE
             fires = parts.enter(model, run, work)
@@ -174,8 +175,3 @@ def advance(
             run.clock[PHASE] = stop_phase
         if fired != NO_TRANSITION:
             run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
-            # A crossing refused where it was refused before: the state does not get away from its guard.
-            if run.count[PENDING] == NO_TRANSITION and span == 0.0:
-                run.count[JUMPS_HERE] += 1
-                if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
-                    return STUCK

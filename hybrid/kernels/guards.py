@@ -105,8 +105,9 @@ def widen_scale(model, run, work):
 def sides_at_point(model, run, work):
     """Bring the sides of the mode's guards, known at the ends of a step only, to where the run has landed.
 
-    A guard that is zero there has not been crossed yet: it keeps the side it had before. A guard that
-    fires both ways is followed no further than that: its side is 0 away from the guard.
+    A guard that is zero there has not been crossed yet: it keeps the side it had before, and has none if the
+    next step has to show it. One that fires both ways is followed no further than that: its side is 0 away
+    from the guard.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -117,7 +118,7 @@ def sides_at_point(model, run, work):
         beyond = value * direction > 0.0
         if abs(value) > rounding_band(model, run, t, work.gradient):
             run.side[transition] = direction if beyond else -direction
-        elif direction != 0:
+        elif direction != 0 and run.side[transition] != 0:
             run.side[transition] = -direction
 
 
@@ -132,6 +133,25 @@ def speed_rounding(model, run, mode, t, work):
         for j in range(n):
             spread += abs(work.jacobian[i, j]) * run.scale[j]
         size += abs(work.gradient[i]) * spread
+    return 16 * EPSILON * size
+
+
+@njit(**KERNEL)
+def acceleration_rounding(model, run, t, work):
+    """How far from zero rounding of state and time alone can leave the acceleration of the same guard.
+
+    Its Jacobian and field are current: ``guard_acceleration`` has just been called.
+    """
+    n = model.dimension
+    size = 0.0
+    for i in range(n):
+        bend = abs(work.jacobian[i, n])
+        for j in range(n):
+            spread = abs(work.field[j]) + abs(work.jacobian[j, n] * t)
+            for k in range(n):
+                spread += abs(work.jacobian[j, k]) * run.scale[k]
+            bend += abs(work.jacobian[i, j]) * spread
+        size += abs(work.gradient[i]) * bend
     return 16 * EPSILON * size
 
 

@@ -29,6 +29,7 @@ from hybrid.kernels.codes import (
     LAST_KIND,
     LAST_TRANSVERSALITY,
     LIMIT_OF_CHATTER,
+    LOCKED,
     LOG_DETERMINANT,
     MODE,
     NO_MODE,
@@ -37,11 +38,13 @@ from hybrid.kernels.codes import (
     PHASE_OF_RUN,
     PREVIOUS_MODE,
     RESTING,
+    RESUMING,
     SINGULAR_JUMPS,
     STEPS,
     TRANSVERSE,
 )
 from hybrid.kernels.guards import (
+    acceleration_rounding,
     allowed,
     error_band,
     guard_acceleration,
@@ -52,28 +55,10 @@ from hybrid.kernels.guards import (
     speed_rounding,
     widen_scale,
 )
-from hybrid.kernels.layout import ENTRY, EPSILON, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.locked import begin_instant, follow, map_of_instant, restore_tangents
 from hybrid.kernels.record import start_record
-from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, orthonormalise
-
-
-@njit(**KERNEL)
-def acceleration_rounding(model, run, t, work):
-    """How far from zero rounding of state and time alone can leave the acceleration of the same guard.
-
-    Its Jacobian and field are current: ``guard_acceleration`` has just been called.
-    """
-    n = model.dimension
-    size = 0.0
-    for i in range(n):
-        bend = abs(work.jacobian[i, n])
-        for j in range(n):
-            spread = abs(work.field[j]) + abs(work.jacobian[j, n] * t)
-            for k in range(n):
-                spread += abs(work.jacobian[j, k]) * run.scale[k]
-            bend += abs(work.jacobian[i, j]) * spread
-        size += abs(work.gradient[i]) * bend
-    return 16 * EPSILON * size
+from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, multiply, orthonormalise
 
 
 @njit(int64(MODEL, RUN, WORK), **ENTRY)
@@ -83,14 +68,16 @@ def enter(model, run, work):
     The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, from its
     acceleration where the speed vanishes too, and where that does as well the next step shows which way it
     leaves: until then it counts as not crossed. A guard that the state has come to lie on or beyond fires at
-    once, except the transition that has just fired: if the state moves on through its guard the crossing is
-    done, and if it rests there the answer is ``RESTING``: the transition would fire for ever. A guard that
-    fires both ways does so at once if it was crossed, on the way, at the very instant of another's jump. A
-    transition whose condition does not hold here does not fire: its guard has then been crossed.
+    once, except one whose crossing has just been refused here, and the transition that has just fired: if the
+    state moves on through its guard the crossing is done, and if it rests there the answer is ``RESTING``:
+    the transition would fire for ever. One that fires because the state lies beyond its guard is locked to
+    this instant, not to the guard. A guard that fires both ways does so at once if it was crossed, on the
+    way, at the very instant of another's jump. A transition whose condition does not hold here does not fire:
+    its guard has then been crossed.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
-    landed = run.count[JUMPS] > 0
-    fires, stuck = NO_TRANSITION, False
+    landed, resumed = run.count[JUMPS] > 0, run.count[PHASE_OF_RUN] == RESUMING
+    fires, locked, stuck = NO_TRANSITION, 0, False
     model.flow(mode, t, run.y, model.parameters, work.field)
     if run.count[STEPS] == 0:
         widen_scale(model, run, work)
@@ -100,11 +87,12 @@ def enter(model, run, work):
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
         band = rounding_band(model, run, t, work.gradient)
         on_guard = abs(value) <= band
-        resting, order = False, 0
+        resting, order, still = False, 0, 0.0
         trend = value
         if on_guard:
             trend, order = speed, 1
-            if abs(speed) <= speed_rounding(model, run, mode, t, work):
+            still = speed_rounding(model, run, mode, t, work)
+            if abs(speed) <= still:
                 resting, order = True, 2
                 trend = guard_acceleration(model, transition, mode, t, run.y, work)
                 if abs(trend) <= acceleration_rounding(model, run, t, work):
@@ -112,11 +100,17 @@ def enter(model, run, work):
         direction = model.direction[transition]
         before = run.side[transition] if run.count[PREVIOUS_MODE] == mode else 0
         side = 1 if trend > 0.0 else (-1 if trend < 0.0 else -direction)
-        if order == 3 and landed and transition == run.count[LAST_FIRED]:
+        crossed = order == 3 and landed and transition == run.count[LAST_FIRED]
+        if crossed:
             # A root of third order: what follows is beyond the guard, and has been crossed already.
             side = direction if direction != 0 else -before
-        run.side[transition] = side
+        # A crossing that was refused at this point, or was made without speed, must not be found here again.
+        passed = on_guard and resumed and before == 0
+        passed = passed or (crossed and abs(run.clock[LAST_TRANSVERSALITY]) <= still)
+        run.side[transition] = 0 if passed else side
         run.on_guard[transition] = order
+        if passed:
+            continue
         inbound = side == direction or (direction == 0 and on_guard and side * before < 0)
         if not inbound or model.marker[transition] == 1:
             continue
@@ -130,18 +124,18 @@ def enter(model, run, work):
             and before != side
             and (on_guard or landed or model.boundary[transition] == 1)
         ):
-            fires = transition
+            fires, locked = transition, 0 if on_guard else 1
+    run.count[LOCKED] = locked
     return RESTING if stuck else fires
 
 
-@njit(float64(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **ENTRY)
-def saltation(model, transition, mode, t, x_minus, x_plus, work):
-    """Saltation matrix into ``work.saltation (n, n)`` and the state after the jump into ``x_plus (n,)``.
+@njit(**KERNEL)
+def cross(model, transition, mode, t, x_minus, x_plus, work):
+    """The state after the jump into ``x_plus (n,)``, and all that its saltation matrix is made of.
 
-    ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
-    (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
-    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities. After a transition
-    that ends the run the state stays where it is, ``f_plus = 0``.
+    ``D_x R`` and ``D_t R`` into ``work.reset_jacobian``, ``f_plus - D_x R f_minus - D_t R`` into
+    ``work.settled``; returns the transversality. After a transition that ends the run the state stays where
+    it is, ``f_plus = 0``.
     """
     n = model.dimension
     model.flow(mode, t, x_minus, model.parameters, work.field)
@@ -156,9 +150,24 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
         difference = work.field_after[i] - work.reset_jacobian[i, n]
         for j in range(n):
             difference -= work.reset_jacobian[i, j] * work.field[j]
+        work.settled[i] = difference
+    return transversality
+
+
+@njit(float64(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **ENTRY)
+def saltation(model, transition, mode, t, x_minus, x_plus, work):
+    """Saltation matrix into ``work.saltation (n, n)`` and the state after the jump into ``x_plus (n,)``.
+
+    ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
+    (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
+    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities.
+    """
+    n = model.dimension
+    transversality = cross(model, transition, mode, t, x_minus, x_plus, work)
+    for i in range(n):
         for j in range(n):
             work.saltation[i, j] = work.reset_jacobian[i, j]
-            term = difference * work.gradient[j]
+            term = work.settled[i] * work.gradient[j]
             if term != 0.0:
                 work.saltation[i, j] += term / transversality
     return transversality
@@ -188,19 +197,12 @@ def carry_tangents(model, run, tangents, orthonormal, work):
     With ``orthonormal`` they are orthonormalised before and after, so that a direction the matrix
     annihilates is told from one that is merely short.
     """
-    n, y = model.dimension, run.y
+    n = model.dimension
     if orthonormal:
-        orthonormalise(y, n, tangents, run.growth, 0.0)
-    for start in range(n, n * (1 + tangents), n):
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += work.saltation[i, j] * y[start + j]
-            work.state[i] = total
-        for i in range(n):
-            y[start + i] = work.state[i]
+        orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    multiply(work.saltation, run.y, n, tangents, work.state)
     if orthonormal:
-        orthonormalise(y, n, tangents, run.growth, COLLAPSED)
+        orthonormalise(run.y, n, tangents, run.growth, COLLAPSED)
     run.clock[LOG_DETERMINANT] += log_abs_determinant(work.saltation, work.reset_jacobian, n)
 
 
@@ -254,17 +256,33 @@ def move(model, run, transition, target, x_plus):
 @njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **PART)
 def jump(model, method, run, record, transition, tangents, orthonormal, work):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
-    mode, target = run.count[MODE], model.target[transition]
-    transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
-    judge(run, model.dimension, work)
-    kind = TRANSVERSE
-    if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
-        kind = GRAZING
+    n, mode, target = model.dimension, run.count[MODE], model.target[transition]
+    locked = run.count[LOCKED] == 1
+    run.count[LOCKED] = 0
+    if locked:
+        transversality = cross(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+        follow(run, n, tangents, work)
+        # It stands for a square root if the jump that it is locked to does.
+        kind = run.count[LAST_KIND]
+    else:
+        transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+        for j in range(n):
+            run.instant[j] = -work.gradient[j] / transversality if work.gradient[j] != 0.0 else 0.0
+        begin_instant(run, n, tangents, work)
+        kind = TRANSVERSE
+        if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
+            kind = GRAZING
+    if kind == GRAZING:
         run.count[ILL_CONDITIONED] += 1
     run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
     sides_at_point(model, run, work)
     remember_jump(model, run, record, transition, transversality, kind, work.new, work)
+    if locked:
+        map_of_instant(run, n, work.saltation)
+    judge(run, n, work)
     if tangents > 0:
+        if locked:
+            restore_tangents(run, n, tangents)
         before = run.growth[0]
         carry_tangents(model, run, tangents, orthonormal, work)
         if kind == GRAZING and orthonormal:
@@ -319,12 +337,15 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     remember_flight(run, record, model.dimension, span, x_limit)
     chatter_matrix(model, run, transition, work)
     add_change_of_duration(model, method, run, target, span, work)
-    if tangents > 0:
-        carry_tangents(model, run, tangents, orthonormal, work)
-        model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
-        drift(run.y, model.dimension, tangents, work.jacobian, span, work.state, work.field)
+    begin_instant(run, model.dimension, tangents, work)
     forward(run, model.period, span)
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
+    if tangents > 0:
+        n = model.dimension
+        carry_tangents(model, run, tangents, orthonormal, work)
+        model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
+        drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
+        drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
     move(model, run, transition, target, x_limit)
     return True
 
@@ -333,8 +354,9 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
 def rest(model, run, limit_mode, tangents, orthonormal, work):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     transition = run.count[LAST_FIRED]
+    chatter_matrix(model, run, transition, work)
+    multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
     if tangents > 0:
-        chatter_matrix(model, run, transition, work)
         carry_tangents(model, run, tangents, orthonormal, work)
     run.count[PREVIOUS_MODE] = run.count[MODE]
     run.count[MODE] = limit_mode

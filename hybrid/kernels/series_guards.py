@@ -94,13 +94,13 @@ def root_between(series, column, order, known_roots, h, low, high, left, right):
 
     ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
     variable for each known root at 0. Newton, kept inside its bracket; in the end on the series as it is,
-    which at 0 is zero up to rounding only.
+    which at 0 is zero up to rounding only; but not to a root at 0, where the step begins.
     """
     s = simple_root_of(series, column, order, known_roots, low, high, left, right)
     for _ in range(3 if known_roots > 0 else 0):
         slope = slope_at(series, column, order, s)
         shift = -value_at(series, column, order, s) / slope if slope != 0.0 else 0.0
-        if not abs(shift) <= 1e-6 * h or not 0.0 <= s + shift <= h:
+        if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
             break
         s += shift
         if abs(shift) <= EPSILON * s:

@@ -51,6 +51,54 @@ def orthonormalise(y, n, k, growth, threshold):
 
 
 @njit(**KERNEL)
+def multiply(matrix, y, n, tangents, image):
+    """Multiply the tangent vectors in ``y (n (1 + k),)`` by a matrix; ``image (n,)`` is scratch."""
+    for start in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += matrix[i, j] * y[start + j]
+            image[i] = total
+        for i in range(n):
+            y[start + i] = image[i]
+
+
+@njit(**KERNEL)
+def solve(system, n, out):
+    """Solve the linear equations in the rows of ``system (n, n + 1)``, overwritten; the last column is known.
+
+    Where they are singular to rounding some unknowns are zero, and equations that contradict are left.
+    """
+    for column in range(n):
+        out[column] = 0.0
+        for i in range(n):
+            out[column] = max(out[column], abs(system[i, column]))
+    rank = 0
+    for column in range(n):
+        pivot = rank
+        for i in range(rank + 1, n):
+            if abs(system[i, column]) > abs(system[pivot, column]):
+                pivot = i
+        if rank == n or not abs(system[pivot, column]) > COLLAPSED * out[column]:
+            out[column] = -1.0
+            continue
+        for j in range(n + 1):
+            system[rank, j], system[pivot, j] = system[pivot, j], system[rank, j]
+        for i in range(n):
+            factor = system[i, column] / system[rank, column]
+            for j in range(column, n + 1 if i != rank else 0):
+                system[i, j] -= factor * system[rank, j]
+        rank += 1
+    rank = 0
+    for column in range(n):
+        if out[column] < 0.0:
+            out[column] = 0.0
+        else:
+            out[column] = system[rank, n] / system[rank, column]
+            rank += 1
+
+
+@njit(**KERNEL)
 def log_abs_determinant(matrix, magnitude, n):
     """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if singular to rounding.
 

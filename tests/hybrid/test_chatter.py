@@ -377,3 +377,27 @@ class TestTangents:
         arc = simulate(incline(), (0.1, 1.0, 0.2, -0.3), (0.0, 4.0), mode="flight")
         normal = np.array([math.sin(SLOPE), math.cos(SLOPE)])
         np.testing.assert_allclose([arc.x[-1, :2] @ normal, arc.x[-1, 2:] @ normal], 0.0, atol=1e-10)
+
+
+def test_the_matrix_of_the_limit_does_not_depend_on_who_looks():
+    """Height and speed are lost, and ``w``, which grew with the height, keeps what it had from the ground."""
+    system = HybridSystem(
+        state=("q", "v", "w"),
+        modes=[
+            Mode("flight", lambda t, x, p: (x.v, -9.81, x.w + x.v)),
+            Mode("rest", lambda t, x, p: (0.0, 0.0, x.w)),
+        ],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, direction=-1),
+                Reset(lambda t, x, p: (0.0, -0.8 * x.v, x.w)),
+                accumulates_to="rest",
+            )
+        ],
+    )
+    for tangent in (None, True):
+        arc = simulate(system, (1.0, 0.0, 1.0), (0.0, 10.0), mode="flight", tangent=tangent)
+        assert arc.jumps[-1].kind == "limit"
+        np.testing.assert_allclose(arc.jumps[-1].saltation, [[0, 0, 0], [0, 0, 0], [-1, 0, 1]], atol=1e-12)

@@ -137,33 +137,6 @@ def test_ours(system, options, unchecked):
 CASES = small_systems().flatmap(cases)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    raises=PropertyError,
-    reason="a guard on whose far side a reset lands gets the saltation matrix of a crossing",
-)
-def test_a_reset_that_lands_beyond_a_guard():
-    """The second event happens at the time of the first, whatever its guard says.
-
-    ``y = y0 - 1 + 5 (t - 1 + x0)`` at the end, so its derivative is (5, 1).
-    """
-    system = HybridSystem(
-        state=("x", "y"),
-        modes=[
-            Mode("a", lambda t, x, p: (1.0, 0.0)),
-            Mode("b", lambda t, x, p: (1.0, 2.0)),
-            Mode("c", lambda t, x, p: (1.0, 5.0)),
-        ],
-        transitions=[
-            Transition("a", "b", Guard(lambda t, x, p: x.x - 1, +1), Reset(lambda t, x, p: (x.x, x.y - 1))),
-            Transition("b", "c", Guard(lambda t, x, p: x.y, -1)),
-        ],
-    )
-    arc = hybrid.simulate(system, (0.0, 0.5), (0.0, 2.0), mode="a")
-    assert arc.x[-1] == pytest.approx([2.0, 4.5])
-    check_saltation(Case(system, {}, "a", (0.0, 0.5), 0.0, 2.0))
-
-
 class TestSmallSystems:
     """Systems made up by chance, with the properties that need no other way of writing them."""
 

@@ -12,12 +12,18 @@ from hybrid.load import load_kernels
 
 KERNELS = load_kernels("hybrid.kernels.tangent")
 _orthonormalise, _log_abs_determinant = KERNELS.orthonormalise, KERNELS.log_abs_determinant
+_solve = KERNELS.solve
 COLLAPSED = KERNELS.COLLAPSED
 
 
 @njit
 def _run(y, n, k, growth, threshold):
     return _orthonormalise(y, n, k, growth, threshold)
+
+
+@njit
+def _solved(system, out):
+    _solve(system, len(out), out)
 
 
 @njit
@@ -141,3 +147,21 @@ def test_near_grazing_is_not_singular(speed):
 def test_small_is_not_singular(small):
     assert log_determinant([[small, 0.0], [0.0, 1.0]]) == pytest.approx(math.log(small))
     assert log_determinant([[0.0, 1.0], [small, 0.0]]) == pytest.approx(math.log(small))
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 6])
+def test_solutions(n):
+    rng = np.random.default_rng(n)
+    matrix, known, out = rng.normal(size=(n, n)), rng.normal(size=n), np.empty(n)
+    matrix[0, 0] = 0.0 if n > 1 else 2.0
+    _solved(np.column_stack([matrix, known]), out)
+    np.testing.assert_allclose(out, np.linalg.solve(matrix, known), rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    "matrix", [np.zeros((2, 2)), [[0.1, 0.2], [0.3, 0.6]], [[0.0, 2.0], [0.0, 3.0]], [[1.0, 0.0], [0.0, 0.0]]]
+)
+def test_of_singular_equations_one_solution_is_found(matrix):
+    known, out = np.array(matrix) @ [1.5, -0.5], np.empty(2)
+    _solved(np.column_stack([matrix, known]), out)
+    np.testing.assert_allclose(np.array(matrix) @ out, known, atol=1e-14)
