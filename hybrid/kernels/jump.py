@@ -253,12 +253,32 @@ def move(model, run, transition, target, x_plus):
     run.count[PHASE_OF_RUN] = ENTERING
 
 
+@njit(**KERNEL)
+def leave(model, run, transition, transversality, work):
+    """Put the run behind a jump to ``work.new``."""
+    mode, target = run.count[MODE], model.target[transition]
+    if mode == target and model.direction[transition] != 0:
+        remember_impulse(model, run, transition, transversality, work)
+    move(model, run, transition, mode if target == NO_MODE else target, work.new)
+
+
 @njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **PART)
 def jump(model, method, run, record, transition, tangents, orthonormal, work):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
     n, mode, target = model.dimension, run.count[MODE], model.target[transition]
     locked = run.count[LOCKED] == 1
     run.count[LOCKED] = 0
+    if tangents == 0 and record.jump_time.shape[0] == 0:
+        # Nobody asks for a saltation matrix.
+        model.flow(mode, run.clock[PHASE], run.y, model.parameters, work.field)
+        transversality = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
+        model.reset(transition, run.clock[PHASE], run.y, model.parameters, work.new)
+        if mode == target and model.direction[transition] != 0:
+            model.flow(mode, run.clock[PHASE], work.new, model.parameters, work.field_after)
+        run.clock[LAST_TRANSVERSALITY] = transversality
+        sides_at_point(model, run, work)
+        leave(model, run, transition, transversality, work)
+        return
     if locked:
         transversality = cross(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
         follow(run, n, tangents, work)
@@ -287,9 +307,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
         carry_tangents(model, run, tangents, orthonormal, work)
         if kind == GRAZING and orthonormal:
             run.clock[ILL_CONDITIONED_GROWTH] += run.growth[0] - before
-    if mode == target and model.direction[transition] != 0:
-        remember_impulse(model, run, transition, transversality, work)
-    move(model, run, transition, mode if target == NO_MODE else target, work.new)
+    leave(model, run, transition, transversality, work)
 
 
 @njit(**KERNEL)

@@ -34,6 +34,7 @@ from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.series_guards import (
     earliest_on_series,
     powers_on_step,
+    raised_to_bernstein,
     slope_at,
     to_bernstein,
     value_at,
@@ -200,17 +201,22 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
     n = model.dimension
     column = work.polynomial
     for i in range(n + 1):
-        power = 1.0
-        for k in range(degree + 1):
-            column[k] = 0.0
-            if k <= order:
+        last = order
+        if i < n or clock >= 0:
+            power = 1.0
+            for k in range(order + 1):
                 column[k] = work.series[k, i if i < n else clock] * power
-            power *= h
-        if i == n and clock < 0:
-            column[0], column[1] = 0.0, span
-            for k in range(2, degree + 1):
+                power *= h
+        else:
+            column[0], column[1], last = 0.0, span, 1
+        while last > 0 and column[last] == 0.0:
+            last -= 1
+        if 2 * last < degree:
+            raised_to_bernstein(column, last, degree)
+        else:
+            for k in range(last + 1, degree + 1):
                 column[k] = 0.0
-        to_bernstein(column, degree)
+            to_bernstein(column, degree)
         for k in range(degree + 1):
             record.step_coefficients[slot, k, i] = column[k]
 
