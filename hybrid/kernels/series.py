@@ -255,7 +255,8 @@ def series_step(model, method, run, record, tangents, remaining, work):
         order = degree
     guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
     clock = length + guards if kind == DESINGULARISED else -1
-    model.series(mode, t, run.y, model.parameters, order, series)
+    # A run may be taken on without its tangent vectors: the columns are those of what is passed.
+    model.series(mode, t, run.y[:length], model.parameters, order, series)
     run.count[STEPS] += 1
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
     h = math.inf

@@ -35,6 +35,17 @@ class TestStroboscopic:
         for field in ("t", "x", "jumps", "mode"):
             np.testing.assert_array_equal(getattr(late, field), getattr(whole, field)[transient:])
 
+    @pytest.mark.parametrize("solver", [None, TIGHT])
+    @pytest.mark.parametrize("system", [OSCILLATOR, vibroimpact()], ids=["oscillator", "vibro-impact"])
+    def test_a_run_is_taken_on_without_its_tangent_vectors(self, system, solver):
+        n = system.dimension
+        start = hybrid.run.start(system, (0.0,) * n, 0.0, solver=solver)
+        carrying = hybrid.run.start(system, (0.0,) * n, 0.0, solver=solver, tangent=np.eye(n))
+        for one, other in zip(
+            hybrid.section.strobe(start, 30), hybrid.section.strobe(carrying, 30), strict=True
+        ):
+            np.testing.assert_array_equal(one, other)
+
     def test_modes(self):
         start = reference("founding_system")["D=0.05"]["x0"]
         section = stroboscopic_section(vibroimpact(), start, periods=5, mode="free")
