@@ -9,13 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import models
-from hybrid import DOP853, HybridError, Tsit5
+from hybrid import DOP853, HybridError, Taylor, Tsit5
 from lyapunov import demo_figures, demo_report
 from lyapunov.demo_paper import PAPER, ROWS
 from lyapunov.demo_study import STARTS, Settings, study_regime
 from lyapunov.demo_tangents import explanations, tolerance_study
 
-SOLVERS = {solver.__name__: solver for solver in (DOP853, Tsit5)}
+SOLVERS = {solver.__name__: solver for solver in (Taylor, DOP853, Tsit5)}
 
 EPILOG = f"""
 For each frequency: the two-orbit formulas (7), (8) and (9) of the paper and Benettin's method (10), after
@@ -59,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
         default=1_000,
         help="forcing periods run before, not counted (default: %(default)s)",
     )
-    options.add_argument("--solver", choices=SOLVERS, default="DOP853", help="method (default: %(default)s)")
+    options.add_argument("--solver", choices=SOLVERS, default="Taylor", help="method (default: %(default)s)")
     options.add_argument(
         "--rtol", type=float, default=1e-9, help="relative tolerance a step (default: %(default)s)"
     )

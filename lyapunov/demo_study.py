@@ -6,10 +6,10 @@ import attrs
 import numpy as np
 
 from hybrid import (
-    DOP853,
     HybridArc,
     HybridSystem,
     PeriodicOrbit,
+    Taylor,
     periodic_orbit,
     simulate,
     stroboscopic_section,
@@ -47,7 +47,7 @@ class Settings:
 
     intervals: int = 10_000
     transient: int = 1_000
-    solver: RungeKutta = attrs.field(factory=lambda: DOP853(rtol=1e-9, atol=1e-11))
+    solver: RungeKutta = attrs.field(factory=lambda: Taylor(rtol=1e-9, atol=1e-11))
     progress: bool = False
 
     @property
