@@ -10,12 +10,12 @@ import numpy as np
 
 import models
 from benchmarks.common import heading, table
-from hybrid import DOP853
+from hybrid import Taylor
 from lyapunov import chart
 
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
 PERIODS, TRANSIENT = 1000, 200
-SOLVER = DOP853(rtol=1e-6, atol=1e-8)
+SOLVER = Taylor(rtol=1e-6, atol=1e-8)
 
 
 def measured(rows: int, threads: int, **options: object) -> tuple[float, float]:

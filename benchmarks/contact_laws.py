@@ -13,7 +13,7 @@ import numpy as np
 
 import models
 from benchmarks.common import ROOT, heading, least_time, table
-from hybrid import DOP853
+from hybrid import Taylor
 from hybrid.plot import COLOURS
 from lyapunov import ModelComparison, compare_models, lyapunov_spectrum
 from models.contact import ContactLaw, matched_laws
@@ -27,7 +27,7 @@ SPEED = 0.40
 OMEGAS = np.round(np.arange(7.0, 8.0001, 0.025), 3)
 # Below, every law has a stable orbit of one period; above there are tori, chaos and several attractors.
 LAST_PERIODIC = 7.40
-SOLVER = DOP853(rtol=1e-9, atol=1e-11)
+SOLVER = Taylor(rtol=1e-9, atol=1e-11)
 TOLERANCES = (3e-1, 3e-2, 1e-3, 1e-6)
 STYLES = {
     "rigid": {"color": COLOURS[1], "marker": "s"},

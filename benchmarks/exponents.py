@@ -18,7 +18,7 @@ import numpy as np
 
 import models
 from benchmarks.common import ROOT, heading, table
-from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Mode, Reset, Taylor, Transition
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from lyapunov.plot import COLOURS, INK, style
 
@@ -29,7 +29,7 @@ REGULAR = -0.05489356622830292
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 INTERVALS = (10, 30, 100, 300, 1000, 3000)
 # The companion's distance is 1e-8: looser steps would be all that it sees.
-TWO_ORBITS = DOP853(rtol=1e-12, atol=1e-14)
+TWO_ORBITS = Taylor(rtol=1e-12, atol=1e-14)
 SKEW = 0.3
 CHAOTIC = -SKEW * math.log(SKEW) - (1 - SKEW) * math.log(1 - SKEW)
 STARTS = np.random.default_rng(4).uniform(0.05, 0.95, 12)
@@ -77,7 +77,7 @@ def timed(work: Callable[[], object]) -> tuple[float, object]:
 
 
 def estimates(
-    system: HybridSystem, x0: tuple[float, ...], M: int, solvers: dict[str, DOP853], **options: float
+    system: HybridSystem, x0: tuple[float, ...], M: int, solvers: dict[str, Taylor], **options: float
 ) -> dict[str, tuple[float, float]]:
     """Seconds and estimate of every method after M intervals."""
     found = {}
@@ -100,7 +100,7 @@ def estimates(
 def regular_curves() -> Curves:
     """Errors on the stable orbit of the founding system, from a point of it."""
     solvers = {
-        f"tolerance {tolerance:.0e}": DOP853(rtol=tolerance, atol=tolerance / 100) for tolerance in TOLERANCES
+        f"tolerance {tolerance:.0e}": Taylor(rtol=tolerance, atol=tolerance / 100) for tolerance in TOLERANCES
     }
     curves: Curves = {}
     for M in INTERVALS:
@@ -111,7 +111,7 @@ def regular_curves() -> Curves:
 
 def chaotic_curves() -> Curves:
     """Root mean square errors on the skew tent map, over several starts."""
-    solvers = {"tolerance 1e-06": DOP853(rtol=1e-6, atol=1e-8)}
+    solvers = {"tolerance 1e-06": Taylor(rtol=1e-6, atol=1e-8)}
     curves: Curves = {}
     for M in INTERVALS:
         runs = [estimates(skew_tent(), (u, 0.5), M, solvers, interval=1.0) for u in STARTS]
