@@ -6,6 +6,7 @@ import importlib.util
 import os
 import sys
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
@@ -73,6 +74,13 @@ class CompiledSystem:
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
         """What the kernels are given: roles, parameter values, graph."""
+        system = self.system
+        return self._model.replace(
+            parameters=system.parameter_values(parameters), period=system.forcing_period(parameters) or 0.0
+        )
+
+    @cached_property
+    def _model(self) -> Any:
         from hybrid.kernels.layout import Model
 
         system = self.system
@@ -83,7 +91,7 @@ class CompiledSystem:
         transitions = system.transitions
         return Model(
             **dict(zip(ROLES, self.roles, strict=True)),
-            parameters=system.parameter_values(parameters),
+            parameters=system.parameter_values(),
             dimension=system.dimension,
             first_outgoing=_indices(first),
             outgoing=_indices(outgoing),
@@ -97,7 +105,7 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
-            period=system.forcing_period(parameters) or 0.0,
+            period=0.0,
         )
 
 

@@ -24,6 +24,7 @@ ISOLATION_DEPTH = 64
 UNLIMITED = np.iinfo(np.int64).max
 
 
+@cache
 def kernel_method(solver: RungeKutta) -> Any:
     """The kernel's view of a solver: tableau and tolerances."""
     from hybrid.kernels.layout import Method
@@ -92,7 +93,7 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     coupled = len(method.b) if method.implicit else 0
     systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
     systems[-1:] = -1.0
-    nodes = 0.5 * (1 - np.cos(np.pi * np.arange(FIT_DEGREE + 1) / FIT_DEGREE))
+    nodes, fit = _fit_of_guards()
     width_of_series = length + columns + codes.NARROW - 1
     width = max(dense_degree(method), FIT_DEGREE) + 4
     return Work(
@@ -116,7 +117,7 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
         stack=np.zeros((ISOLATION_DEPTH, width)),
         intervals=np.zeros((ISOLATION_DEPTH, 2)),
         nodes=nodes,
-        fit=np.linalg.inv(_bernstein_basis(nodes)),
+        fit=fit,
         systems=systems,
         pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
         # Whole vectors of columns are evaluated: a few more than there are.
@@ -125,12 +126,15 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     )
 
 
-def _bernstein_basis(nodes: np.ndarray) -> np.ndarray:
+@cache
+def _fit_of_guards() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes on [0, 1] and the matrix from values there to Bernstein coefficients."""
     from scipy.special import comb
 
-    degree = len(nodes) - 1
-    j = np.arange(degree + 1)
-    return comb(degree, j) * nodes[:, None] ** j * (1 - nodes[:, None]) ** (degree - j)
+    j = np.arange(FIT_DEGREE + 1)
+    nodes = 0.5 * (1 - np.cos(np.pi * j / FIT_DEGREE))
+    basis = comb(FIT_DEGREE, j) * nodes[:, None] ** j * (1 - nodes[:, None]) ** (FIT_DEGREE - j)
+    return nodes, np.linalg.inv(basis)
 
 
 def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:

@@ -47,7 +47,7 @@ def simulate(
     parameters
         Values that override the system's.
     solver
-        Method and tolerances, by default ``DOP853(rtol=1e-10, atol=1e-12)``.
+        Method and tolerances, by default ``Taylor(rtol=1e-10, atol=1e-12)``: what fits each mode.
     tangent
         True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is
         controlled with the state's.
@@ -132,9 +132,10 @@ class _Recorder:
         n = trajectory.model.dimension
         degree = dense_degree(trajectory.method)
         self.record = empty_record(n, degree, STEPS_AT_ONCE, JUMPS_AT_ONCE)
-        self.steps = [_step_columns(empty_record(n, degree), 0.0)]
-        self.jumps = [_jump_columns(empty_record(n, degree), 0.0)]
-        self.grazings = [_grazing_columns(empty_record(n, degree), 0.0)]
+        # Nothing yet, in the right shapes.
+        self.steps = [_step_columns(self.record, 0.0)]
+        self.jumps = [_jump_columns(self.record, 0.0)]
+        self.grazings = [_grazing_columns(self.record, 0.0)]
         self.states = np.full((0 if times is None else len(times), n), np.nan)
         self.places = np.zeros((len(self.states), 2), dtype=np.int64)
         self.sampled = 0

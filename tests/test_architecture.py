@@ -10,7 +10,16 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("hybrid", "models", "lyapunov")
-KERNELS_MAY_IMPORT = ("__future__", "hybrid.kernels", "llvmlite", "math", "numba", "numpy", "typing")
+KERNELS_MAY_IMPORT = (
+    "__future__",
+    "hybrid.kernels",
+    "llvmlite",
+    "math",
+    "numba",
+    "numpy",
+    "struct",
+    "typing",
+)
 HEAVY = ("matplotlib", "networkx", "numba", "scipy", "sympy")
 MAX_LINES = 500
 

@@ -7,6 +7,8 @@ address and shape there. What the table holds never changes, so the compiler rea
 of a loop; what the arrays hold may change freely.
 """
 
+import struct
+
 import numpy as np
 from numba import types
 from numba.core.typing.templates import AttributeTemplate
@@ -49,6 +51,7 @@ class Structure:
     def __init_subclass__(cls):
         """Derive the numba type from the annotations."""
         cls.numba_type = StructureType(cls.__name__, cls.__annotations__)
+        cls.words = {name: _words_of(name, kind) for name, kind in cls.__annotations__.items()}
 
     def __init__(self, **values):
         fields = self.numba_type.fields
@@ -58,30 +61,55 @@ class Structure:
             )
         self.__dict__.update(values)
         words = []
-        for name, kind in fields.items():
-            words += _words(name, kind, values[name])
-        self.__dict__["table"] = np.array(words, dtype=np.int64)
-        self.__dict__["address"] = self.table.ctypes.data
+        for name, words_of in self.words.items():
+            words += words_of(values[name])
+        self._fill(np.array(words, dtype=np.int64))
+
+    def _fill(self, table):
+        self.__dict__["table"] = table
+        self.__dict__["address"] = _address(table)
 
     def __setattr__(self, name, value):
         raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
 
     def replace(self, **changes):
         """A copy with some fields changed."""
-        return type(self)(**{name: getattr(self, name) for name in self.numba_type.fields} | changes)
+        copy, table = object.__new__(type(self)), self.table.copy()
+        copy.__dict__.update(self.__dict__)
+        for name, value in changes.items():
+            place, words = self.numba_type.place(name), self.words[name](value)
+            table[place : place + len(words)] = words
+            copy.__dict__[name] = value
+        copy._fill(table)
+        return copy
 
 
-def _words(name, kind, value):
-    if isinstance(kind, types.Array):
-        fits = isinstance(value, np.ndarray) and value.ndim == kind.ndim and value.flags.c_contiguous
-        if not fits or value.dtype != np.dtype(str(kind.dtype)):
+def _address(array):
+    # Ten times as fast as its ctypes view.
+    return array.__array_interface__["data"][0]
+
+
+def _array_words(name, kind):
+    dtype, ndim = np.dtype(str(kind.dtype)), kind.ndim
+
+    def words(value):
+        fits = isinstance(value, np.ndarray) and value.ndim == ndim and value.flags.c_contiguous
+        if not fits or value.dtype != dtype:
             raise TypeError(f"{name} must be a contiguous array of type {kind}; got {value!r}.")
-        return [value.ctypes.data, *value.shape]
+        return (_address(value), *value.shape)
+
+    return words
+
+
+def _words_of(name, kind):
+    """The function that turns a field into words. Structures are made for every run, so it is quick."""
+    if isinstance(kind, types.Array):
+        return _array_words(name, kind)
     if isinstance(kind, types.Float):
-        return [int(np.float64(value).view(np.int64))]
+        return lambda value: struct.unpack("q", struct.pack("d", value))
     if isinstance(kind, StructureType | types.FunctionType):
-        return [value.address]
-    return [int(value)]
+        return lambda value: (value.address,)
+    return lambda value: (int(value),)
 
 
 @register_model(StructureType)
