@@ -45,9 +45,17 @@ MOST_JUMPS_AT_ONCE = 100
 
 @njit(**KERNEL)
 def arrived(model, run, work):
-    """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run."""
-    mode, t = run.count[MODE], run.clock[PHASE]
+    """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run.
+
+    Rounding is judged as by a run that starts here, which knows nothing of the step that led here; but the
+    steps of Runge-Kutta methods can pass a guard by their own rounding without having found it.
+    """
+    mode, t, found = run.count[MODE], run.clock[PHASE], NO_TRANSITION
     model.flow(mode, t, run.y, model.parameters, work.field)
+    for i in range(model.dimension):
+        work.settled[i] = run.scale[i]
+        if model.propagator[mode] != RUNGE_KUTTA:
+            run.scale[i] = abs(run.y[i])
     widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
@@ -57,9 +65,11 @@ def arrived(model, run, work):
             after = 1 if speed > 0.0 else -1
             direction = model.direction[transition]
             crossed = speed != 0.0 and after != run.side[transition] and direction in (0, after)
-            if crossed and allowed(model, transition, t, run.y, work.scalar):
-                return transition
-    return NO_TRANSITION
+            if found == NO_TRANSITION and crossed and allowed(model, transition, t, run.y, work.scalar):
+                found = transition
+    for i in range(model.dimension):
+        run.scale[i] = max(run.scale[i], work.settled[i])
+    return found
 
 
 @njit(**INLINE)
