@@ -79,7 +79,7 @@ def simulate(
     if not max_jumps >= 0:
         raise ArgumentError(f"max_jumps must be at least 0; got {max_jumps!r}.")
     trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
-    return _Recorder(trajectory, times).run(t0, t1, int(max_jumps))
+    return _Recorder(trajectory, times, t1).run(t0, t1, int(max_jumps))
 
 
 def _time_span(t_span: Any) -> tuple[float, float]:
@@ -126,12 +126,14 @@ def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
 class _Recorder:
     """Runs a trajectory in bursts and files what the kernel wrote down in each."""
 
-    def __init__(self, trajectory: Trajectory, times: np.ndarray | None) -> None:
+    def __init__(self, trajectory: Trajectory, times: np.ndarray | None, t1: float) -> None:
         self.trajectory = trajectory
         self.times = times
         n = trajectory.model.dimension
         degree = dense_degree(trajectory.method)
-        self.record = empty_record(n, degree, STEPS_AT_ONCE, JUMPS_AT_ONCE)
+        # The state at the end is at hand without any polynomial.
+        only_the_end = times is not None and bool(np.all(times >= t1))
+        self.record = empty_record(n, degree, 0 if only_the_end else STEPS_AT_ONCE, JUMPS_AT_ONCE)
         # Nothing yet, in the right shapes.
         self.steps = [_step_columns(self.record, 0.0)]
         self.jumps = [_jump_columns(self.record, 0.0)]
