@@ -48,6 +48,8 @@ SHARE = 1e-3
 SAFETY = 0.9
 # Terms at the end of a series that have to be small.
 TAIL = 8
+# Share of a step by which a landing may still be corrected.
+CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
 LONG = 100.0
 
@@ -83,44 +85,20 @@ def weigh_state(series, n, length, rtol, atol, exact, weights):
             weights[i] = 1.0 / (floor + rtol * abs(series[0, i]))
 
 
-@njit(**INLINE)
-def weigh_guards(model, mode, series, n, length, rtol, weights):
-    """The same for the guards of the mode, into ``weights`` from ``length`` on.
-
-    A guard that is not affine has a series that ends before the state's. It is measured against what it
-    changes while the state changes by its size; the others follow the state, and weigh nothing.
-    """
-    size, pace = 0.0, 0.0
-    for i in range(n):
-        size, pace = max(size, abs(series[0, i])), max(pace, abs(series[1, i]))
-    scale = size / pace if size * pace > 0.0 else 1.0
-    start = model.first_outgoing[mode]
-    for slot in range(start, model.first_outgoing[mode + 1]):
-        column = length + slot - start
-        weights[column] = 0.0
-        if model.affine_guard[model.outgoing[slot]] == 0:
-            largest = abs(series[0, column]) + scale * (
-                abs(series[1, column]) + scale * (abs(series[2, column]) + scale * abs(series[3, column]))
-            )
-            weights[column] = 1.0 / (rtol * largest) if largest > 0.0 else 0.0
-
-
 @njit(**KERNEL)
-def longest_step(model, mode, series, n, length, order, rtol, atol, exact, weights):
+def longest_step(series, n, length, order, rtol, atol, exact, weights):
     """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
 
     The last term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth
     may be there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The
-    term that decides is told by the exponents of floating point alone. ``weights (length + guards,)`` is
-    scratch. Nan if a coefficient is.
+    term that decides is told by the exponents of floating point alone. ``weights (length,)`` is scratch. Nan
+    if a coefficient is.
     """
     weigh_state(series, n, length, rtol, atol, exact, weights)
-    weigh_guards(model, mode, series, n, length, rtol, weights)
-    width = length + model.first_outgoing[mode + 1] - model.first_outgoing[mode]
     shortest, largest, decisive = math.inf, 1e-300, order
     for o in range(order, order - TAIL, -1):
         terms, worst, total = series[o], 1e-300, 0.0
-        for i in range(width):
+        for i in range(length):
             worst = max(worst, weights[i] * abs(terms[i]))
             total += terms[i]
         if not abs(total) < math.inf:
@@ -129,6 +107,32 @@ def longest_step(model, mode, series, n, length, order, rtol, atol, exact, weigh
         if length_of_this < shortest:
             shortest, largest, decisive = length_of_this, worst, o
     return SAFETY * math.exp(math.log(rtol) / order - math.log(rtol * largest) / decisive)
+
+
+@njit(**KERNEL)
+def within_guards(model, mode, series, length, order, rtol, h):
+    """Shorten a step to where the series of guards that are not affine reach, if less far than the state's.
+
+    Their last terms are measured against what the guard changes over the step itself, so a shorter step may
+    have to be shorter still.
+    """
+    start = model.first_outgoing[mode]
+    for slot in range(start, model.first_outgoing[mode + 1]):
+        column = length + slot - start
+        for _ in range(20 if model.affine_guard[model.outgoing[slot]] == 0 else 0):
+            largest = abs(series[0, column])
+            for o in range(1, 4):
+                largest += abs(series[o, column]) * h**o
+            reach = math.inf
+            for o in range(order, order - TAIL, -1):
+                term = abs(series[o, column])
+                if term > 0.0 and largest > 0.0:
+                    reach = min(reach, math.log(largest / term) / o)
+            longest = SAFETY * math.exp(min(math.log(rtol) / order + reach, 700.0))
+            if not longest < h:
+                break
+            h = longest
+    return h
 
 
 @njit(**KERNEL)
@@ -222,11 +226,13 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
 
 
 @njit(**KERNEL)
-def reach_guard(model, run, tangents, transition, t, work):
+def reach_guard(model, run, tangents, transition, t, longest, work):
     """Bring the state onto the guard by an Euler step in time, whose length is returned.
 
-    A contact ends where the root of its guard vanishes. The guard differs from the square of the root by the
-    error of the step, and beyond its rounding it would count as not yet, or once more, crossed.
+    A contact ends where the root of its guard vanishes, and the guard differs from the square of the root by
+    the error of the step. A guard that is not affine has a series with terms, and rounding, of its own. Left
+    beyond its rounding it would count as not yet, or once more, crossed. Nothing is done, and 0 returned,
+    where more than ``longest`` would be needed.
     """
     field = work.stages[0]
     rates(model, run.count[MODE], t, run.y, tangents, field)
@@ -234,6 +240,8 @@ def reach_guard(model, run, tangents, transition, t, work):
     if speed == 0.0:
         return 0.0
     correction = -guard_value(model, transition, t, run.y, work.scalar) / speed
+    if not abs(correction) <= longest:
+        return 0.0
     for i in range(model.dimension * (1 + tangents)):
         run.y[i] += correction * field[i]
     return correction
@@ -261,17 +269,18 @@ def series_step(model, method, run, record, tangents, remaining, work):
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
     h = math.inf
     if degree == 0:
-        h = longest_step(model, mode, series, n, length, order, rtol, atol, exact, work.weights)
+        h = longest_step(series, n, length, order, rtol, atol, exact, work.weights)
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock >= 0:
         h = step_until(series, clock, order, min(h, 1e100), remaining, work)
-        span = math.inf
     else:
         h = min(h, method.max_step, remaining)
         if not h < 1e100:
             h = unhurried(series, n, run)
-        span = h
+    if degree == 0:
+        h = within_guards(model, mode, series, length, order, rtol, h)
+    span = h if clock < 0 else math.inf
     fired = NO_TRANSITION
     if guards > 0:
         theta, fired = earliest_on_series(model, method, run, order, t, h, length, kind, work)
@@ -292,8 +301,9 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if record.step_time.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
-    if fired != NO_TRANSITION and clock >= 0:
-        span += reach_guard(model, run, tangents, fired, t + span, work)
+    if fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
+        longest = math.inf if clock >= 0 else CLOSE * span
+        span += reach_guard(model, run, tangents, fired, t + span, longest, work)
     return GO_ON, span
 
 
