@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from models import bouncing_ball, impact_oscillator
 
 
@@ -22,6 +22,24 @@ def pendulum(guard=lambda t, x, p: x.q - p.c, *, both=False, names=("left", "rig
         parameters={"c": 0.3},
         modes=[Mode(left, field), Mode(right, field)],
         transitions=transitions[::order],
+    )
+
+
+def shaken_table():
+    """A ball on a table that moves as ``a sin(w t)``: guard and reset depend on time."""
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"g": 9.81, "e": 0.7, "a": 0.1, "w": 5.0},
+        modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q - p.a * np.sin(p.w * t), -1),
+                Reset(lambda t, x, p: (x.q, -p.e * x.v + (1 + p.e) * p.a * p.w * np.cos(p.w * t))),
+                name="hit",
+            )
+        ],
     )
 
 

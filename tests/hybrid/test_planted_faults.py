@@ -35,6 +35,7 @@ from hybrid.testing import (
 )
 from hybrid.testing.invariance import ELASTIC
 from tests.cases import systems
+from tests.hybrid.systems import shaken_table
 
 EXAMPLES = 200
 NUDGE = 1e-6
@@ -62,24 +63,6 @@ def found(check, system, engine=None, **options):
     return str(caught.value)
 
 
-def table():
-    """A ball on a table that moves as ``a sin(w t)``: guard and reset depend on time."""
-    return HybridSystem(
-        state=("q", "v"),
-        parameters={"g": 9.81, "e": 0.7, "a": 0.1, "w": 5.0},
-        modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
-        transitions=[
-            Transition(
-                "flight",
-                "flight",
-                Guard(lambda t, x, p: x.q - p.a * np.sin(p.w * t), -1),
-                Reset(lambda t, x, p: (x.q, -p.e * x.v + (1 + p.e) * p.a * p.w * np.cos(p.w * t))),
-                name="hit",
-            )
-        ],
-    )
-
-
 def box(*, floor=-1, reset=lambda t, x, p: (x.q, -p.e * x.v), jacobian=None):
     """A damped body between two walls; of the wall at 0 what a user may get wrong is to be given."""
     return HybridSystem(
@@ -100,7 +83,7 @@ def box(*, floor=-1, reset=lambda t, x, p: (x.q, -p.e * x.v), jacobian=None):
     )
 
 
-BALL, TABLE, JERK, BOX = models.bouncing_ball(), table(), systems.jerk(), box()
+BALL, TABLE, JERK, BOX = models.bouncing_ball(), shaken_table(), systems.jerk(), box()
 CONSTANT = systems.constant_fields()
 IN_THE_BOX = {"states": {"q": (0.1, 0.9), "v": (-2.0, 2.0)}}
 

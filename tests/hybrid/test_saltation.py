@@ -11,28 +11,11 @@ import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, saltation_matrix, simulate
 from models import bouncing_ball, impact_oscillator
 from tests.cases import systems
+from tests.hybrid.systems import shaken_table
 from tests.reference.load import reference
 
 TIGHT = hybrid.DOP853(rtol=1e-13, atol=1e-14)
 STEP = 1e-5
-
-
-def table():
-    """A ball on a table that moves as ``a sin(w t)``: guard and reset depend on time."""
-    return HybridSystem(
-        state=("q", "v"),
-        parameters={"g": 9.81, "e": 0.7, "a": 0.1, "w": 5.0},
-        modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
-        transitions=[
-            Transition(
-                "flight",
-                "flight",
-                Guard(lambda t, x, p: x.q - p.a * np.sin(p.w * t), -1),
-                Reset(lambda t, x, p: (x.q, -p.e * x.v + (1 + p.e) * p.a * p.w * np.cos(p.w * t))),
-                name="hit",
-            )
-        ],
-    )
 
 
 def forced():
@@ -56,7 +39,7 @@ def forced():
     )
 
 
-TABLE, FORCED, BALL, OSCILLATOR = table(), forced(), bouncing_ball(), impact_oscillator()
+TABLE, FORCED, BALL, OSCILLATOR = shaken_table(), forced(), bouncing_ball(), impact_oscillator()
 
 
 def differenced(system, x0, t0, t1, mode, parameters=None):
