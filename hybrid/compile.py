@@ -16,7 +16,7 @@ import numpy as np
 
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 from hybrid.errors import ArgumentError
-from hybrid.kernels.codes import NO_MODE
+from hybrid.kernels.codes import NARROW, NO_MODE
 from hybrid.load import kernels_key, load_kernels
 
 if TYPE_CHECKING:
@@ -33,6 +33,11 @@ ROLES = (
     "reset_jacobian",
     "series",
 )
+
+# Division by zero is infinite, not an error. The products of series may be fused into their sums; in a guard
+# that could make a difference of equal terms differ from zero.
+IEEE = {"error_model": "numpy"}
+FUSED = {"series": IEEE | {"fastmath": {"contract"}}}
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -65,11 +70,10 @@ class CompiledSystem:
         return "\n".join(lines)
 
     def series_columns(self, tangents: int) -> int:
-        """Columns that the series of any mode need besides state and tangent vectors."""
-        sources = [transition.source for transition in self.system.transitions]
+        """Columns that the series of any mode need."""
+        groups = -(-tangents // NARROW)
         return max(
-            each.columns + tangents * each.columns_per_tangent + sources.count(name)
-            for name, each in zip(self.system.mode_names, self.emitted.propagators, strict=True)
+            each.tangent_start + groups * each.tangent_columns for each in self.emitted.propagators
         )
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
@@ -105,6 +109,8 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
+            tangent_start=_indices(propagator.tangent_start for propagator in self.emitted.propagators),
+            tangent_columns=_indices(propagator.tangent_columns for propagator in self.emitted.propagators),
             period=0.0,
         )
 
@@ -166,7 +172,7 @@ def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
 
     types = {"flow_jacobian": MATRIX_ROLE, "reset_jacobian": MATRIX_ROLE, "series": SERIES_ROLE}
     return tuple(
-        cfunc(types.get(role, VECTOR_ROLE).signature, cache=cached, error_model="numpy")(namespace[role])
+        cfunc(types.get(role, VECTOR_ROLE).signature, cache=cached, **FUSED.get(role, IEEE))(namespace[role])
         for role in ROLES
     )
 

@@ -23,7 +23,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.printer import assignments
 from hybrid.series import ONE_THEN_ZERO, PAIRS, Constants, NoSeries, Recurrences, directional
-from hybrid.series_loops import indented, padded, padded_for_all, state_loop, tangent_loop
+from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
 from hybrid.symbolic import (
     Absolute,
     Less,
@@ -40,6 +40,8 @@ ROOT = sympy.Symbol("w", positive=True)
 ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 # Columns between those of the guards and the others: the time since the step's start, the integral of div f.
 CLOCK, DIVERGENCE, OTHERS = range(3)
+# Columns that whole vectors begin at.
+ALIGNED = 8
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
 
@@ -66,16 +68,18 @@ class Propagator:
         What tracing found.
     statements
         Body of the mode in the role ``series``.
-    columns, columns_per_tangent
-        Columns that the series need beside those of state, tangents and guards.
+    tangent_start
+        Columns before those of the tangent vectors.
+    tangent_columns
+        Columns that four tangent vectors need.
     """
 
     kind: int
     degree: int
     reason: str
     statements: tuple[str, ...] = ()
-    columns: int = 0
-    columns_per_tangent: int = 0
+    tangent_start: int = 0
+    tangent_columns: int = 0
 
     def __str__(self) -> str:
         return f"{PROPAGATORS[self.kind]} ({self.reason})"
@@ -108,7 +112,7 @@ def _series(
     if z is not None:
         written = _write_desingularised(field, guards, z, symbols)
         return Propagator(
-            DESINGULARISED, 0, "half-integer powers of a guard, on the clock dt = 2 w ds", *written
+            DESINGULARISED, 0, "half-integer powers of a guard, on the clock dt = w ds", *written
         )
     written = _write(field, guards, symbols)
     jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
@@ -211,33 +215,28 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 def _write(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
 ) -> tuple[tuple[str, ...], int, int]:
-    body = _Body(len(symbols.x), len(guards))
-    block = body.block({x: str(i) for i, x in enumerate(symbols.x)}, (symbols.t, ONE_THEN_ZERO))
+    body = _Body(symbols, guards)
+    block = body.block({}, (symbols.t, ONE_THEN_ZERO))
     seeds = _seeds(symbols)
     tangents = [directional(rate, seeds) for rate in field]
     trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
-    columns, starts = _state(symbols)
-    return body.assemble(block, columns, field, starts, guards, trace, tangents, seeds)
+    return body.assemble(block, symbols.x, *_state(symbols), field, guards, trace, tangents, seeds)
 
 
 def _write_desingularised(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols
 ) -> tuple[tuple[str, ...], int, int]:
-    """Series on the clock ``dt = 2 w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
+    """Series on the clock ``dt = w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
 
-    All fields are multiplied by ``2 w``, and ``dw/ds = dz/dt``. The root is never started at zero exactly:
+    All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
     with a speed of zero too it would stay there. What it is started at is below the rounding of ``z``.
     """
-    body = _Body(len(symbols.x), len(guards))
-    clock, root = body.column(CLOCK), body.column(OTHERS)
-    body.columns = OTHERS + 1
+    body = _Body(symbols, guards)
+    clock, root = body.column(CLOCK), body.allot()
     harmonics = _harmonics(field, symbols)
     field = [rate.xreplace(harmonics) for rate in field]
-    driven = [(symbol, body.allot()) for symbol in harmonics.values()]
-    block = body.block(
-        {**{x: str(i) for i, x in enumerate(symbols.x)}, ROOT: root, **dict(driven)},
-        (symbols.t, f"out[o, {clock}]"),
-    )
+    driven = {symbol: body.allot() for symbol in harmonics.values()}
+    block = body.block({ROOT: root, **driven}, (symbols.t, f"out[o, {clock}]"))
     seeds = _seeds(symbols)
     slope = z.diff(symbols.t) + sympy.Add(
         *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
@@ -250,14 +249,15 @@ def _write_desingularised(
     size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in symbols.x))
     columns, starts = _state(symbols)
     body.preamble += [*assignments(["z", "size"], [z, size]), f"root = sqrt(max(z, {FLOOR}*size, 1e-300))"]
-    turning = [2 * ROOT * function.diff(symbols.t).xreplace(harmonics) for function in harmonics]
+    turning = [ROOT * function.diff(symbols.t).xreplace(harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
     return body.assemble(
         block,
-        [*columns, clock, root, *(column for _, column in driven)],
-        [*rates, 2 * ROOT, _in_roots(slope, z), *turning],
+        [*symbols.x, None, ROOT, *driven],
+        [*columns, clock, root, *driven.values()],
         [*starts, "0.0", "root", *begun],
+        [*rates, ROOT, _in_roots(slope / 2, z), *turning],
         crossing,
         trace,
         tangents,
@@ -282,11 +282,11 @@ def _harmonics(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr
 
 
 def _on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
-    """``2 w`` times the rate, with powers of ``z`` as powers of ``w`` and none of them negative."""
+    """``w`` times the rate, with powers of ``z`` as powers of ``w`` and none of them negative."""
     terms = sympy.Add.make_args(_in_roots(rate, z))
     singular = [term for term in terms if term.has(1 / ROOT)]
     regular = sympy.Add(*(term for term in terms if term not in singular))
-    return sympy.Add(2 * ROOT * regular, *(2 * ROOT * term for term in singular))
+    return sympy.Add(ROOT * regular, *(ROOT * term for term in singular))
 
 
 def _in_roots(expression: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
@@ -305,63 +305,79 @@ def _state(symbols: Symbols) -> tuple[list[str], list[str]]:
 
 
 class _Body:
-    """The body of one mode: allots columns, and puts the loops one after the other."""
+    """The body of one mode: allots columns, and puts the loops one into the other."""
 
-    def __init__(self, n: int, guards: int) -> None:
-        self.n = n
-        self.columns = OTHERS
+    def __init__(self, symbols: Symbols, guards: Sequence[sympy.Expr]) -> None:
+        self.symbols = symbols
+        self.n = len(symbols.x)
+        self.behind_guards = self.n + len(guards)
+        self.columns = self.behind_guards + OTHERS
         self.constants = Constants()
-        self.preamble = [f"m = len(x) + {guards}"]
+        self.preamble: list[str] = []
 
     def column(self, place: int) -> str:
-        """Text of a column behind those of the guards."""
-        return f"m + {place}"
+        """A column behind those of the guards."""
+        return str(self.behind_guards + place)
 
     def allot(self) -> str:
         """A new column."""
         self.columns += 1
-        return self.column(self.columns - 1)
+        return str(self.columns - 1)
 
     def block(self, rows: dict[sympy.Symbol, str], time: tuple[sympy.Symbol, str]) -> Recurrences:
-        """The recurrences of the state."""
-        return Recurrences(rows, time, self.allot, "a", self.constants)
+        """The recurrences of the state, and of what is in other ``rows``."""
+        state = {x: str(i) for i, x in enumerate(self.symbols.x)}
+        return Recurrences({**state, **rows}, time, self.allot, "a", self.constants)
 
     def assemble(
         self,
         block: Recurrences,
+        names: Sequence[sympy.Symbol | None],
         columns: list[str],
-        rates: Sequence[sympy.Expr],
         starts: list[str],
+        rates: Sequence[sympy.Expr],
         guards: Sequence[sympy.Expr],
         trace: sympy.Expr,
         tangents: Sequence[sympy.Expr],
         seeds: dict[sympy.Symbol, sympy.Symbol],
     ) -> tuple[tuple[str, ...], int, int]:
-        """The statements and the numbers of columns: state and guards first, then what rests on them."""
-        n = self.n
-        rows = {seed: f"v + {i}" for i, seed in enumerate(seeds.values())}
-        vector = Recurrences(rows, None, self.allot, "b", self.constants, block)
-        block.expect(rates)
-        carried = tangent_loop(n, tangents, vector)
+        """The statements, where the columns of tangent vectors begin, and how many four of them need."""
+        vectors = Recurrences(
+            dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, block, lanes=True
+        )
         volume = Recurrences({}, None, self.allot, "d", self.constants, block)
-        spread = state_loop([self.column(DIVERGENCE)], [trace], ["0.0"], volume)
+        block.expect(rates)
+        moved = StateLoop(names, columns, rates, starts, block)
         for place, guard in enumerate(guards):
-            block.keep(guard, f"len(x) + {place}")
-        moved = state_loop(columns, rates, starts, block)
-        for i, rights in enumerate(block.blocks.values()):
-            self.preamble.append(f"{block.prefix}b{i} = {self.column(self.columns)}")
-            self.columns += padded(len(rights))
-        widths = [len(rights) for rights in vector.blocks.values()]
-        places = [f"first{i} = {self._place(widths[:i])}" for i in range(len(widths))]
+            block.keep(guard, str(self.n + place))
+        spread = StateLoop([None], [self.column(DIVERGENCE)], [trace], ["0.0"], volume)
+        carried = TangentLoop(list(seeds.values()), vectors)
+        carried.compute(tangents)
+        self._place_blocks(block)
+        self._place_blocks(volume)
+        carried.start = padded(self.columns, ALIGNED)
         lines = [
             *self.preamble,
+            f"groups = (len(x)//{self.n} + {NARROW - 2})//{NARROW}",
             *self.constants.statements(),
-            *moved,
-            f"if len(x) > {n}:",
-            *indented([*spread, f"n = {n}", f"count = len(x)//{n} - 1", *places, *carried]),
+            "o = 0",
+            *moved.first(),
+            *spread.first(),
+            *carried.first(),
+            "for o in range(1, order + 1):",
+            *indented(
+                [
+                    "shrink = 1.0/o",
+                    *moved.higher(),
+                    "if groups > 0:",
+                    *indented([*spread.higher(), *carried.higher()]),
+                ]
+            ),
         ]
-        return tuple(lines), self.columns + len(widths) * (NARROW - 1), sum(widths)
+        return tuple(lines), carried.start, carried.columns
 
-    def _place(self, widths: Sequence[int]) -> str:
-        """Text of the column behind blocks of some widths for each tangent vector."""
-        return " + ".join([self.column(self.columns), *map(padded_for_all, widths)])
+    def _place_blocks(self, block: Recurrences) -> None:
+        for i, rights in enumerate(block.blocks.values()):
+            self.columns = padded(self.columns, ALIGNED)
+            self.preamble.append(f"{block.prefix}b{i} = {self.columns}")
+            self.columns += padded(len(rights))

@@ -85,7 +85,7 @@ def dense_degree(method: Any) -> int:
 
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
-    """Scratch memory for one run; ``columns`` are those of series besides state and tangent vectors."""
+    """Scratch memory for one run; ``columns`` are those of series."""
     from hybrid.kernels.layout import Work
 
     n, length = dimension, dimension * (1 + tangents)
@@ -94,7 +94,8 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
     systems[-1:] = -1.0
     nodes, fit = _fit_of_guards()
-    width_of_series = length + columns + codes.NARROW - 1
+    # Whole vectors of columns are evaluated: there may be a few more than are in use.
+    width_of_series = -(-columns // (2 * codes.NARROW)) * 2 * codes.NARROW
     width = max(dense_degree(method), FIT_DEGREE) + 4
     return Work(
         stages=np.zeros((stages, length + 1)),
@@ -120,9 +121,8 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
         fit=fit,
         systems=systems,
         pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
-        # Whole vectors of columns are evaluated: a few more than there are.
-        series=np.zeros((codes.HIGHEST_ORDER + 2, width_of_series) if method.order else (0, 0)),
-        weights=np.zeros(width_of_series),
+        series=np.zeros((codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0)),
+        weights=np.zeros((1, width_of_series)),
     )
 
 

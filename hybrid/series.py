@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
+from hybrid.kernels.codes import NARROW
 from hybrid.printer import MATH_FUNCTIONS, assignments
 from hybrid.symbolic import ZERO
 
@@ -42,10 +43,13 @@ class Recurrences:
 
     The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
-    ``o``. Convolutions are taken in two parts: the terms at their ends hold what this order brings, all those
-    between hold lower orders only and are summed before anything else. Those that share a factor are summed
-    together: ``blocks`` lists, by the column of that factor, what it is multiplied by, side by side in
-    columns of their own.
+    ``o``. Convolutions are taken in parts: the terms at their ends hold what this order and the one before
+    bring, all those between hold lower orders only and can be summed early. Those that share a factor are
+    summed together: ``blocks`` lists, by the column of that factor, what it is multiplied by, side by side
+    in columns of their own. In every sum what is known last is added last: nothing waits for it twice.
+
+    With ``lanes`` a coefficient is that of four tangent vectors at once, in four columns. These have been
+    written as one and are read as one, which is quick even for the order before.
 
     Parameters
     ----------
@@ -60,6 +64,8 @@ class Recurrences:
         Begins the names of local variables.
     known
         Recurrences that run before these and hold the series of all that is free of the symbols in ``rows``.
+    lanes
+        Whether the symbols in ``rows`` stand for four numbers each.
     """
 
     def __init__(
@@ -70,8 +76,10 @@ class Recurrences:
         prefix: str,
         constants: Constants,
         known: Recurrences | None = None,
+        lanes: bool = False,
     ) -> None:
         self.rows: dict[sympy.Expr, str] = dict(rows)
+        self.lanes = lanes
         self.time = time
         self.allot = allot
         self.prefix = prefix
@@ -79,6 +87,7 @@ class Recurrences:
         self.known = known
         self.first: list[str] = []
         self.higher: list[str] = []
+        self.after: dict[str, str] = {}
         self.blocks: dict[str, list[sympy.Expr]] = {}
         self.variables: dict[sympy.Expr, str] = {}
         self.slopes: dict[sympy.Expr, str] = {}
@@ -99,9 +108,9 @@ class Recurrences:
         if expression in self.variables:
             return self.variables[expression]
         if expression in self.rows:
-            return f"out[o, {self.rows[expression]}]"
-        if self.known is not None and not expression.free_symbols & self.own:
-            return f"out[o, {self.known.row(expression)}]"
+            return self.at("o", self.rows[expression])
+        if self._is_known(expression):
+            return self._known_coefficient(expression)
         if self._is_constant(expression):
             return self._bind(expression, self.constants.name(expression), "0.0")
         return self._operation(expression)
@@ -110,17 +119,34 @@ class Recurrences:
         """Text of the column that holds the series of the expression."""
         if expression in self.rows:
             return self.rows[expression]
-        if self.known is not None and not expression.free_symbols & self.own:
+        if self._is_known(expression):
+            assert self.known is not None
             return self.known.row(expression)
         text = self.coefficient(expression)
         if expression not in self.rows:
             self.rows[expression] = self.allot()
-            self._both(f"out[o, {self.rows[expression]}] = {text}")
+            self._both(self.put("o", self.rows[expression], text))
         return self.rows[expression]
+
+    def at(self, order: str, column: str) -> str:
+        """Text of an entry of a column of these recurrences."""
+        return f"load(out, {order}, {column})" if self.lanes else f"out[{order}, {column}]"
+
+    def put(self, order: str, column: str, value: str) -> str:
+        """Statement that writes there."""
+        return f"store(out, {order}, {column}, {value})" if self.lanes else f"out[{order}, {column}] = {value}"
 
     def keep(self, expression: sympy.Expr, column: str) -> None:
         """Write the series of the expression into a given column."""
-        self._both(f"out[o, {column}] = {self.coefficient(expression)}")
+        self._both(self.put("o", column, self.coefficient(expression)))
+
+    def _is_known(self, expression: sympy.Expr) -> bool:
+        return self.known is not None and not expression.free_symbols & self.own
+
+    def _known_coefficient(self, expression: sympy.Expr) -> str:
+        assert self.known is not None
+        row = self.known.row(expression)
+        return self.known.variables.get(expression, f"out[o, {row}]")
 
     def _is_constant(self, expression: sympy.Expr) -> bool:
         return not expression.free_symbols & self.own and (
@@ -149,21 +175,30 @@ class Recurrences:
 
     def _store(self, *expressions: sympy.Expr) -> None:
         for expression in expressions:
-            self._both(f"out[o, {self.rows[expression]}] = {self.variables[expression]}")
+            self._both(self.put("o", self.rows[expression], self.variables[expression]))
 
     def _place(self, left: str, right: sympy.Expr) -> tuple[str, str]:
-        """The inner sum of a convolution with the column ``left``, and the column for its other factor."""
+        """A convolution with the column ``left`` but for its ends, and the column for its other factor."""
         rights = self.blocks.setdefault(left, [])
         if right not in rights:
             rights.append(right)
         block, place = list(self.blocks).index(left), rights.index(right)
-        return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {place}"
+        inner = f"{self.prefix}s{block}_{place}"
+        if self.lanes:
+            return inner, f"{self.prefix}b{block} + {NARROW*place}"
+        column = f"{self.prefix}b{block} + {place}"
+        # The last coefficients but one of both factors. For the first order there are none, for the second
+        # both terms would be the same.
+        before, left_before = f"{self.prefix}p{block}_{place}", f"{self.prefix}q{block}"
+        self.after[before] = f"out[o, {column}]"
+        self.after[left_before] = f"out[o, {left}] if o > 1 else 0.0"
+        return f"({inner} + out[1, {left}]*{before} + {left_before}*out[1, {column}])", column
 
     def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
         """``_place``, and the coefficient of the other factor, which is written there."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
-        self._both(f"out[o, {column}] = {value}")
+        self._both(self.put("o", column, value))
         return inner, column, value
 
     def _slope(self, u: sympy.Expr) -> str:
@@ -236,11 +271,13 @@ class Recurrences:
 
     def _convolution(self, expression: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> str:
         left = self.row(a)
+        factor = self._known_coefficient(a) if self._is_known(a) else self.coefficient(a)
         inner, right, value = self._beside(left, b)
+        first = self.at("0", right)
         return self._bind(
             expression,
-            f"out[0, {left}]*out[0, {right}]",
-            f"{inner} + out[0, {left}]*{value} + out[o, {left}]*out[0, {right}]",
+            f"out[0, {left}]*{first}",
+            f"{inner} + {factor}*{first} + out[0, {left}]*{value}",
         )
 
     def _quotient(self, expression: sympy.Expr, above: sympy.Expr | None, below: sympy.Expr) -> str:
@@ -248,10 +285,11 @@ class Recurrences:
         divisor = self.row(below)
         inner, column = self._place(divisor, expression)
         name, column = self._kept(expression, column)
+        self.first.append(f"{name}d = 1.0/out[0, {divisor}]")
         self._bind(
             expression,
             f"{text or '1.0'}/out[0, {divisor}]",
-            f"({text or '0.0'} - {inner} - out[o, {divisor}]*out[0, {column}])/out[0, {divisor}]",
+            f"({text or '0.0'} - {inner} - out[o, {divisor}]*out[0, {column}])*{name}d",
         )
         self._store(expression)
         return name
@@ -271,10 +309,11 @@ class Recurrences:
         inner, column = self._place(u, expression)
         moving, copy = self._place(slope, expression)
         name, column = self._kept(expression, column)
+        self.first.append(f"{name}d = 1.0/out[0, {u}]")
         self._bind(
             expression,
             _power_text(f"out[0, {u}]", exponent, k),
-            f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})/(o*out[0, {u}])",
+            f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})*shrink*{name}d",
         )
         self._store(expression)
         self._both(f"out[o, {copy}] = {name}")
@@ -293,12 +332,12 @@ class Recurrences:
         argument = self.coefficient(u)
         if rate:
             name, column = self._kept(expression)
-            value = f"{rate}*out[o - 1, {column}]/o"
+            value = f"shrink*{rate}*out[o - 1, {column}]"
         else:
             slope = self._slope(u)
             inner, column = self._place(slope, expression)
             name, column = self._kept(expression, column)
-            value = f"({inner} + out[o, {slope}]*out[0, {column}])/o"
+            value = f"({inner} + out[o, {slope}]*out[0, {column}])*shrink"
         self._bind(expression, f"exp({argument})", value)
         self._store(expression)
         return name
@@ -311,14 +350,14 @@ class Recurrences:
         argument = self.coefficient(u)
         if rate:
             (s_name, s_column), (c_name, c_column) = self._kept(s), self._kept(c)
-            values = [f"{rate}*out[o - 1, {c_column}]/o", f"{sign}{rate}*out[o - 1, {s_column}]/o"]
+            values = [f"shrink*{rate}*out[o - 1, {c_column}]", f"{sign}shrink*{rate}*out[o - 1, {s_column}]"]
         else:
             slope = self._slope(u)
             (s_sum, s_column), (c_sum, c_column) = (self._place(slope, each) for each in (s, c))
             (s_name, _), (c_name, _) = self._kept(s, s_column), self._kept(c, c_column)
             values = [
-                f"({c_sum} + out[o, {slope}]*out[0, {c_column}])/o",
-                f"{sign}({s_sum} + out[o, {slope}]*out[0, {s_column}])/o",
+                f"({c_sum} + out[o, {slope}]*out[0, {c_column}])*shrink",
+                f"{sign}({s_sum} + out[o, {slope}]*out[0, {s_column}])*shrink",
             ]
         self.first += [f"{s_name} = {odd.__name__}({argument})", f"{c_name} = {even.__name__}({argument})"]
         self.higher += [f"{s_name} = {values[0]}", f"{c_name} = {values[1]}"]
@@ -334,16 +373,13 @@ class Recurrences:
         name, row = self._kept(expression)
         slope_name, _ = self._kept(slope, slope_column)
         inner, copy = self._place(row, expression)
-        self.first += [
-            f"{name} = {expression.func.__name__}({argument})",
-            f"{slope_name} = 1.0 {sign} {name}*{name}",
-        ]
-        self.higher += [
-            f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])/o",
-            f"{slope_name} = {sign}({inner} + 2.0*out[0, {row}]*{name})",
-        ]
-        self._store(expression, slope)
+        self.first.append(f"{name} = {expression.func.__name__}({argument})")
+        self.higher.append(f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])*shrink")
+        self._store(expression)
         self._both(f"out[o, {copy}] = {name}")
+        self.first.append(f"{slope_name} = 1.0 {sign} {name}*{name}")
+        self.higher.append(f"{slope_name} = {sign}({inner} + 2.0*out[0, {row}]*{name})")
+        self._store(slope)
         return name
 
     def _by_derivative(self, expression: sympy.Expr) -> str:
@@ -353,7 +389,7 @@ class Recurrences:
         return self._bind(
             expression,
             f"{MATH_FUNCTIONS[expression.func]}({argument})",
-            f"({inner} + out[o, {rate}]*out[0, {slope}])/o",
+            f"({inner} + out[o, {rate}]*out[0, {slope}])*shrink",
         )
 
 

@@ -8,166 +8,240 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic, overload, register_jitable
 
 from hybrid.kernels.codes import NARROW
+from hybrid.kernels.lanes import FUSED, HERE, built_in, everywhere, read, vector_of, write
 
-# Columns taken in one turn.
+# Columns in the widest register.
 WIDE = 2 * NARROW
-FUSED = ("contract",)
-# Small and called at every order: the call would cost as much as the work.
-HERE = {"_nrt": False, "forceinline": True}
+# Sums that grow side by side: each term waits for the one before it in the same sum.
+SUMS_AT_ONCE = 4
 
 
-def convolve(series, order, left, first, width):
-    """Sums of ``series[j, left] * series[order - j, c]`` over ``0 < j < order``, into ``series[order, c]``.
+def convolve(series, order, inset, left, first, width):
+    """Sums of ``series[j, left] * series[order - j, c]`` over ``inset <= j <= order - inset``.
 
-    The columns ``c`` are ``width``, a multiple of 4, from ``first`` on; each is as good as a loop of its own.
-    The two terms at the ends of a convolution are those that hold the coefficients of this order.
+    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4 known to the compiler,
+    from ``first`` on. The terms left out at both ends are those with the coefficients of the highest orders.
     """
     sums = np.zeros(width)
-    for j in range(1, order):
+    for j in range(inset, order - inset + 1):
         sums += series[j, left] * series[order - j, first : first + width]
     series[order, first : first + width] = sums
 
 
-def evaluate(series, order, s, width, sizes):
-    """Values at ``s`` of the first ``width`` series, a multiple of 4, into ``series[order + 1]``.
-
-    With ``sizes`` it is the sums of the magnitudes of their terms, for ``s`` that is not negative.
-    """
-    terms = abs(series) if sizes else series
-    total = terms[order, :width].copy()
+def evaluate(series, order, s, first, width):
+    """Values at ``s`` of ``width`` series, a multiple of 4, from ``first`` on, into ``series[order + 1]``."""
+    total = series[order, first : first + width].copy()
     for o in range(order - 1, -1, -1):
-        total = total * s + terms[o, :width]
-    series[order + 1, :width] = total
+        total = total * s + series[o, first : first + width]
+    series[order + 1, first : first + width] = total
+
+
+def evaluate_with_sizes(series, order, s, first, width):
+    """As ``evaluate``, and the sums of the magnitudes of all terms into ``series[order + 2]``; ``s >= 0``."""
+    evaluate(series, order, s, first, width)
+    total = abs(series[order, first : first + width])
+    for o in range(order - 1, -1, -1):
+        total = total * s + abs(series[o, first : first + width])
+    series[order + 2, first : first + width] = total
+
+
+def largest_product(weights, series, order, first, width):
+    """Largest ``abs(weights[0, c] * series[order, c])`` of the columns ``c``, a multiple of 4; nan is left out."""
+    return np.nanmax(abs(weights[0, first : first + width] * series[order, first : first + width]))
+
+
+@overload(largest_product, jit_options=HERE)
+def _largest_product(weights, series, order, first, width):
+    return lambda weights, series, order, first, width: _largest_in_registers(
+        weights, series, order, first, width
+    )
+
+
+@register_jitable
+def spread_tangents(y, n, series, first, stride):
+    """Tangent vectors from ``y (n (1 + k),)`` into order zero of their series: four at a time, by component.
+
+    Those of four vectors begin at ``first``, those of the next four ``stride`` columns further.
+    """
+    count = len(y) // n - 1
+    for vector in range((count + NARROW - 1) // NARROW * NARROW):
+        column = first + vector // NARROW * stride + vector % NARROW
+        for i in range(n):
+            series[0, column + NARROW * i] = y[n * (1 + vector) + i] if vector < count else 0.0
+
+
+@register_jitable
+def gather_tangents(series, order, n, first, stride, y):
+    """The inverse of ``spread_tangents`` from row ``order``."""
+    for vector in range(len(y) // n - 1):
+        column = first + vector // NARROW * stride + vector % NARROW
+        for i in range(n):
+            y[n * (1 + vector) + i] = series[order, column + NARROW * i]
 
 
 @overload(convolve, jit_options=HERE)
-def _convolve(series, order, left, first, width):
-    return lambda series, order, left, first, width: _convolve_in_registers(series, order, left, first, width)
+def _convolve(series, order, inset, left, first, width):
+    return lambda series, order, inset, left, first, width: _convolve_in_registers(
+        series, order, inset, left, first, width
+    )
 
 
 @overload(evaluate, jit_options=HERE)
-def _evaluate(series, order, s, width, sizes):
-    return lambda series, order, s, width, sizes: _evaluate_in_registers(series, order, s, width, sizes)
+def _evaluate(series, order, s, first, width):
+    return lambda series, order, s, first, width: _evaluate_in_registers(
+        series, order, s, first, width, False
+    )
 
 
-class _Vectors:
-    """Writes instructions for vectors of one number of columns of a matrix."""
+@overload(evaluate_with_sizes, jit_options=HERE)
+def _evaluate_with_sizes(series, order, s, first, width):
+    return lambda series, order, s, first, width: _evaluate_in_registers(series, order, s, first, width, True)
 
-    def __init__(self, context, builder, matrix_type, matrix, lanes):
+
+class _Matrix:
+    """Writes the instructions that walk through the rows of a matrix."""
+
+    def __init__(self, context, builder, matrix_type, matrix):
         array = context.make_array(matrix_type)(context, builder, matrix)
-        self.data = array.data
         self.builder = builder
+        self.data = array.data
         self.columns = cgutils.unpack_tuple(builder, array.shape)[1]
-        self.kind = ir.VectorType(ir.DoubleType(), lanes)
-        self.zero = self.kind([0.0] * lanes)
-        self.lanes = lanes
 
-    def row(self, order):
-        """Index of the first entry of a row."""
-        return self.builder.mul(order, self.columns)
+    def address(self, row, column):
+        """Address of an entry."""
+        builder = self.builder
+        return builder.gep(self.data, [builder.add(builder.mul(row, self.columns), column)])
 
-    def number(self, index):
-        """The entry of that index."""
-        return self.builder.load(self.builder.gep(self.data, [index]))
+    def walker(self, row, column):
+        """A variable that holds the address of an entry."""
+        return cgutils.alloca_once_value(self.builder, self.address(row, column))
 
-    def everywhere(self, number):
-        """One number in every lane."""
-        lanes = ir.VectorType(ir.IntType(32), self.lanes)
-        vector = self.builder.insert_element(self.zero, number, ir.IntType(32)(0))
-        return self.builder.shuffle_vector(vector, self.zero, lanes([0] * self.lanes))
-
-    def _place(self, index):
-        return self.builder.bitcast(self.builder.gep(self.data, [index]), self.kind.as_pointer())
-
-    def load(self, index):
-        """The vector that begins at an index."""
-        return self.builder.load(self._place(index), align=8)
-
-    def store(self, vector, index):
-        """Write a vector to where it begins."""
-        self.builder.store(vector, self._place(index), align=8)
-
-    def multiply_add(self, a, b, c):
-        """``a * b + c``."""
-        return self.builder.fadd(c, self.builder.fmul(a, b, flags=FUSED), flags=FUSED)
-
-    def magnitude(self, vector):
-        """Absolute values."""
-        kind = ir.FunctionType(self.kind, [self.kind])
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.fabs.v{self.lanes}f64")
-        return self.builder.call(function, [vector])
+    def walk(self, walker, rows):
+        """Move on by a number of rows."""
+        builder = self.builder
+        here = builder.load(walker)
+        builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
+        return here
 
 
-def _in_turns(context, builder, matrix_type, matrix, first, width, write):
-    """Call ``write(vectors, column)`` for whole turns of columns, and once more for what is left."""
-    number = context.get_value_type(types.intp)
-    wide, narrow = (_Vectors(context, builder, matrix_type, matrix, lanes) for lanes in (WIDE, NARROW))
-    left_over = builder.and_(width, number(WIDE - NARROW))
-    middle = builder.sub(builder.add(first, width), left_over)
-    with cgutils.for_range_slice(builder, first, middle, number(WIDE), number) as (column, _):
-        write(wide, column)
-    with builder.if_then(builder.icmp_signed(">", left_over, number(0))):
-        write(narrow, middle)
-    return context.get_dummy_value()
+def _add_product(builder, total, a, b):
+    product = builder.fmul(a, b, flags=FUSED)
+    builder.store(builder.fadd(builder.load(total), product, flags=FUSED), total)
+
+
+def _registers(width):
+    """How many columns each register takes, the widest first."""
+    return [WIDE] * (width // WIDE) + [NARROW] * (width % WIDE // NARROW)
+
+
+@intrinsic(prefer_literal=True)
+def _convolve_in_registers(typing_context, series, order, inset, left, first, width):
+    if not isinstance(width, types.IntegerLiteral):
+        return None
+    widths = _registers(width.literal_value)
+    sums_at_once = max(1, SUMS_AT_ONCE // len(widths))
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, inset, left, first, _ = arguments
+        rows = _Matrix(context, builder, signature.args[0], matrix)
+        number = order.type
+        # The lowest orders of the columns come first: what was written last is the slowest to read.
+        factor = rows.walker(builder.sub(order, inset), left)
+        other = rows.walker(inset, first)
+        totals = [
+            [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for each in widths]
+            for _ in range(sums_at_once)
+        ]
+
+        def add_term(row_of_totals):
+            a = builder.load(rows.walk(factor, -1))
+            b = rows.walk(other, 1)
+            for place, (each, total) in enumerate(zip(widths, row_of_totals, strict=True)):
+                there = builder.gep(b, [number(sum(widths[:place]))])
+                _add_product(builder, total, everywhere(builder, a, each), read(builder, there, each))
+
+        terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
+        terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
+        with cgutils.for_range(builder, builder.udiv(terms, number(sums_at_once)), intp=number):
+            for each in totals:
+                add_term(each)
+        if sums_at_once > 1:
+            with cgutils.for_range(builder, builder.urem(terms, number(sums_at_once)), intp=number):
+                add_term(totals[0])
+        target = rows.address(order, first)
+        for place in range(len(widths)):
+            parts = [builder.load(each[place]) for each in totals]
+            while len(parts) > 1:
+                parts = [builder.fadd(*parts[i : i + 2]) for i in range(0, len(parts), 2)]
+            write(builder, parts[0], builder.gep(target, [number(sum(widths[:place]))]))
+        return context.get_dummy_value()
+
+    return types.void(series, *(types.intp,) * 5), generate
+
+
+@intrinsic(prefer_literal=True)
+def _evaluate_in_registers(typing_context, series, order, s, first, width, sizes):
+    with_sizes = sizes.literal_value
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, s, first, width, _ = arguments
+        rows = _Matrix(context, builder, signature.args[0], matrix)
+        number = order.type
+
+        def column_of_values(column, lanes):
+            walker = rows.walker(order, column)
+            factor = everywhere(builder, s, lanes)
+            top = read(builder, rows.walk(walker, -1), lanes)
+            value = cgutils.alloca_once_value(builder, top)
+            size = cgutils.alloca_once_value(builder, built_in(builder, "fabs", lanes, top))
+            with cgutils.for_range(builder, order, intp=number):
+                term = read(builder, rows.walk(walker, -1), lanes)
+                sums = [(value, term)]
+                if with_sizes:
+                    sums.append((size, built_in(builder, "fabs", lanes, term)))
+                for total, next_term in sums:
+                    product = builder.fmul(builder.load(total), factor, flags=FUSED)
+                    builder.store(builder.fadd(product, next_term, flags=FUSED), total)
+            for total, below in ((value, 1), (size, 2))[: 2 if with_sizes else 1]:
+                write(
+                    builder, builder.load(total), rows.address(builder.add(order, number(below)), column)
+                )
+
+        narrow = builder.and_(width, number(WIDE - NARROW))
+        middle = builder.sub(builder.add(first, width), narrow)
+        with cgutils.for_range_slice(builder, first, middle, number(WIDE), number) as (column, _):
+            column_of_values(column, WIDE)
+        with builder.if_then(builder.icmp_signed(">", narrow, number(0))):
+            column_of_values(middle, NARROW)
+        return context.get_dummy_value()
+
+    return types.void(series, types.intp, types.float64, types.intp, types.intp, types.boolean), generate
 
 
 @intrinsic
-def _convolve_in_registers(typing_context, series, order, left, first, width):
+def _largest_in_registers(typing_context, weights, series, order, first, width):
     def generate(context, builder, signature, arguments):
-        matrix, order, left, first, width = arguments
-        one = order.type(1)
+        weights, matrix, order, first, width = arguments
+        number = order.type
+        factors = _Matrix(context, builder, signature.args[0], weights)
+        rows = _Matrix(context, builder, signature.args[1], matrix)
+        zero = vector_of(NARROW)([0.0] * NARROW)
+        largest = cgutils.alloca_once_value(builder, zero)
+        end = builder.add(first, width)
+        with cgutils.for_range_slice(builder, first, end, number(NARROW), number) as (column, _):
+            factor = read(builder, factors.address(number(0), column), NARROW)
+            term = built_in(builder, "fabs", NARROW, read(builder, rows.address(order, column), NARROW))
+            product, before = builder.fmul(factor, term), builder.load(largest)
+            larger = builder.fcmp_ordered(">", product, before)
+            builder.store(builder.select(larger, product, before), largest)
+        lanes = builder.load(largest)
+        parts = [builder.extract_element(lanes, ir.IntType(32)(i)) for i in range(NARROW)]
+        while len(parts) > 1:
+            a, b = parts[:2]
+            parts = [*parts[2:], builder.select(builder.fcmp_ordered(">", a, b), a, b)]
+        return parts[0]
 
-        def write(vectors, column):
-            # Two terms in a turn, each with a sum of its own: a sum waits for the one before it. The lowest
-            # orders of the columns come first: what was written last is the slowest to read.
-            even, odd = (cgutils.alloca_once_value(builder, vectors.zero) for _ in range(2))
-            terms = builder.sub(order, one)
-            factor = cgutils.alloca_once_value(builder, builder.add(vectors.row(terms), left))
-            other = cgutils.alloca_once_value(builder, builder.add(vectors.row(one), column))
-
-            def add_term(total):
-                a = vectors.everywhere(vectors.number(builder.load(factor)))
-                b = vectors.load(builder.load(other))
-                builder.store(vectors.multiply_add(a, b, builder.load(total)), total)
-                builder.store(builder.sub(builder.load(factor), vectors.columns), factor)
-                builder.store(builder.add(builder.load(other), vectors.columns), other)
-
-            with cgutils.for_range(builder, builder.ashr(terms, one), intp=order.type):
-                add_term(even)
-                add_term(odd)
-            with builder.if_then(builder.icmp_signed("==", builder.and_(terms, one), one)):
-                add_term(even)
-            total = builder.fadd(builder.load(even), builder.load(odd))
-            vectors.store(total, builder.add(vectors.row(order), column))
-
-        return _in_turns(context, builder, signature.args[0], matrix, first, width, write)
-
-    return types.void(series, *(types.intp,) * 4), generate
-
-
-@intrinsic
-def _evaluate_in_registers(typing_context, series, order, s, width, sizes):
-    def generate(context, builder, signature, arguments):
-        matrix, order, s, width, sizes = arguments
-        one = order.type(1)
-
-        def write(vectors, column):
-            place = cgutils.alloca_once_value(builder, builder.add(vectors.row(order), column))
-            factor = vectors.everywhere(s)
-
-            def term():
-                vector = vectors.load(builder.load(place))
-                return builder.select(sizes, vectors.magnitude(vector), vector)
-
-            total = cgutils.alloca_once_value(builder, term())
-            with cgutils.for_range(builder, order, intp=order.type):
-                builder.store(builder.sub(builder.load(place), vectors.columns), place)
-                builder.store(vectors.multiply_add(builder.load(total), factor, term()), total)
-            vectors.store(builder.load(total), builder.add(vectors.row(builder.add(order, one)), column))
-
-        return _in_turns(context, builder, signature.args[0], matrix, order.type(0), width, write)
-
-    return types.void(series, types.intp, types.float64, types.intp, types.boolean), generate
+    return types.float64(weights, series, *(types.intp,) * 3), generate

@@ -30,7 +30,8 @@ class Model(Structure):
     run. ``boundary`` is 1 for a transition that a state on the far side of its guard
     must take at once, 0 for one that only crossings fire; ``accumulates_to`` the mode after a complete
     chatter, or -1. ``propagator`` says how each mode is advanced; ``degree`` is that of its solutions in time
-    where they are polynomials, else 0. ``period`` is 0 without a forcing period.
+    where they are polynomials, else 0. ``tangent_start`` and ``tangent_columns`` say where in its series the
+    tangent vectors are, four at a time. ``period`` is 0 without a forcing period.
     """
 
     flow: VECTOR_ROLE
@@ -53,6 +54,8 @@ class Model(Structure):
     accumulates_to: INDICES
     propagator: INDICES
     degree: INDICES
+    tangent_start: INDICES
+    tangent_columns: INDICES
     period: float64
 
 
@@ -135,8 +138,8 @@ class Work(Structure):
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
     the polynomial of the last step: its stages, its start, its end, its length and its mode, -1 for none.
 
-    For Taylor series, else empty: ``series (order + 2, columns)``, the last row scratch,
-    and ``weights (columns,)`` of its columns in the control of the step.
+    For Taylor series, else empty: ``series (order + 3, columns)``, the last two rows scratch,
+    and ``weights (1, columns)`` of its columns in the control of the step.
     """
 
     stages: MATRIX
@@ -163,7 +166,7 @@ class Work(Structure):
     systems: MATRIX
     pivots: INDICES
     series: MATRIX
-    weights: VECTOR
+    weights: MATRIX
 
 
 WORK = Work.numba_type

@@ -1,8 +1,9 @@
 """One step by the Taylor series of the solution, whose guards are isolated on the series themselves.
 
-A series ``(order + 1, columns)`` holds normalised Taylor coefficients: the state and the tangent vectors in
-the columns of ``y``, then the guards of the mode, the time since the start of the step, the integral of div
-f, and what the recurrences need. Its variable is time, or the clock of a desingularised mode.
+A series ``(order + 1, columns)`` holds normalised Taylor coefficients: the state, then the guards of the mode,
+the time since the start of the step, the integral of div f, what the recurrences need, and the tangent
+vectors, four at a time. Its variable is time, or the clock of a desingularised mode. Two rows below it take
+the values at the end of the step, and what these are sums of.
 """
 
 import math
@@ -27,9 +28,11 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
 )
-from hybrid.kernels.columns import evaluate
+from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents, largest_product
 from hybrid.kernels.guards import guard_speed, guard_value
+from hybrid.kernels.lanes import load, magnitude, square_root, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.powers import binary_logarithm, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.series_guards import (
     earliest_on_series,
@@ -46,8 +49,11 @@ EXACT_TOLERANCE = 1e-17
 # Share of the largest component that is an absolute tolerance for the others.
 SHARE = 1e-3
 SAFETY = 0.9
+# What stands for an absolute tolerance where there is none.
+TINY = 1e-300
 # Terms at the end of a series that have to be small.
 TAIL = 8
+TAIL_OF_EXACT = 3
 # Share of a step by which a landing may still be corrected.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
@@ -55,62 +61,68 @@ LONG = 100.0
 
 
 @njit(**INLINE)
-def whole_vectors(width):
-    """The least number of columns, no less than ``width``, that ``evaluate`` takes."""
-    return (width + NARROW - 1) // NARROW * NARROW
+def weigh_state(series, n, rtol, atol, exact, weights):
+    """One over the tolerance of every component of the state, into ``weights``."""
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(series[0, i]))
+    if largest == 0.0:
+        # From rest at the origin, the first terms tell the size.
+        for i in range(n):
+            largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
+    floor = SHARE * rtol * largest + TINY if exact else atol + TINY
+    for i in range(n):
+        weights[0, i] = 1.0 / (floor + rtol * abs(series[0, i]))
 
 
 @njit(**INLINE)
-def weigh_state(series, n, length, rtol, atol, exact, weights):
-    """One over the tolerance of every component, into ``weights (length,)``.
-
-    The tolerances are those of the Runge-Kutta methods: each tangent vector is a block by itself.
-    """
-    for start in range(0, length, n):
-        square, largest = 0.0, 0.0
-        for i in range(start, start + n):
-            square += series[0, i] * series[0, i]
-            largest = max(largest, abs(series[0, i]))
-        if largest == 0.0:
-            # From rest at the origin, the first terms tell the size.
-            for i in range(start, start + n):
-                largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
-        if exact:
-            floor = SHARE * rtol * largest + 1e-300
-        elif start > 0:
-            floor = rtol * math.sqrt(square / n) + 1e-300
-        else:
-            floor = atol
-        for i in range(start, start + n):
-            weights[i] = 1.0 / (floor + rtol * abs(series[0, i]))
+def weigh_tangents(series, n, first, rtol, exact, weights):
+    """One over the tolerance of every component of four tangent vectors, each measured against itself."""
+    square = 0.0 * load(weights, 0, first)
+    for i in range(n):
+        component = load(series, 0, first + NARROW * i)
+        square = component * component + square
+    floor = (SHARE * rtol if exact else rtol) * square_root(square / n) + TINY
+    for i in range(n):
+        component = load(series, 0, first + NARROW * i)
+        store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
 
 
 @njit(**KERNEL)
-def longest_step(series, n, length, order, rtol, atol, exact, weights):
+def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights):
     """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
 
-    The last term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth
-    may be there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The
-    term that decides is told by the exponents of floating point alone. ``weights (length,)`` is scratch. Nan
-    if a coefficient is.
+    The tolerances are those of the Runge-Kutta methods: each tangent vector is a block by itself. The last
+    term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth may be
+    there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
+    exact modes fall faster than any power, and three of their terms are enough. ``weights (1, columns)`` is
+    scratch. Nan if a coefficient is.
     """
-    weigh_state(series, n, length, rtol, atol, exact, weights)
-    shortest, largest, decisive = math.inf, 1e-300, order
-    for o in range(order, order - TAIL, -1):
-        terms, worst, total = series[o], 1e-300, 0.0
-        for i in range(length):
-            worst = max(worst, weights[i] * abs(terms[i]))
-            total += terms[i]
-        if not abs(total) < math.inf:
-            return math.nan
-        length_of_this = -math.frexp(rtol * worst)[1] / o
-        if length_of_this < shortest:
-            shortest, largest, decisive = length_of_this, worst, o
-    return SAFETY * math.exp(math.log(rtol) / order - math.log(rtol * largest) / decisive)
+    weigh_state(series, n, rtol, atol, exact, weights)
+    for g in range(groups):
+        weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
+    total = 0.0
+    for i in range(n):
+        total += series[order, i]
+    for g in range(groups):
+        for i in range(NARROW * n):
+            total += series[order, first + g * stride + i]
+    if not abs(total) < math.inf:
+        return math.nan
+    scale = binary_logarithm(rtol)
+    decisive = -math.inf
+    for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
+        worst = 0.0
+        for i in range(n):
+            worst = max(worst, weights[0, i] * abs(series[o, i]))
+        for g in range(groups):
+            worst = max(worst, largest_product(weights, series, o, first + g * stride, NARROW * n))
+        decisive = max(decisive, (scale + binary_logarithm(worst)) / o)
+    return SAFETY * power_of_two(scale / order - decisive)
 
 
 @njit(**KERNEL)
-def within_guards(model, mode, series, length, order, rtol, h):
+def within_guards(model, mode, series, n, order, rtol, h):
     """Shorten a step to where the series of guards that are not affine reach, if less far than the state's.
 
     Their last terms are measured against what the guard changes over the step itself, so a shorter step may
@@ -118,7 +130,7 @@ def within_guards(model, mode, series, length, order, rtol, h):
     """
     start = model.first_outgoing[mode]
     for slot in range(start, model.first_outgoing[mode + 1]):
-        column = length + slot - start
+        column = n + slot - start
         for _ in range(20 if model.affine_guard[model.outgoing[slot]] == 0 else 0):
             largest = abs(series[0, column])
             for o in range(1, 4):
@@ -161,12 +173,6 @@ def step_until(series, clock, order, h, remaining, work):
 
     Beyond a zero of the root, where the mode ends, that clock would run backwards.
     """
-    power, latest = 1.0, 0.0
-    for o in range(order + 1):
-        latest += abs(series[o, clock]) * power
-        power *= h
-    if latest < remaining:
-        return h
     degree, _ = powers_on_step(series, clock + 2, order, h, 0, work.polynomial)
     to_bernstein(work.polynomial, degree)
     theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
@@ -178,7 +184,10 @@ def step_until(series, clock, order, h, remaining, work):
 
 @njit(**INLINE)
 def accept_series(model, run, tangents, order, h, work):
-    """Move the state and the tangent vectors to ``h`` on the series, and the divergence's integral."""
+    """Move the state and the tangent vectors to ``h`` on the series, and the divergence's integral.
+
+    The values of the state at ``h``, and what they are sums of, have been left behind the series.
+    """
     n, series = model.dimension, work.series
     mode = run.count[MODE]
     first, last = model.first_outgoing[mode], model.first_outgoing[mode + 1]
@@ -186,15 +195,15 @@ def accept_series(model, run, tangents, order, h, work):
     for slot in range(first, last):
         on_guard += run.on_guard[model.outgoing[slot]]
     # What the state is a sum of is what its rounding is judged by.
-    evaluate(series, order, h, whole_vectors(n), True)
     for i in range(n):
-        run.scale[i] = max(run.scale[i] if on_guard > 0 else 0.0, series[order + 1, i])
-    length = n * (1 + tangents)
-    evaluate(series, order, h, whole_vectors(length), False)
-    for i in range(length):
+        run.scale[i] = max(run.scale[i] if on_guard > 0 else 0.0, series[order + 2, i])
         run.y[i] = series[order + 1, i]
     if tangents > 0:
-        run.clock[DIVERGENCE] += value_at(series, length + last - first + 1, order, h)
+        run.clock[DIVERGENCE] += series[order + 1, n + last - first + 1]
+        start, stride = model.tangent_start[mode], model.tangent_columns[mode]
+        for g in range((tangents + NARROW - 1) // NARROW):
+            evaluate(series, order, h, start + g * stride, NARROW * n)
+        gather_tangents(series, order + 1, n, start, stride, run.y[: n * (1 + tangents)])
 
 
 @njit(**KERNEL)
@@ -254,7 +263,6 @@ def series_step(model, method, run, record, tangents, remaining, work):
     An event is left in ``PENDING``.
     """
     n = model.dimension
-    length = n * (1 + tangents)
     mode, t, series = run.count[MODE], run.clock[PHASE], work.series
     kind, degree = model.propagator[mode], model.degree[mode]
     exact = kind == EXACT
@@ -262,28 +270,35 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if degree > 0:
         order = degree
     guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
-    clock = length + guards if kind == DESINGULARISED else -1
+    clock = n + guards if kind == DESINGULARISED else -1
+    # State, guards, clock and divergence are evaluated together, in whole vectors.
+    front = (n + guards + 2 + NARROW - 1) // NARROW * NARROW
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
-    model.series(mode, t, run.y[:length], model.parameters, order, series)
+    model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.count[STEPS] += 1
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
     h = math.inf
     if degree == 0:
-        h = longest_step(series, n, length, order, rtol, atol, exact, work.weights)
+        start, stride = model.tangent_start[mode], model.tangent_columns[mode]
+        groups = (tangents + NARROW - 1) // NARROW
+        h = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
     if not h > 0.0:
         return NON_FINITE, 0.0
-    if clock >= 0:
-        h = step_until(series, clock, order, min(h, 1e100), remaining, work)
-    else:
+    if clock < 0:
         h = min(h, method.max_step, remaining)
         if not h < 1e100:
             h = unhurried(series, n, run)
+    else:
+        h = min(h, 1e100)
     if degree == 0:
-        h = within_guards(model, mode, series, length, order, rtol, h)
-    span = h if clock < 0 else math.inf
+        h = within_guards(model, mode, series, n, order, rtol, h)
+    evaluate_with_sizes(series, order, h, 0, front)
+    if clock >= 0 and not series[order + 2, clock] < remaining:
+        h = step_until(series, clock, order, h, remaining, work)
+        evaluate_with_sizes(series, order, h, 0, front)
     fired = NO_TRANSITION
     if guards > 0:
-        theta, fired = earliest_on_series(model, method, run, order, t, h, length, kind, work)
+        theta, fired = earliest_on_series(model, method, run, order, t, h, kind, work)
         if run.clock[GRAZING_PLACE] < theta:
             s = run.clock[GRAZING_PLACE] * h
             for i in range(n):
@@ -292,10 +307,9 @@ def series_step(model, method, run, record, tangents, remaining, work):
             remember_grazing(model, run, record, t + since, work)
         if fired != NO_TRANSITION:
             h *= theta
-            span = h
+            evaluate_with_sizes(series, order, h, 0, front)
             run.count[PENDING] = fired
-    if clock >= 0:
-        span = min(value_at(series, clock, order, h), remaining)
+    span = h if clock < 0 else min(series[order + 1, clock], remaining)
     if fired == NO_TRANSITION and not span > 4.0 * EPSILON * abs(t) and span < remaining:
         return STEP_TOO_SMALL, 0.0
     if record.step_time.shape[0] > 0 and span > 0.0:

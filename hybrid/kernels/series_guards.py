@@ -162,12 +162,12 @@ def simple_root_of(series, column, order, known_roots, low, high, left, right):
 
 
 @njit(**KERNEL)
-def earliest_on_series(model, method, run, order, t, h, length, kind, work):
+def earliest_on_series(model, method, run, order, t, h, kind, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
     Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)`` if there is none. Sides, and what is
     held to be zero, are brought up to date as by ``guards.earliest_crossing``. The polynomials are the
-    guards themselves, up to the remainder of the series.
+    guards themselves, up to the remainder of the series; what they are sums of stands behind the series.
     """
     mode, series = run.count[MODE], work.series
     earliest, fired = NO_ROOT, NO_TRANSITION
@@ -176,12 +176,12 @@ def earliest_on_series(model, method, run, order, t, h, length, kind, work):
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         on_guard, side = run.on_guard[transition], run.side[transition]
-        column = length + slot - first
-        degree, reach = powers_on_step(series, column, order, h, on_guard, work.polynomial)
-        nearest = work.polynomial[0] * side
+        column = model.dimension + slot - first
         # The cheap proof: the guard cannot come back to zero within this step.
-        if on_guard == 0 and nearest > 2.0 * reach:
+        nearest = series[0, column] * side
+        if on_guard == 0 and nearest > 2.0 * (series[order + 2, column] - nearest):
             continue
+        degree, reach = powers_on_step(series, column, order, h, on_guard, work.polynomial)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
         rounding = rounding_band(model, run, t, work.gradient)
         band = rounding

@@ -1,0 +1,194 @@
+"""Four numbers in one vector register, as a type of the compiler: arithmetic on four tangent vectors at once.
+
+In plain Python ``Lanes`` are arrays ``(4,)``, so that what is written for one runs as the other.
+"""
+
+import operator
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, overload, register_model
+
+from hybrid.kernels.codes import NARROW
+
+FUSED = ("contract",)
+# Small and called at every order: the call would cost as much as the work.
+HERE = {"_nrt": False, "forceinline": True}
+
+
+class LanesType(types.Type):
+    """The numba type of four numbers side by side."""
+
+    def __init__(self):
+        super().__init__("Lanes")
+
+
+LANES = LanesType()
+
+
+def vector_of(width):
+    """The type of a register of that many numbers."""
+    return ir.VectorType(ir.DoubleType(), width)
+
+
+@register_model(LanesType)
+class _Register(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, vector_of(NARROW))
+
+
+def everywhere(builder, number, width):
+    """One number in every lane."""
+    nothing = vector_of(width)(ir.Undefined)
+    vector = builder.insert_element(nothing, number, ir.IntType(32)(0))
+    lanes = ir.VectorType(ir.IntType(32), width)
+    return builder.shuffle_vector(vector, nothing, lanes([0] * width))
+
+
+def built_in(builder, name, width, *arguments):
+    """Call of a function that the compiler has for vectors, ``fabs`` for one."""
+    kind = vector_of(width)
+    function = ir.FunctionType(kind, [kind] * len(arguments))
+    return builder.call(
+        cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{width}f64"), arguments
+    )
+
+
+def place(context, builder, matrix_type, matrix, row, column):
+    """Address of an entry of a matrix."""
+    array = context.make_array(matrix_type)(context, builder, matrix)
+    columns = cgutils.unpack_tuple(builder, array.shape)[1]
+    return builder.gep(array.data, [builder.add(builder.mul(row, columns), column)])
+
+
+def read(builder, address, width):
+    """The vector at an address."""
+    return builder.load(builder.bitcast(address, vector_of(width).as_pointer()), align=8)
+
+
+def write(builder, vector, address):
+    """Put a vector where it belongs."""
+    builder.store(vector, builder.bitcast(address, vector.type.as_pointer()), align=8)
+
+
+def load(matrix, row, column):
+    """Four entries of a row."""
+    return matrix[row, column : column + NARROW].copy()
+
+
+def store(matrix, row, column, lanes):
+    """Write four entries of a row, from a register or all from one number."""
+    matrix[row, column : column + NARROW] = lanes
+
+
+@overload(load, jit_options=HERE)
+def _load(matrix, row, column):
+    return lambda matrix, row, column: _load_register(matrix, row, column)
+
+
+@overload(store, jit_options=HERE)
+def _store(matrix, row, column, lanes):
+    return lambda matrix, row, column, lanes: _store_register(matrix, row, column, lanes)
+
+
+@intrinsic
+def _load_register(typing_context, matrix, row, column):
+    def generate(context, builder, signature, arguments):
+        return read(builder, place(context, builder, signature.args[0], *arguments), NARROW)
+
+    return LANES(matrix, types.intp, types.intp), generate
+
+
+@intrinsic
+def _store_register(typing_context, matrix, row, column, lanes):
+    kind = LANES if lanes == LANES else types.float64
+
+    def generate(context, builder, signature, arguments):
+        *where, value = arguments
+        vector = value if kind == LANES else everywhere(builder, value, NARROW)
+        write(builder, vector, place(context, builder, signature.args[0], *where))
+        return context.get_dummy_value()
+
+    return types.void(matrix, types.intp, types.intp, kind), generate
+
+
+def _operation(instruction):
+    """An intrinsic for an operation on two registers, or on a register and a number."""
+
+    @intrinsic
+    def operate(typing_context, a, b):
+        kinds = [each if each == LANES else types.float64 for each in (a, b)]
+
+        def generate(context, builder, signature, arguments):
+            vectors = [
+                argument if kind == LANES else everywhere(builder, argument, NARROW)
+                for kind, argument in zip(kinds, arguments, strict=True)
+            ]
+            return getattr(builder, instruction)(*vectors, flags=FUSED)
+
+        return LANES(*kinds), generate
+
+    return operate
+
+
+_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE = (_operation(name) for name in ("fadd", "fsub", "fmul", "fdiv"))
+
+
+def _overloaded(operation, function):
+    @overload(operation, jit_options=HERE)
+    def choose(a, b):
+        if LANES in (a, b):
+            return lambda a, b: function(a, b)
+        return None
+
+
+for _operator, _function in (
+    (operator.add, _ADD),
+    (operator.sub, _SUBTRACT),
+    (operator.mul, _MULTIPLY),
+    (operator.truediv, _DIVIDE),
+):
+    _overloaded(_operator, _function)
+
+
+@overload(operator.neg, jit_options=HERE)
+def _negative(a):
+    if a == LANES:
+        return lambda a: _MULTIPLY(-1.0, a)
+    return None
+
+
+def square_root(lanes):
+    """Square root of each."""
+    return np.sqrt(lanes)
+
+
+def magnitude(lanes):
+    """Absolute value of each."""
+    return abs(lanes)
+
+
+def _built_in_function(name):
+    @intrinsic
+    def call(typing_context, lanes):
+        def generate(context, builder, signature, arguments):
+            return built_in(builder, name, NARROW, *arguments)
+
+        return LANES(LANES), generate
+
+    return call
+
+
+_SQUARE_ROOT, _MAGNITUDE = _built_in_function("sqrt"), _built_in_function("fabs")
+
+
+@overload(square_root, jit_options=HERE)
+def _square_root(lanes):
+    return lambda lanes: _SQUARE_ROOT(lanes)
+
+
+@overload(magnitude, jit_options=HERE)
+def _magnitude(lanes):
+    return lambda lanes: _MAGNITUDE(lanes)
