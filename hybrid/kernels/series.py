@@ -62,17 +62,19 @@ LONG = 100.0
 
 @njit(**INLINE)
 def weigh_state(series, n, rtol, atol, exact, weights):
-    """One over the tolerance of every component of the state, into ``weights``."""
+    """One over the tolerance of every component of the state, into ``weights``; what follows weighs nothing."""
     largest = 0.0
-    for i in range(n):
+    for i in range(n if exact else 0):
         largest = max(largest, abs(series[0, i]))
-    if largest == 0.0:
+    if exact and largest == 0.0:
         # From rest at the origin, the first terms tell the size.
         for i in range(n):
             largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
     floor = SHARE * rtol * largest + TINY if exact else atol + TINY
-    for i in range(n):
-        weights[0, i] = 1.0 / (floor + rtol * abs(series[0, i]))
+    for i in range(0, n, NARROW):
+        store(weights, 0, i, 1.0 / (floor + rtol * magnitude(load(series, 0, i))))
+    for i in range(n, whole_registers(n)):
+        weights[0, i] = 0.0
 
 
 @njit(**INLINE)
@@ -88,6 +90,12 @@ def weigh_tangents(series, n, first, rtol, exact, weights):
         store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
 
 
+@njit(**INLINE)
+def whole_registers(width):
+    """The least number of columns, no less than ``width``, that fill vector registers."""
+    return (width + NARROW - 1) // NARROW * NARROW
+
+
 @njit(**KERNEL)
 def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights):
     """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
@@ -96,25 +104,15 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth may be
     there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
     exact modes fall faster than any power, and three of their terms are enough. ``weights (1, columns)`` is
-    scratch. Nan if a coefficient is.
+    scratch.
     """
     weigh_state(series, n, rtol, atol, exact, weights)
     for g in range(groups):
         weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
-    total = 0.0
-    for i in range(n):
-        total += series[order, i]
-    for g in range(groups):
-        for i in range(NARROW * n):
-            total += series[order, first + g * stride + i]
-    if not abs(total) < math.inf:
-        return math.nan
     scale = binary_logarithm(rtol)
     decisive = -math.inf
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
-        worst = 0.0
-        for i in range(n):
-            worst = max(worst, weights[0, i] * abs(series[o, i]))
+        worst = largest_product(weights, series, o, 0, whole_registers(n))
         for g in range(groups):
             worst = max(worst, largest_product(weights, series, o, first + g * stride, NARROW * n))
         decisive = max(decisive, (scale + binary_logarithm(worst)) / o)
@@ -173,7 +171,7 @@ def step_until(series, clock, order, h, remaining, work):
 
     Beyond a zero of the root, where the mode ends, that clock would run backwards.
     """
-    degree, _ = powers_on_step(series, clock + 2, order, h, 0, work.polynomial)
+    degree = powers_on_step(series, clock + 2, order, h, 0, work.polynomial)
     to_bernstein(work.polynomial, degree)
     theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
     longest = min(theta, 1.0) * h
@@ -272,7 +270,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
     clock = n + guards if kind == DESINGULARISED else -1
     # State, guards, clock and divergence are evaluated together, in whole vectors.
-    front = (n + guards + 2 + NARROW - 1) // NARROW * NARROW
+    front = whole_registers(n + guards + 2)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.count[STEPS] += 1
@@ -293,6 +291,11 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if degree == 0:
         h = within_guards(model, mode, series, n, order, rtol, h)
     evaluate_with_sizes(series, order, h, 0, front)
+    total = 0.0
+    for i in range(n):
+        total += series[order + 2, i]
+    if not total < math.inf:
+        return NON_FINITE, 0.0
     if clock >= 0 and not series[order + 2, clock] < remaining:
         h = step_until(series, clock, order, h, remaining, work)
         evaluate_with_sizes(series, order, h, 0, front)

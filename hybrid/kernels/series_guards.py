@@ -15,8 +15,8 @@ from hybrid.kernels.codes import (
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 
-# Share of a guard's value that the high powers of its series may reach together to be left out of a proof.
-NEGLIGIBLE = 0.1
+# Share of a guard's size that the high powers of its series may reach together to be left out of a proof.
+NEGLIGIBLE = 0.01
 
 
 @njit(**INLINE)
@@ -80,34 +80,56 @@ def raised_to_bernstein(coefficients, order, degree):
 def powers_on_step(series, column, order, h, known_roots, coefficients):
     """Power coefficients on ``[0, 1]`` of a series, divided by its variable for each known root at 0.
 
-    Returns the degree, and the sum of the magnitudes of all but the first coefficient.
+    Returns the degree.
     """
     degree = order
     while degree > known_roots and series[degree, column] == 0.0:
         degree -= 1
-    power, reach = h**known_roots, 0.0
+    power = h**known_roots
     for k in range(known_roots, degree + 1):
         coefficients[k - known_roots] = series[k, column] * power
         power *= h
-    for k in range(1, degree + 1 - known_roots):
-        reach += abs(coefficients[k])
-    return degree - known_roots, reach
+    return degree - known_roots
 
 
 @njit(**INLINE)
-def stays_clear(powers, degree, side, band, scratch):
-    """The second cheap proof that a guard keeps beyond ``band`` on its side of zero over a whole step.
+def beyond_known_roots(series, column, h, known_roots, size):
+    """What is left of the sum of the magnitudes of all terms without the first, and the power of ``h`` there."""
+    power = 1.0
+    for k in range(known_roots):
+        size -= abs(series[k, column]) * power
+        power *= h
+    return size, power
 
-    Its leading powers must, by their Bernstein coefficients, even if all the others are against them.
+
+@njit(**INLINE)
+def leading_powers(series, column, order, power, known_roots, size, coefficients, h):
+    """The first power coefficients on ``[0, 1]`` of a series, divided by its variable for each root at 0.
+
+    ``size`` is the sum of the magnitudes of its terms from there on, ``power`` the power of ``h`` in the
+    first. Returns the degree from which on the others are a small part of the sum, and a bound for them.
     """
-    leading, rest = degree, 0.0
-    while leading > 1 and rest + abs(powers[leading]) <= NEGLIGIBLE * abs(powers[0]):
-        rest += abs(powers[leading])
-        leading -= 1
-    for k in range(leading + 1):
-        scratch[k] = powers[k]
-    to_bernstein(scratch, leading)
-    return stays(scratch, leading, side, band + rest)
+    rest, degree = size, 0
+    for k in range(known_roots, order + 1):
+        term = series[k, column] * power
+        degree = k - known_roots
+        coefficients[degree] = term
+        rest -= abs(term)
+        if rest <= NEGLIGIBLE * size:
+            break
+        power *= h
+    # Its own rounding included.
+    return degree, max(rest, 0.0) + 64.0 * EPSILON * size
+
+
+@njit(**INLINE)
+def falls_throughout(coefficients, degree, slope_of_rest, side):
+    """Whether ``side`` times a polynomial in Bernstein form falls everywhere, with what has been left out."""
+    least = slope_of_rest / max(degree, 1)
+    for i in range(degree):  # noqa: SIM110 (no generators in kernels)
+        if not (coefficients[i] - coefficients[i + 1]) * side > least:
+            return False
+    return degree > 0
 
 
 @njit(**KERNEL)
@@ -161,6 +183,12 @@ def simple_root_of(series, column, order, known_roots, low, high, left, right):
     return s
 
 
+@njit(**INLINE)
+def crosses_towards(direction, side):
+    """Whether a transition fires on a crossing to that side."""
+    return direction == 0 or direction == side
+
+
 @njit(**KERNEL)
 def earliest_on_series(model, method, run, order, t, h, kind, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
@@ -181,7 +209,6 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
         nearest = series[0, column] * side
         if on_guard == 0 and nearest > 2.0 * (series[order + 2, column] - nearest):
             continue
-        degree, reach = powers_on_step(series, column, order, h, on_guard, work.polynomial)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
         rounding = rounding_band(model, run, t, work.gradient)
         band = rounding
@@ -190,12 +217,29 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
         # Along the root of a guard, what is small for the guard is not as small.
         if kind == DESINGULARISED:
             rounding, band = math.sqrt(rounding), math.sqrt(band)
+        size, power = beyond_known_roots(series, column, h, on_guard, series[order + 2, column])
         if on_guard > 0:
-            if reach + abs(work.polynomial[0]) <= rounding:
+            if size <= rounding:
                 continue
             run.on_guard[transition] = 0
-        if stays_clear(work.polynomial, degree, side, band, work.stack[0]):
+        # The second cheap proof: the leading powers keep to their side, even if all the others are against it.
+        degree, rest = leading_powers(
+            series, column, order, power, on_guard, size, work.polynomial, h
+        )
+        to_bernstein(work.polynomial, degree)
+        if stays(work.polynomial, degree, side, band + rest):
             continue
+        # And the third: there is one crossing, of a guard that falls throughout.
+        start, end = work.polynomial[0], series[order + 1, column]
+        falls = falls_throughout(work.polynomial, degree, order * rest, side)
+        if falls and on_guard == 0 and start * side > 0.0 and end * side < 0.0 and crosses_towards(
+            model.direction[transition], -side
+        ):
+            theta = root_between(series, column, order, 0, h, 0.0, h, start, end) / h
+            if theta < earliest:
+                earliest, fired = theta, transition
+            continue
+        degree = powers_on_step(series, column, order, h, on_guard, work.polynomial)
         to_bernstein(work.polynomial, degree)
         if stays(work.polynomial, degree, side, band):
             continue
