@@ -50,7 +50,7 @@ IMPORTS = (
     "    log, log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
     ")\n"
     "from hybrid.kernels.columns import convolve, spread_tangents\n"
-    "from hybrid.kernels.lanes import load, store\n"
+    "from hybrid.kernels.lanes import load, store, store_row\n"
 )
 
 COMPARISONS: dict[type[sympy.Basic], str] = {sym.Less: "<", sym.LessEqual: "<=", sym.Equal: "=="}

@@ -37,6 +37,7 @@ from hybrid.symbolic import (
 from hybrid.trace import Symbols
 
 ROOT = sympy.Symbol("w", positive=True)
+HALF = sympy.Rational(1, 2)
 ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 # Columns between those of the guards and the others: the time since the step's start, the integral of div f.
 CLOCK, DIVERGENCE, OTHERS = range(3)
@@ -290,9 +291,14 @@ def _on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
 
 
 def _in_roots(expression: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
-    """Fractional powers of ``z`` as powers of its root."""
+    """Fractional powers of ``z`` as whole ones times its root, which saves the products that ``z`` is."""
     powers = {p for p in expression.atoms(sympy.Pow) if p.base == z and not p.exp.is_Integer}
-    return expression.xreplace({power: ROOT ** (2 * power.exp) for power in powers})
+    return expression.xreplace({p: sympy.Mul(*_whole_power(z, p.exp - HALF), ROOT) for p in powers})
+
+
+def _whole_power(z: sympy.Expr, exponent: sympy.Integer) -> tuple[sympy.Expr, ...]:
+    # Negative powers belong to those of the root: there they cancel one of a rate's.
+    return (z**exponent,) if exponent >= 0 else (ROOT ** (2 * exponent),)
 
 
 def _seeds(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:

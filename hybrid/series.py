@@ -89,6 +89,7 @@ class Recurrences:
         self.higher: list[str] = []
         self.after: dict[str, str] = {}
         self.blocks: dict[str, list[sympy.Expr]] = {}
+        self.entries: dict[tuple[str, sympy.Expr], str] = {}
         self.variables: dict[sympy.Expr, str] = {}
         self.slopes: dict[sympy.Expr, str] = {}
         self.shared: Counter[sympy.Expr] = Counter()
@@ -185,12 +186,12 @@ class Recurrences:
         block, place = list(self.blocks).index(left), rights.index(right)
         inner = f"{self.prefix}s{block}_{place}"
         if self.lanes:
-            return inner, f"{self.prefix}b{block} + {NARROW*place}"
+            return inner, f"{self.prefix}b{block} + {NARROW * place}"
         column = f"{self.prefix}b{block} + {place}"
         # The last coefficients but one of both factors. For the first order there are none, for the second
         # both terms would be the same.
         before, left_before = f"{self.prefix}p{block}_{place}", f"{self.prefix}q{block}"
-        self.after[before] = f"out[o, {column}]"
+        self.after[before] = f"{left}:{column}"
         self.after[left_before] = f"out[o, {left}] if o > 1 else 0.0"
         return f"({inner} + out[1, {left}]*{before} + {left_before}*out[1, {column}])", column
 
@@ -198,8 +199,17 @@ class Recurrences:
         """``_place``, and the coefficient of the other factor, which is written there."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
-        self._both(self.put("o", column, value))
+        self._enter(left, right, column, value)
         return inner, column, value
+
+    def _enter(self, left: str, right: sympy.Expr, column: str, value: str) -> None:
+        """Give a convolution the coefficient of its other factor. Those of one block are written together."""
+        self.entries[left, right] = value
+        self.after = {
+            name: value if text == f"{left}:{column}" else text for name, text in self.after.items()
+        }
+        if self.lanes:
+            self._both(self.put("o", column, value))
 
     def _slope(self, u: sympy.Expr) -> str:
         """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""
@@ -276,22 +286,22 @@ class Recurrences:
         first = self.at("0", right)
         return self._bind(
             expression,
-            f"out[0, {left}]*{first}",
+            f"{factor}*{value}",
             f"{inner} + {factor}*{first} + out[0, {left}]*{value}",
         )
 
     def _quotient(self, expression: sympy.Expr, above: sympy.Expr | None, below: sympy.Expr) -> str:
         text = None if above is None else self.coefficient(above)
-        divisor = self.row(below)
+        divisor, value = self.row(below), self.coefficient(below)
         inner, column = self._place(divisor, expression)
         name, column = self._kept(expression, column)
-        self.first.append(f"{name}d = 1.0/out[0, {divisor}]")
+        self.first.append(f"{name}d = 1.0/{value}")
         self._bind(
             expression,
-            f"{text or '1.0'}/out[0, {divisor}]",
-            f"({text or '0.0'} - {inner} - out[o, {divisor}]*out[0, {column}])*{name}d",
+            f"{text or '1.0'}/{value}",
+            f"({text or '0.0'} - {inner} - {value}*out[0, {column}])*{name}d",
         )
-        self._store(expression)
+        self._enter(divisor, expression, column, name)
         return name
 
     def _power(self, expression: sympy.Expr) -> str:
@@ -306,17 +316,18 @@ class Recurrences:
                 expression, *((base, base ** (exponent - 1)) if exponent.p % 2 else (half, half))
             )
         u, slope, k = self.row(base), self._slope(base), self.constants.name(exponent)
+        value = self.coefficient(base)
         inner, column = self._place(u, expression)
         moving, copy = self._place(slope, expression)
         name, column = self._kept(expression, column)
-        self.first.append(f"{name}d = 1.0/out[0, {u}]")
+        self.first.append(f"{name}d = 1.0/{value}")
         self._bind(
             expression,
-            _power_text(f"out[0, {u}]", exponent, k),
+            _power_text(value, exponent, k),
             f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})*shrink*{name}d",
         )
-        self._store(expression)
-        self._both(f"out[o, {copy}] = {name}")
+        self._enter(u, expression, column, name)
+        self._enter(slope, expression, copy, name)
         return name
 
     def _rate(self, u: sympy.Expr) -> str | None:
@@ -332,14 +343,15 @@ class Recurrences:
         argument = self.coefficient(u)
         if rate:
             name, column = self._kept(expression)
-            value = f"shrink*{rate}*out[o - 1, {column}]"
-        else:
-            slope = self._slope(u)
-            inner, column = self._place(slope, expression)
-            name, column = self._kept(expression, column)
-            value = f"({inner} + out[o, {slope}]*out[0, {column}])*shrink"
+            self._bind(expression, f"exp({argument})", f"shrink*{rate}*out[o - 1, {column}]")
+            self._store(expression)
+            return name
+        slope = self._slope(u)
+        inner, column = self._place(slope, expression)
+        name, column = self._kept(expression, column)
+        value = f"({inner} + out[o, {slope}]*out[0, {column}])*shrink"
         self._bind(expression, f"exp({argument})", value)
-        self._store(expression)
+        self._enter(slope, expression, column, name)
         return name
 
     def _pair(self, expression: sympy.Expr) -> str:
@@ -361,7 +373,11 @@ class Recurrences:
             ]
         self.first += [f"{s_name} = {odd.__name__}({argument})", f"{c_name} = {even.__name__}({argument})"]
         self.higher += [f"{s_name} = {values[0]}", f"{c_name} = {values[1]}"]
-        self._store(s, c)
+        if rate:
+            self._store(s, c)
+        else:
+            self._enter(slope, s, s_column, s_name)
+            self._enter(slope, c, c_column, c_name)
         return self.variables[expression]
 
     def _own_square(self, expression: sympy.Expr) -> str:
@@ -376,10 +392,10 @@ class Recurrences:
         self.first.append(f"{name} = {expression.func.__name__}({argument})")
         self.higher.append(f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])*shrink")
         self._store(expression)
-        self._both(f"out[o, {copy}] = {name}")
+        self._enter(row, expression, copy, name)
         self.first.append(f"{slope_name} = 1.0 {sign} {name}*{name}")
         self.higher.append(f"{slope_name} = {sign}({inner} + 2.0*out[0, {row}]*{name})")
-        self._store(slope)
+        self._enter(rate, slope, slope_column, slope_name)
         return name
 
     def _by_derivative(self, expression: sympy.Expr) -> str:

@@ -53,7 +53,7 @@ class StateLoop:
         """Order zero."""
         block = self.block
         before = [f"{name} = 0.0" for name in block.after]
-        return [*self.begin, *block.first, *self.rates, *self._sums("1"), *before]
+        return [*self.begin, *block.first, *self._rows(), *self.rates, *self._sums("1"), *before]
 
     def higher(self) -> list[str]:
         """Order ``o``, once ``shrink`` is 1/o."""
@@ -64,7 +64,17 @@ class StateLoop:
             for place in range(len(rights))
         ]
         after = [f"{name} = {value}" for name, value in block.after.items()]
-        return [*inner, *self._sums("o + 1"), *self.advance, *block.higher, *self.rates, *after]
+        sums = self._sums("o + 1")
+        return [*inner, *sums, *self.advance, *block.higher, *self._rows(), *self.rates, *after]
+
+    def _rows(self) -> list[str]:
+        """What is multiplied by one factor is written as one vector, so that it can be read as one soon."""
+        block = self.block
+        rows = []
+        for i, (left, rights) in enumerate(block.blocks.items()):
+            values = ", ".join(block.entries[left, right] for right in rights)
+            rows.append(f"store_row(out, o, {block.prefix}b{i}, ({values},))")
+        return rows
 
     def _sums(self, order: str) -> list[str]:
         block = self.block

@@ -5,16 +5,13 @@ them alike, order after order, takes whole vectors of columns at a time.
 """
 
 import numpy as np
-from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
 from hybrid.kernels.codes import NARROW
-from hybrid.kernels.lanes import FUSED, HERE, built_in, everywhere, read, vector_of, write
+from hybrid.kernels.lanes import FUSED, HERE, WIDE, built_in, everywhere, read, vector_of, write
 
-# Columns in the widest register.
-WIDE = 2 * NARROW
 # Sums that grow side by side: each term waits for the one before it in the same sum.
 SUMS_AT_ONCE = 4
 
@@ -46,18 +43,6 @@ def evaluate_with_sizes(series, order, s, first, width):
     for o in range(order - 1, -1, -1):
         total = total * s + abs(series[o, first : first + width])
     series[order + 2, first : first + width] = total
-
-
-def largest_product(weights, series, order, first, width):
-    """Largest ``abs(weights[0, c] * series[order, c])`` of the columns ``c``, a multiple of 4; nan is left out."""
-    return np.nanmax(abs(weights[0, first : first + width] * series[order, first : first + width]))
-
-
-@overload(largest_product, jit_options=HERE)
-def _largest_product(weights, series, order, first, width):
-    return lambda weights, series, order, first, width: _largest_in_registers(
-        weights, series, order, first, width
-    )
 
 
 @register_jitable
@@ -219,29 +204,3 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, sizes
         return context.get_dummy_value()
 
     return types.void(series, types.intp, types.float64, types.intp, types.intp, types.boolean), generate
-
-
-@intrinsic
-def _largest_in_registers(typing_context, weights, series, order, first, width):
-    def generate(context, builder, signature, arguments):
-        weights, matrix, order, first, width = arguments
-        number = order.type
-        factors = _Matrix(context, builder, signature.args[0], weights)
-        rows = _Matrix(context, builder, signature.args[1], matrix)
-        zero = vector_of(NARROW)([0.0] * NARROW)
-        largest = cgutils.alloca_once_value(builder, zero)
-        end = builder.add(first, width)
-        with cgutils.for_range_slice(builder, first, end, number(NARROW), number) as (column, _):
-            factor = read(builder, factors.address(number(0), column), NARROW)
-            term = built_in(builder, "fabs", NARROW, read(builder, rows.address(order, column), NARROW))
-            product, before = builder.fmul(factor, term), builder.load(largest)
-            larger = builder.fcmp_ordered(">", product, before)
-            builder.store(builder.select(larger, product, before), largest)
-        lanes = builder.load(largest)
-        parts = [builder.extract_element(lanes, ir.IntType(32)(i)) for i in range(NARROW)]
-        while len(parts) > 1:
-            a, b = parts[:2]
-            parts = [*parts[2:], builder.select(builder.fcmp_ordered(">", a, b), a, b)]
-        return parts[0]
-
-    return types.float64(weights, series, *(types.intp,) * 3), generate

@@ -13,6 +13,8 @@ from numba.extending import intrinsic, models, overload, register_model
 
 from hybrid.kernels.codes import NARROW
 
+# Numbers in the widest register.
+WIDE = 2 * NARROW
 FUSED = ("contract",)
 # Small and called at every order: the call would cost as much as the work.
 HERE = {"_nrt": False, "forceinline": True}
@@ -83,6 +85,11 @@ def store(matrix, row, column, lanes):
     matrix[row, column : column + NARROW] = lanes
 
 
+def store_row(matrix, row, column, numbers):
+    """Write a tuple of numbers side by side, in registers that are filled up with zeros."""
+    matrix[row, column : column + len(numbers)] = numbers
+
+
 @overload(load, jit_options=HERE)
 def _load(matrix, row, column):
     return lambda matrix, row, column: _load_register(matrix, row, column)
@@ -112,6 +119,30 @@ def _store_register(typing_context, matrix, row, column, lanes):
         return context.get_dummy_value()
 
     return types.void(matrix, types.intp, types.intp, kind), generate
+
+
+@overload(store_row, jit_options=HERE)
+def _store_row(matrix, row, column, numbers):
+    return lambda matrix, row, column, numbers: _store_registers(matrix, row, column, numbers)
+
+
+@intrinsic
+def _store_registers(typing_context, matrix, row, column, numbers):
+    def generate(context, builder, signature, arguments):
+        *where, numbers = arguments
+        values = cgutils.unpack_tuple(builder, numbers)
+        address = place(context, builder, signature.args[0], *where)
+        for start in range(0, len(values), WIDE):
+            some = values[start : start + WIDE]
+            width = WIDE if len(some) > NARROW else NARROW
+            vector = vector_of(width)([0.0] * width)
+            for lane, value in enumerate(some):
+                vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
+            write(builder, vector, builder.gep(address, [ir.IntType(64)(start)]))
+        return context.get_dummy_value()
+
+    count = len(numbers)
+    return types.void(matrix, types.intp, types.intp, types.UniTuple(types.float64, count)), generate
 
 
 def _operation(instruction):
@@ -192,3 +223,64 @@ def _square_root(lanes):
 @overload(magnitude, jit_options=HERE)
 def _magnitude(lanes):
     return lambda lanes: _MAGNITUDE(lanes)
+
+
+def everywhere_in_lanes(number):
+    """The same number four times."""
+    return np.full(NARROW, number)
+
+
+def larger(a, b):
+    """The larger of each two; ``b`` where they cannot be compared."""
+    return np.where(a > b, a, b)
+
+
+def largest(lanes):
+    """The largest of the four."""
+    return max(lanes)
+
+
+@overload(everywhere_in_lanes, jit_options=HERE)
+def _everywhere_in_lanes(number):
+    return lambda number: _FILL(number)
+
+
+@overload(larger, jit_options=HERE)
+def _larger(a, b):
+    return lambda a, b: _LARGER(a, b)
+
+
+@overload(largest, jit_options=HERE)
+def _largest(lanes):
+    return lambda lanes: _LARGEST(lanes)
+
+
+@intrinsic
+def _FILL(typing_context, number):
+    def generate(context, builder, signature, arguments):
+        return everywhere(builder, arguments[0], NARROW)
+
+    return LANES(types.float64), generate
+
+
+def _select_larger(builder, a, b):
+    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
+
+
+@intrinsic
+def _LARGER(typing_context, a, b):
+    def generate(context, builder, signature, arguments):
+        return _select_larger(builder, *arguments)
+
+    return LANES(LANES, LANES), generate
+
+
+@intrinsic
+def _LARGEST(typing_context, lanes):
+    def generate(context, builder, signature, arguments):
+        parts = [builder.extract_element(arguments[0], ir.IntType(32)(i)) for i in range(NARROW)]
+        while len(parts) > 1:
+            parts = [_select_larger(builder, *parts[i : i + 2]) for i in range(0, len(parts), 2)]
+        return parts[0]
+
+    return types.float64(LANES), generate

@@ -4,21 +4,45 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
+from hybrid.kernels.codes import NARROW
+from hybrid.kernels.lanes import LANES, vector_of
 from hybrid.kernels.layout import INLINE
 
 # A float is ``2 ** (exponent - BIAS)`` times its mantissa, whose bits are the lower ones.
 BIAS = 1023
-MANTISSA = 2.0**52
+BITS_OF_MANTISSA = 52
+MANTISSA = 2.0**BITS_OF_MANTISSA
 # ``log2(1 + m) = m + BULGE m (1 - m)``, within 0.008.
 BULGE = 0.346
 
 
 @intrinsic
-def _bits(typing_context, number):
-    def generate(context, builder, signature, arguments):
-        return builder.bitcast(arguments[0], ir.IntType(64))
+def _exponent_and_mantissa(typing_context, lanes):
+    """The exponents of four positive numbers, and what their mantissas are above 1."""
 
-    return types.int64(types.float64), generate
+    def generate(context, builder, signature, arguments):
+        whole = ir.VectorType(ir.IntType(64), NARROW)
+
+        def everywhere(number):
+            return whole([number] * NARROW)
+
+        def as_numbers(bits):
+            return builder.bitcast(bits, vector_of(NARROW))
+
+        bits = builder.bitcast(arguments[0], whole)
+        exponent = builder.lshr(bits, everywhere(BITS_OF_MANTISSA))
+        # A small integer in the last bits of 2**52 is that much more than 2**52.
+        large = int(BIAS + BITS_OF_MANTISSA) << BITS_OF_MANTISSA
+        exponent = builder.fsub(
+            as_numbers(builder.or_(exponent, everywhere(large))),
+            vector_of(NARROW)([MANTISSA + BIAS] * NARROW),
+        )
+        mantissa = builder.and_(bits, everywhere((1 << BITS_OF_MANTISSA) - 1))
+        mantissa = builder.or_(mantissa, everywhere(BIAS << BITS_OF_MANTISSA))
+        mantissa = builder.fsub(as_numbers(mantissa), vector_of(NARROW)([1.0] * NARROW))
+        return context.make_tuple(builder, signature.return_type, (exponent, mantissa))
+
+    return types.UniTuple(LANES, 2)(LANES), generate
 
 
 @intrinsic
@@ -30,12 +54,10 @@ def _from_bits(typing_context, bits):
 
 
 @njit(**INLINE)
-def binary_logarithm(x):
-    """About ``log2(x)`` for ``x >= 0``; -1023 for zero, more than 1023 for what is not finite."""
-    bits = _bits(x)
-    exponent = bits >> 52
-    mantissa = (bits - (exponent << 52)) / MANTISSA
-    return exponent - BIAS + mantissa + BULGE * mantissa * (1.0 - mantissa)
+def binary_logarithms(lanes):
+    """About ``log2`` of four numbers; -1023 for zero, 1024 or more for what is not finite."""
+    exponent, mantissa = _exponent_and_mantissa(lanes)
+    return exponent + mantissa + BULGE * mantissa * (1.0 - mantissa)
 
 
 @njit(**INLINE)

@@ -28,11 +28,11 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
 )
-from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents, largest_product
+from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.guards import guard_speed, guard_value
-from hybrid.kernels.lanes import load, magnitude, square_root, store
+from hybrid.kernels.lanes import everywhere_in_lanes, larger, largest, load, magnitude, square_root, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
-from hybrid.kernels.powers import binary_logarithm, power_of_two
+from hybrid.kernels.powers import binary_logarithms, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.series_guards import (
     earliest_on_series,
@@ -109,14 +109,17 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     weigh_state(series, n, rtol, atol, exact, weights)
     for g in range(groups):
         weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
-    scale = binary_logarithm(rtol)
-    decisive = -math.inf
+    scale = math.log2(rtol)
+    decisive = everywhere_in_lanes(-math.inf)
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
-        worst = largest_product(weights, series, o, 0, whole_registers(n))
+        worst = load(weights, 0, 0) * magnitude(load(series, o, 0))
+        for i in range(NARROW, n, NARROW):
+            worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
         for g in range(groups):
-            worst = max(worst, largest_product(weights, series, o, first + g * stride, NARROW * n))
-        decisive = max(decisive, (scale + binary_logarithm(worst)) / o)
-    return SAFETY * power_of_two(scale / order - decisive)
+            for i in range(first + g * stride, first + g * stride + NARROW * n, NARROW):
+                worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
+        decisive = larger((scale + binary_logarithms(worst)) * (1.0 / o), decisive)
+    return SAFETY * power_of_two(scale / order - largest(decisive))
 
 
 @njit(**KERNEL)

@@ -126,7 +126,7 @@ def leading_powers(series, column, order, power, known_roots, size, coefficients
 def falls_throughout(coefficients, degree, slope_of_rest, side):
     """Whether ``side`` times a polynomial in Bernstein form falls everywhere, with what has been left out."""
     least = slope_of_rest / max(degree, 1)
-    for i in range(degree):  # noqa: SIM110 (no generators in kernels)
+    for i in range(degree):
         if not (coefficients[i] - coefficients[i + 1]) * side > least:
             return False
     return degree > 0
