@@ -72,9 +72,7 @@ class CompiledSystem:
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
         groups = -(-tangents // NARROW)
-        return max(
-            each.tangent_start + groups * each.tangent_columns for each in self.emitted.propagators
-        )
+        return max(each.tangent_start + groups * each.tangent_columns for each in self.emitted.propagators)
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
         """What the kernels are given: roles, parameter values, graph."""

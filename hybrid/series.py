@@ -135,7 +135,9 @@ class Recurrences:
 
     def put(self, order: str, column: str, value: str) -> str:
         """Statement that writes there."""
-        return f"store(out, {order}, {column}, {value})" if self.lanes else f"out[{order}, {column}] = {value}"
+        if self.lanes:
+            return f"store(out, {order}, {column}, {value})"
+        return f"out[{order}, {column}] = {value}"
 
     def keep(self, expression: sympy.Expr, column: str) -> None:
         """Write the series of the expression into a given column."""

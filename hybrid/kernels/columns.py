@@ -191,9 +191,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, sizes
                     product = builder.fmul(builder.load(total), factor, flags=FUSED)
                     builder.store(builder.fadd(product, next_term, flags=FUSED), total)
             for total, below in ((value, 1), (size, 2))[: 2 if with_sizes else 1]:
-                write(
-                    builder, builder.load(total), rows.address(builder.add(order, number(below)), column)
-                )
+                write(builder, builder.load(total), rows.address(builder.add(order, number(below)), column))
 
         narrow = builder.and_(width, number(WIDE - NARROW))
         middle = builder.sub(builder.add(first, width), narrow)

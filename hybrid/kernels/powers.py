@@ -1,4 +1,4 @@
-"""Logarithms and powers to base two, to half a percent: enough for the length of a step, and no function call."""
+"""Logarithms and powers to base two, to half a percent, without a call: enough for the length of a step."""
 
 from llvmlite import ir
 from numba import njit, types

@@ -1,7 +1,7 @@
 """One step by the Taylor series of the solution, whose guards are isolated on the series themselves.
 
-A series ``(order + 1, columns)`` holds normalised Taylor coefficients: the state, then the guards of the mode,
-the time since the start of the step, the integral of div f, what the recurrences need, and the tangent
+A series ``(order + 1, columns)`` holds normalised Taylor coefficients: the state, then the guards of the
+mode, the time since the start of the step, the integral of div f, what the recurrences need, and the tangent
 vectors, four at a time. Its variable is time, or the clock of a desingularised mode. Two rows below it take
 the values at the end of the step, and what these are sums of.
 """
@@ -62,7 +62,7 @@ LONG = 100.0
 
 @njit(**INLINE)
 def weigh_state(series, n, rtol, atol, exact, weights):
-    """One over the tolerance of every component of the state, into ``weights``; what follows weighs nothing."""
+    """One over the tolerance of every component of the state into ``weights``; what follows weighs nothing."""
     largest = 0.0
     for i in range(n if exact else 0):
         largest = max(largest, abs(series[0, i]))

@@ -94,7 +94,7 @@ def powers_on_step(series, column, order, h, known_roots, coefficients):
 
 @njit(**INLINE)
 def beyond_known_roots(series, column, h, known_roots, size):
-    """What is left of the sum of the magnitudes of all terms without the first, and the power of ``h`` there."""
+    """The sum of the magnitudes of all terms without the known ones, and the power of ``h`` in the next."""
     power = 1.0
     for k in range(known_roots):
         size -= abs(series[k, column]) * power
@@ -222,18 +222,20 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
             if size <= rounding:
                 continue
             run.on_guard[transition] = 0
-        # The second cheap proof: the leading powers keep to their side, even if all the others are against it.
-        degree, rest = leading_powers(
-            series, column, order, power, on_guard, size, work.polynomial, h
-        )
+        # The second cheap proof: the leading powers keep to their side, even if the others are against it.
+        degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
         to_bernstein(work.polynomial, degree)
         if stays(work.polynomial, degree, side, band + rest):
             continue
         # And the third: there is one crossing, of a guard that falls throughout.
         start, end = work.polynomial[0], series[order + 1, column]
         falls = falls_throughout(work.polynomial, degree, order * rest, side)
-        if falls and on_guard == 0 and start * side > 0.0 and end * side < 0.0 and crosses_towards(
-            model.direction[transition], -side
+        if (
+            falls
+            and on_guard == 0
+            and start * side > 0.0
+            and end * side < 0.0
+            and crosses_towards(model.direction[transition], -side)
         ):
             theta = root_between(series, column, order, 0, h, 0.0, h, start, end) / h
             if theta < earliest:

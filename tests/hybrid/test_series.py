@@ -6,7 +6,7 @@ import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Transition
 from hybrid.emit import emit
-from hybrid.kernels.codes import DESINGULARISED, EXACT, RUNGE_KUTTA, TAYLOR
+from hybrid.kernels.codes import DESINGULARISED, EXACT, NARROW, RUNGE_KUTTA, TAYLOR
 
 ORDER = 9
 A = 1.375
@@ -50,16 +50,23 @@ FUNCTIONS = {
 }  # fmt: skip
 
 
-def series_of(system, x, *, t=0.0, mode=0, tangents=0, parameters=()):
-    """The role ``series`` of a system as a matrix ``(ORDER + 1, columns)``."""
+def series_of(system, x, *, t=0.0, mode=0, tangents=0, vectors=None, parameters=()):
+    """The role ``series`` of a system: of the state and what follows it, and of each tangent vector.
+
+    Matrices ``(ORDER + 1, columns)``, and ``(ORDER + 1, n)`` a vector.
+    """
     scope = {}
     emitted = emit(system)
     exec(emitted.source, scope)
     n = system.dimension
-    y = np.concatenate([x, *np.eye(n)[:tangents]])
-    out = np.full((ORDER + 2, 80), np.nan)
+    vectors = np.eye(n)[:tangents] if vectors is None else vectors
+    tangents = len(vectors)
+    y = np.concatenate([x, *vectors])
+    out = np.full((ORDER + 2, 240), np.nan)
     scope["series"](mode, t, y, np.array(parameters), ORDER, out)
-    return out[: ORDER + 1]
+    start, stride = emitted.propagators[mode].tangent_start, emitted.propagators[mode].tangent_columns
+    columns = [start + i // NARROW * stride + NARROW * np.arange(n) + i % NARROW for i in range(tangents)]
+    return out[: ORDER + 1, :start], [out[: ORDER + 1, each] for each in columns]
 
 
 def system_of(field, *transitions, state=("x", "y"), **options):
@@ -75,21 +82,21 @@ def test_functions_of_the_state(name):
     """With ``x' = 1, y' = F(x)`` the coefficients of y are those of the integral of F."""
     function, exact = FUNCTIONS[name]
     system = system_of(lambda t, x, p: (1.0, function(x.x)))
-    out = series_of(system, [A, 0.0], tangents=1)
+    out, [vector] = series_of(system, [A, 0.0], tangents=1)
     with mp.workdps(40):
         coefficients = mp.taylor(exact, mp.mpf(A), ORDER)
     expected = [0.0, *(float(coefficients[k - 1] / k) for k in range(1, ORDER + 1))]
     np.testing.assert_allclose(out[:, 1], expected, rtol=1e-12, atol=1e-15)
     # The second component of the tangent vector that starts along x integrates F': it is F less a constant.
     slope = [0.0, *(float(c) for c in coefficients[1:])]
-    np.testing.assert_allclose(out[:, 3], slope, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(vector[:, 1], slope, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_functions_of_time(name):
     function, exact = FUNCTIONS[name]
     system = system_of(lambda t, x, p: (function(t), x.x))
-    out = series_of(system, [0.0, 0.0], t=A)
+    out, _ = series_of(system, [0.0, 0.0], t=A)
     with mp.workdps(40):
         expected = [0.0, *(float(c / (k + 1)) for k, c in enumerate(mp.taylor(exact, mp.mpf(A), ORDER - 1)))]
     np.testing.assert_allclose(out[:, 0], expected, rtol=1e-12, atol=1e-15)
@@ -105,17 +112,17 @@ def test_guards_have_series_of_their_own():
             Transition("b", "a", Guard(lambda t, x, p: x.y - 1, -1)),
         ],
     )
-    out = series_of(system, [0.5, 3.0], t=0.25)
+    out, _ = series_of(system, [0.5, 3.0], t=0.25)
     np.testing.assert_allclose(out[:3, 2], [1.5 - 0.25, 3.0 + 1.0 - 1.0, 2.0])
     np.testing.assert_allclose(out[:3, 3], [np.sin(0.5), np.cos(0.5), -np.sin(0.5) / 2])
 
 
 def test_divergence_is_integrated():
     system = system_of(lambda t, x, p: (-p.c * x.x, x.x * x.y), parameters={"c": 0.5})
-    out = series_of(system, [2.0, 1.0], tangents=2, parameters=[0.5])
+    out, _ = series_of(system, [2.0, 1.0], tangents=2, parameters=[0.5])
     decay = [(-0.5) ** k / mp.factorial(k) for k in range(ORDER)]
     expected = [0.0] + [float((-0.5 * (k == 0) + 2.0 * decay[k]) / (k + 1)) for k in range(ORDER)]
-    np.testing.assert_allclose(out[:, 7], expected, rtol=1e-12)
+    np.testing.assert_allclose(out[:, 3], expected, rtol=1e-12)
 
 
 def test_what_is_exact_and_what_is_not():
@@ -168,8 +175,8 @@ def test_a_guard_says_what_holds_in_its_mode():
         ],
     )
     assert kinds(system) == [EXACT, EXACT]
-    np.testing.assert_allclose(series_of(system, [-1.0, 0.0], mode=0)[2, 0], -1.0 / 2)
-    np.testing.assert_allclose(series_of(system, [1.0, 0.0], mode=1)[2, 0], -5.0 / 2)
+    np.testing.assert_allclose(series_of(system, [-1.0, 0.0], mode=0)[0][2, 0], -1.0 / 2)
+    np.testing.assert_allclose(series_of(system, [1.0, 0.0], mode=1)[0][2, 0], -5.0 / 2)
 
 
 def test_a_guard_with_a_condition_says_nothing():
@@ -217,20 +224,36 @@ def test_hunt_crossley_contact_is_desingularised():
 
 @pytest.mark.parametrize("power", [0.5, 1.5, 2.5])
 def test_series_on_the_clock_of_a_contact(power):
-    """``y' = 2 w f``, ``w^2 = z``, and the tangents solve the variational equation."""
-    out = series_of(contact(power), [0.04, 1.0], t=0.3, mode=1, tangents=2, parameters=[100.0])
+    """``y' = w f``, ``w^2 = z``, and the tangents solve the variational equation."""
+    out, vectors = series_of(contact(power), [0.04, 1.0], t=0.3, mode=1, tangents=2, parameters=[100.0])
     s = 1e-3
-    values = np.polynomial.polynomial.polyval(s, out[:, :11])
-    rates = np.polynomial.polynomial.polyval(s, (np.arange(1, ORDER + 1)[:, None] * out[1:, :11]))
-    x, y, clock, w = values[0], values[1], values[7], values[9]
+
+    def value_and_rate(series):
+        slopes = np.arange(1, ORDER + 1)[:, None] * series[1:]
+        return np.polynomial.polynomial.polyval(s, series), np.polynomial.polynomial.polyval(s, slopes)
+
+    values, rates = value_and_rate(out[:, :6])
+    x, y, clock, w = values[0], values[1], values[3], values[5]
     assert w == pytest.approx(np.sqrt(x), rel=1e-14)
-    assert rates[7] == pytest.approx(2 * w, rel=1e-14)
-    assert rates[0] == pytest.approx(2 * w * y, rel=1e-13)
-    assert rates[1] == pytest.approx(2 * w * (np.cos(0.3 + clock) - 100.0 * x**power), rel=1e-12)
+    assert rates[3] == pytest.approx(w, rel=1e-14)
+    assert rates[0] == pytest.approx(w * y, rel=1e-13)
+    assert rates[1] == pytest.approx(w * (np.cos(0.3 + clock) - 100.0 * x**power), rel=1e-12)
     stiffness = -100.0 * power * x ** (power - 1)
-    for v in (2, 4):
-        assert rates[v] == pytest.approx(2 * w * values[v + 1], rel=1e-12, abs=1e-15)
-        assert rates[v + 1] == pytest.approx(2 * w * stiffness * values[v], rel=1e-11, abs=1e-15)
+    for vector in vectors:
+        values, rates = value_and_rate(vector)
+        assert rates[0] == pytest.approx(w * values[1], rel=1e-12, abs=1e-15)
+        assert rates[1] == pytest.approx(w * stiffness * values[0], rel=1e-11, abs=1e-15)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 5, 9])
+def test_any_number_of_tangent_vectors(count):
+    """Four at a time, the last of them filled up with zeros: each is as if it were alone."""
+    system = system_of(lambda t, x, p: (x.y * x.x, np.sin(x.y) / x.x + np.cos(t)))
+    vectors = np.random.default_rng(count).normal(size=(count, 2))
+    _, together = series_of(system, [A, 0.5], vectors=vectors)
+    for vector, series in zip(vectors, together, strict=True):
+        _, [alone] = series_of(system, [A, 0.5], vectors=vector[None])
+        np.testing.assert_array_equal(series, alone)
 
 
 def test_the_reason_is_told():
