@@ -62,7 +62,7 @@ LONG = 100.0
 
 @njit(**INLINE)
 def weigh_state(series, n, rtol, atol, exact, weights):
-    """One over the tolerance of every component of the state into ``weights``; what follows weighs nothing."""
+    """One over the tolerance of every component of the state into ``weights``; the rest weighs nothing."""
     largest = 0.0
     for i in range(n if exact else 0):
         largest = max(largest, abs(series[0, i]))
