@@ -352,7 +352,8 @@ class _Body:
             dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, block, lanes=True
         )
         volume = Recurrences({}, None, self.allot, "d", self.constants, block)
-        block.expect(rates)
+        block.expect(names, rates)
+        vectors.expect(seeds.values(), tangents)
         moved = StateLoop(names, columns, rates, starts, block)
         for place, guard in enumerate(guards):
             block.keep(guard, str(self.n + place))

@@ -9,7 +9,7 @@ order, products and functions a convolution.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
@@ -93,14 +93,21 @@ class Recurrences:
         self.variables: dict[sympy.Expr, str] = {}
         self.slopes: dict[sympy.Expr, str] = {}
         self.shared: Counter[sympy.Expr] = Counter()
+        self.lateness: dict[sympy.Expr, int] = {}
         self.own = frozenset(rows)
         if known is None and time is not None:
             self.own |= {time[0]}
 
-    def expect(self, expressions: Iterable[sympy.Expr]) -> None:
-        """Count the factors of products to come: one that many share goes into their common block."""
-        for expression in expressions:
-            for node in sympy.preorder_traversal(expression):
+    def expect(self, symbols: Iterable[sympy.Symbol | None], rates: Sequence[sympy.Expr]) -> None:
+        """Look at the rates of symbols that are to come.
+
+        The factors of products are counted: one that many share goes into their common block. And what takes
+        long to compute is known late: its symbol is added last in every sum.
+        """
+        for symbol, rate in zip(symbols, rates, strict=True):
+            if symbol is not None:
+                self.lateness[symbol] = sympy.count_ops(rate)
+            for node in sympy.preorder_traversal(rate):
                 if node.is_Mul:
                     self.shared.update(node.args)
 
@@ -251,9 +258,15 @@ class Recurrences:
 
     def _sum(self, expression: sympy.Expr) -> str:
         constant = [term for term in expression.args if self._is_constant(term)]
-        text = " + ".join(self._term(term) for term in expression.args if term not in constant)
+        moving = sorted((term for term in expression.args if term not in constant), key=self._late)
+        text = " + ".join(map(self._term, moving))
         first = f"{text} + {self.constants.name(sympy.Add(*constant))}" if constant else text
         return self._bind(expression, first, text)
+
+    def _late(self, term: sympy.Expr) -> tuple[int, int]:
+        """What terms of a sum are ordered by: when they are known."""
+        latest = max((self.lateness.get(symbol, 0) for symbol in term.free_symbols), default=0)
+        return latest, sympy.count_ops(term)
 
     def _term(self, term: sympy.Expr) -> str:
         factors = sympy.Mul.make_args(term)

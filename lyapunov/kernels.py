@@ -17,6 +17,7 @@ from hybrid.kernels.codes import (
     PREVIOUS_MODE,
     READY,
     STALE,
+    STRAIN,
 )
 from hybrid.kernels.layout import (
     ADVANCE,
@@ -107,6 +108,7 @@ def growth_rates(
         if code != DONE:
             return done, code
         orthonormalise(run.y, n, tangents, run.growth, 0.0)
+        run.clock[STRAIN] = 0.0
         if run.count[PHASE_OF_RUN] == READY:
             run.count[PHASE_OF_RUN] = STALE
         for c in range(tangents):

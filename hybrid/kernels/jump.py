@@ -41,6 +41,7 @@ from hybrid.kernels.codes import (
     RESUMING,
     SINGULAR_JUMPS,
     STEPS,
+    STRAIN,
     TRANSVERSE,
 )
 from hybrid.kernels.guards import (
@@ -58,7 +59,7 @@ from hybrid.kernels.guards import (
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.locked import begin_instant, follow, map_of_instant, restore_tangents
 from hybrid.kernels.record import start_record
-from hybrid.kernels.tangent import COLLAPSED, log_abs_determinant, multiply, orthonormalise
+from hybrid.kernels.tangent import COLLAPSED, STRAINED, log_abs_determinant, multiply, orthonormalise, strain
 
 
 @njit(int64(MODEL, RUN, WORK), **ENTRY)
@@ -191,19 +192,30 @@ def remember_jump(model, run, record, transition, transversality, kind, x_plus, 
 
 
 @njit(**KERNEL)
-def carry_tangents(model, run, tangents, orthonormal, work):
+def carry_tangents(model, run, tangents, orthonormal, apart, work):
     """Multiply the tangent vectors by ``work.saltation``, and add its log-determinant to the run's.
 
-    With ``orthonormal`` they are orthonormalised before and after, so that a direction the matrix
-    annihilates is told from one that is merely short.
+    With ``orthonormal`` they are orthonormalised before and after where the matrices since the last time
+    strain them, so that a direction that one annihilates is told from one that is merely short; with
+    ``apart`` too, and then what the jump alone added to the growth of the first is returned, else 0.
     """
     n = model.dimension
-    if orthonormal:
+    for i in range(n):
+        for j in range(n):
+            work.jacobian[i, j] = work.saltation[i, j]
+    log_determinant = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
+    run.clock[LOG_DETERMINANT] += log_determinant
+    run.clock[STRAIN] += strain(work.saltation, n, log_determinant)
+    anew = orthonormal and (apart or not run.clock[STRAIN] < STRAINED)
+    if anew:
         orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    before = run.growth[0]
     multiply(work.saltation, run.y, n, tangents, work.state)
-    if orthonormal:
-        orthonormalise(run.y, n, tangents, run.growth, COLLAPSED)
-    run.clock[LOG_DETERMINANT] += log_abs_determinant(work.saltation, work.reset_jacobian, n)
+    if not anew:
+        return 0.0
+    orthonormalise(run.y, n, tangents, run.growth, COLLAPSED)
+    run.clock[STRAIN] = 0.0
+    return run.growth[0] - before
 
 
 @njit(**KERNEL)
@@ -303,10 +315,9 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     if tangents > 0:
         if locked:
             restore_tangents(run, n, tangents)
-        before = run.growth[0]
-        carry_tangents(model, run, tangents, orthonormal, work)
-        if kind == GRAZING and orthonormal:
-            run.clock[ILL_CONDITIONED_GROWTH] += run.growth[0] - before
+        grown = carry_tangents(model, run, tangents, orthonormal, kind == GRAZING, work)
+        if kind == GRAZING:
+            run.clock[ILL_CONDITIONED_GROWTH] += grown
     leave(model, run, transition, transversality, work)
 
 
@@ -360,7 +371,7 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
     if tangents > 0:
         n = model.dimension
-        carry_tangents(model, run, tangents, orthonormal, work)
+        carry_tangents(model, run, tangents, orthonormal, False, work)
         model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
         drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
         drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
@@ -375,6 +386,6 @@ def rest(model, run, limit_mode, tangents, orthonormal, work):
     chatter_matrix(model, run, transition, work)
     multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
     if tangents > 0:
-        carry_tangents(model, run, tangents, orthonormal, work)
+        carry_tangents(model, run, tangents, orthonormal, False, work)
     run.count[PREVIOUS_MODE] = run.count[MODE]
     run.count[MODE] = limit_mode

@@ -8,6 +8,9 @@ from hybrid.kernels.layout import KERNEL
 
 # Below this length a unit vector's image is rounding: the map that produced it is singular.
 COLLAPSED = 1e-13
+# Strain of all jumps since the tangent vectors were last orthonormalised from which on it is done again: a
+# condition number of a thousand costs three digits of the vectors that grow less.
+STRAINED = math.log(1e3)
 
 
 @njit(**KERNEL)
@@ -61,6 +64,20 @@ def multiply(matrix, y, n, tangents, image):
             image[i] = total
         for i in range(n):
             y[start + i] = image[i]
+
+
+@njit(**KERNEL)
+def strain(matrix, n, log_determinant):
+    """How far a matrix is from one that keeps all angles: 0 for those, infinite if it is singular.
+
+    ``n log(|Xi|_F / sqrt(n)) - log|det Xi|``, the logarithm of what bounds its condition number up to a factor
+    of 2 (Guggenheimer, Edelman and Johnson 1995, College Mathematics Journal 26, 2-5).
+    """
+    square = 0.0
+    for i in range(n):
+        for j in range(n):
+            square += matrix[i, j] * matrix[i, j]
+    return 0.5 * n * math.log(square / n) - log_determinant if square > 0.0 else math.inf
 
 
 @njit(**KERNEL)
