@@ -1,6 +1,7 @@
 """What buys the third digit of an exponent: the number of intervals, the tolerance, or the method.
 
-``python -m benchmarks.exponents`` makes ``docs/exponents_work.png``.
+``python -m benchmarks.exponents`` makes ``docs/exponents_work.png``; ``pip install '.[benchmarks]'`` brings
+the packages that it measures beside this one.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import models
+from benchmarks import exponents_beside
 from benchmarks.common import ROOT, heading, table
+from benchmarks.exponents_beside import Beside
 from hybrid import Guard, HybridSystem, Mode, Reset, Taylor, Transition
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from lyapunov.plot import COLOURS, INK, style
@@ -97,14 +100,22 @@ def estimates(
     return found
 
 
+def warm(system: HybridSystem, x0: tuple[float, ...]) -> None:
+    """Compile apart."""
+    lyapunov_spectrum(system, x0, k=1, intervals=1, transient=0)
+    two_orbit_exponents(system, x0, intervals=1)
+
+
 def regular_curves() -> Curves:
     """Errors on the stable orbit of the founding system, from a point of it."""
     solvers = {
         f"tolerance {tolerance:.0e}": Taylor(rtol=tolerance, atol=tolerance / 100) for tolerance in TOLERANCES
     }
+    system = models.vibroimpact()
+    warm(system, START)
     curves: Curves = {}
     for M in INTERVALS:
-        for name, (seconds, value) in estimates(models.vibroimpact(), START, M, solvers).items():
+        for name, (seconds, value) in estimates(system, START, M, solvers).items():
             curves.setdefault(name, []).append((M, seconds, abs(value / REGULAR - 1)))
     return curves
 
@@ -112,9 +123,11 @@ def regular_curves() -> Curves:
 def chaotic_curves() -> Curves:
     """Root mean square errors on the skew tent map, over several starts."""
     solvers = {"tolerance 1e-06": Taylor(rtol=1e-6, atol=1e-8)}
+    system = skew_tent()
+    warm(system, (0.3, 0.5))
     curves: Curves = {}
     for M in INTERVALS:
-        runs = [estimates(skew_tent(), (u, 0.5), M, solvers, interval=1.0) for u in STARTS]
+        runs = [estimates(system, (u, 0.5), M, solvers, interval=1.0) for u in STARTS]
         for name in runs[0]:
             seconds, values = np.array([run[name] for run in runs]).T
             error = math.sqrt(np.mean((values / CHAOTIC - 1) ** 2))
@@ -161,15 +174,16 @@ def draw_work(axes: plt.Axes, curves: Curves) -> None:
     axes.grid(True)
 
 
-def picture(regular: Curves, chaotic: Curves) -> None:
+def picture(regular: Curves, chaotic: Curves, beside: Beside) -> None:
     with style():
-        figure, axes = plt.subplots(1, 3, figsize=(12.0, 4.6), sharey=True)
+        figure, (axes, below) = plt.subplots(2, 3, figsize=(12.0, 8.4), sharey="row")
         draw(axes[0], regular, "Regular: founding system at 7.40")
         draw_work(axes[1], regular)
         draw(axes[2], chaotic, "Chaotic: skew tent map")
         axes[2].set_ylabel("")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+        exponents_beside.draw(below, beside)
+        for side, ax in (("upper", axes[0]), ("lower", below[0])):
+            figure.legend(*ax.get_legend_handles_labels(), loc=f"outside {side} center", ncols=5)
         figure.savefig(PICTURE, metadata={"Software": None})
 
 
@@ -183,16 +197,14 @@ def summary(curves: Curves) -> None:
 
 def main() -> None:
     heading("Relative error of the first exponent over the number of intervals; three digits are 5e-4.")
-    # Compile apart.
-    for system, x0 in ((models.vibroimpact(), START), (skew_tent(), (0.3, 0.5))):
-        lyapunov_spectrum(system, x0, intervals=1, transient=0)
-        two_orbit_exponents(system, x0, intervals=1)
     regular, chaotic = regular_curves(), chaotic_curves()
     print("Founding system at omega = 7.40, one tangent vector; tapered means unless it says otherwise:\n")
     summary(regular)
     print(f"Skew tent map, exponent {CHAOTIC:.6f}, root mean square over {len(STARTS)} starts:\n")
     summary(chaotic)
-    picture(regular, chaotic)
+    beside = exponents_beside.beside()
+    exponents_beside.summary(beside)
+    picture(regular, chaotic, beside)
     print(f"Picture: {PICTURE.relative_to(ROOT)}")
 
 

@@ -19,12 +19,12 @@ def problems() -> dict[str, Problem]:
     """By short name; what stands before the first dash is the chart."""
     founding = {}
     for D in ("0", "0.05"):
-        facts = _stored("founding_system")["transients"][D]
+        facts = stored("founding_system")["transients"][D]
         system = attrs.evolve(
             models.vibroimpact(), parameters={**models.vibroimpact().parameters, "D": float(D)}
         )
         period = system.forcing_period()
-        shape = {"system": system, "x0": facts["x0"], "mode": "free", "straight": _always_touching(system)}
+        shape = {"system": system, "x0": facts["x0"], "mode": "free", "straight": always_touching(system)}
         ten, hundred = {"t_span": (0.0, 10 * period)}, {"t_span": (0.0, 100 * period)}
         title, times = f"Founding system, D = {D} m", facts["times10"]
         matrix = Answer(facts["x10"], times=times, fundamental=facts["fundamental10"])
@@ -48,18 +48,18 @@ def problems() -> dict[str, Problem]:
     }
 
 
-def _stored(name: str) -> Any:
+def stored(name: str) -> Any:
     return json.loads((ROOT / "tests" / "reference" / f"{name}.json").read_text(encoding="utf-8"))
 
 
-def _always_touching(system: HybridSystem) -> HybridSystem:
+def always_touching(system: HybridSystem) -> HybridSystem:
     """The contact's field everywhere: its force is zero apart."""
     contact = next(mode for mode in system.modes if mode.name == "contact")
     return attrs.evolve(system, modes=[contact], transitions=[])
 
 
 def _impact_oscillator() -> Problem:
-    flight = _stored("impact_oscillator")["long_flight"]
+    flight = stored("impact_oscillator")["long_flight"]
     return Problem(
         "Impact oscillator, 200 impacts from rest",
         models.impact_oscillator(),
@@ -71,7 +71,7 @@ def _impact_oscillator() -> Problem:
 
 def _buck_converter() -> Problem:
     """Two hundred ramps along the orbit at 20 V and a quarter, over which the switch stays open."""
-    facts, ramps = _stored("buck_converter")[1], 200
+    facts, ramps = stored("buck_converter")[1], 200
     p = {**models.buck_converter().parameters, "E": facts["E"]}
     model = attrs.evolve(models.buck_converter(), parameters=p)
     A = np.array([[-1 / (p["R"] * p["C"]), 1 / p["C"]], [-1 / p["L"], 0.0]])
@@ -113,7 +113,7 @@ def _buck_converter() -> Problem:
 
 def _stick_slip() -> Problem:
     """Forty slips of the limit cycle, from the middle of a stick to that of another."""
-    facts, slips = _stored("stick_slip"), 40
+    facts, slips = stored("stick_slip"), 40
     belt, Fs = 0.2, 1.0
     released = [(Fs - 0.5) / belt + k * facts["period"] for k in range(slips)]
     caught = [t + facts["slip"] for t in released]
