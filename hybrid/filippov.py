@@ -224,9 +224,13 @@ class _Surface:
         return L_b - L_a - self._hardly_moving(t, x, p)
 
     def _hardly_moving(self, t: Any, x: Any, p: Any) -> Any:
-        """A speed through the surface that is next to none."""
-        slope = _total(self.gradient(t, x, p)[:-1])
-        return TANGENT * slope * (_total(self.below(t, x, p)) + _total(self.above(t, x, p)))
+        """A speed through the surface that is next to none.
+
+        It is as smooth as the fields, so that the sliding mode has a Taylor series where they do.
+        """
+        slope = self.gradient(t, x, p)[:-1]
+        speed = [*self.below(t, x, p), *self.above(t, x, p)]
+        return TANGENT * np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
 
     def is_above(self, t: Any, x: Any, p: Any) -> Any:
         return self._height(t, x, p) > SLIDING_BAND
@@ -321,11 +325,6 @@ def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:
         if not _is_zero(factor):
             total = total + factor * other
     return total
-
-
-def _total(values: Iterable[Any]) -> Any:
-    """Sum of the magnitudes."""
-    return sum((np.abs(value) for value in values if not _is_zero(value)), 0.0)
 
 
 def _is_zero(value: Any) -> bool:
