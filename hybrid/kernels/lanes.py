@@ -91,17 +91,17 @@ def store_row(matrix, row, column, numbers):
 
 
 @overload(load, jit_options=HERE)
-def _load(matrix, row, column):
-    return lambda matrix, row, column: _load_register(matrix, row, column)
+def _overload_load(matrix, row, column):
+    return lambda matrix, row, column: _read_register(matrix, row, column)
 
 
 @overload(store, jit_options=HERE)
-def _store(matrix, row, column, lanes):
-    return lambda matrix, row, column, lanes: _store_register(matrix, row, column, lanes)
+def _overload_store(matrix, row, column, lanes):
+    return lambda matrix, row, column, lanes: _write_register(matrix, row, column, lanes)
 
 
 @intrinsic
-def _load_register(typing_context, matrix, row, column):
+def _read_register(typing_context, matrix, row, column):
     def generate(context, builder, signature, arguments):
         return read(builder, place(context, builder, signature.args[0], *arguments), NARROW)
 
@@ -109,7 +109,7 @@ def _load_register(typing_context, matrix, row, column):
 
 
 @intrinsic
-def _store_register(typing_context, matrix, row, column, lanes):
+def _write_register(typing_context, matrix, row, column, lanes):
     kind = LANES if lanes == LANES else types.float64
 
     def generate(context, builder, signature, arguments):
@@ -122,12 +122,12 @@ def _store_register(typing_context, matrix, row, column, lanes):
 
 
 @overload(store_row, jit_options=HERE)
-def _store_row(matrix, row, column, numbers):
-    return lambda matrix, row, column, numbers: _store_registers(matrix, row, column, numbers)
+def _overload_store_row(matrix, row, column, numbers):
+    return lambda matrix, row, column, numbers: _write_row(matrix, row, column, numbers)
 
 
 @intrinsic
-def _store_registers(typing_context, matrix, row, column, numbers):
+def _write_row(typing_context, matrix, row, column, numbers):
     def generate(context, builder, signature, arguments):
         *where, numbers = arguments
         values = cgutils.unpack_tuple(builder, numbers)
@@ -143,6 +143,31 @@ def _store_registers(typing_context, matrix, row, column, numbers):
 
     count = len(numbers)
     return types.void(matrix, types.intp, types.intp, types.UniTuple(types.float64, count)), generate
+
+
+def square_root(lanes):
+    """Square root of each."""
+    return np.sqrt(lanes)
+
+
+def magnitude(lanes):
+    """Absolute value of each."""
+    return abs(lanes)
+
+
+def four_times(number):
+    """The same number in every lane."""
+    return np.full(NARROW, number)
+
+
+def larger(a, b):
+    """The larger of each two; ``b`` where they cannot be compared."""
+    return np.where(a > b, a, b)
+
+
+def largest(lanes):
+    """The largest of the four."""
+    return max(lanes)
 
 
 def _operation(instruction):
@@ -164,44 +189,9 @@ def _operation(instruction):
     return operate
 
 
-_ADD, _SUBTRACT, _MULTIPLY, _DIVIDE = (_operation(name) for name in ("fadd", "fsub", "fmul", "fdiv"))
+def _function_of_each(name):
+    """An intrinsic for a function that the compiler has for vectors."""
 
-
-def _overloaded(operation, function):
-    @overload(operation, jit_options=HERE)
-    def choose(a, b):
-        if LANES in (a, b):
-            return lambda a, b: function(a, b)
-        return None
-
-
-for _operator, _function in (
-    (operator.add, _ADD),
-    (operator.sub, _SUBTRACT),
-    (operator.mul, _MULTIPLY),
-    (operator.truediv, _DIVIDE),
-):
-    _overloaded(_operator, _function)
-
-
-@overload(operator.neg, jit_options=HERE)
-def _negative(a):
-    if a == LANES:
-        return lambda a: _MULTIPLY(-1.0, a)
-    return None
-
-
-def square_root(lanes):
-    """Square root of each."""
-    return np.sqrt(lanes)
-
-
-def magnitude(lanes):
-    """Absolute value of each."""
-    return abs(lanes)
-
-
-def _built_in_function(name):
     @intrinsic
     def call(typing_context, lanes):
         def generate(context, builder, signature, arguments):
@@ -212,75 +202,85 @@ def _built_in_function(name):
     return call
 
 
-_SQUARE_ROOT, _MAGNITUDE = _built_in_function("sqrt"), _built_in_function("fabs")
-
-
-@overload(square_root, jit_options=HERE)
-def _square_root(lanes):
-    return lambda lanes: _SQUARE_ROOT(lanes)
-
-
-@overload(magnitude, jit_options=HERE)
-def _magnitude(lanes):
-    return lambda lanes: _MAGNITUDE(lanes)
-
-
-def everywhere_in_lanes(number):
-    """The same number four times."""
-    return np.full(NARROW, number)
-
-
-def larger(a, b):
-    """The larger of each two; ``b`` where they cannot be compared."""
-    return np.where(a > b, a, b)
-
-
-def largest(lanes):
-    """The largest of the four."""
-    return max(lanes)
-
-
-@overload(everywhere_in_lanes, jit_options=HERE)
-def _everywhere_in_lanes(number):
-    return lambda number: _FILL(number)
-
-
-@overload(larger, jit_options=HERE)
-def _larger(a, b):
-    return lambda a, b: _LARGER(a, b)
-
-
-@overload(largest, jit_options=HERE)
-def _largest(lanes):
-    return lambda lanes: _LARGEST(lanes)
+def _larger_of(builder, a, b):
+    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
 
 
 @intrinsic
-def _FILL(typing_context, number):
+def _fill(typing_context, number):
     def generate(context, builder, signature, arguments):
         return everywhere(builder, arguments[0], NARROW)
 
     return LANES(types.float64), generate
 
 
-def _select_larger(builder, a, b):
-    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
-
-
 @intrinsic
-def _LARGER(typing_context, a, b):
+def _select_larger(typing_context, a, b):
     def generate(context, builder, signature, arguments):
-        return _select_larger(builder, *arguments)
+        return _larger_of(builder, *arguments)
 
     return LANES(LANES, LANES), generate
 
 
 @intrinsic
-def _LARGEST(typing_context, lanes):
+def _reduce_to_largest(typing_context, lanes):
     def generate(context, builder, signature, arguments):
         parts = [builder.extract_element(arguments[0], ir.IntType(32)(i)) for i in range(NARROW)]
         while len(parts) > 1:
-            parts = [_select_larger(builder, *parts[i : i + 2]) for i in range(0, len(parts), 2)]
+            parts = [_larger_of(builder, *parts[i : i + 2]) for i in range(0, len(parts), 2)]
         return parts[0]
 
     return types.float64(LANES), generate
+
+
+_add, _subtract, _multiply, _divide = (_operation(name) for name in ("fadd", "fsub", "fmul", "fdiv"))
+_square_root, _magnitude = _function_of_each("sqrt"), _function_of_each("fabs")
+
+
+def _overload_operator(operation, function):
+    @overload(operation, jit_options=HERE)
+    def choose(a, b):
+        if LANES in (a, b):
+            return lambda a, b: function(a, b)
+        return None
+
+
+for _operator, _intrinsic in (
+    (operator.add, _add),
+    (operator.sub, _subtract),
+    (operator.mul, _multiply),
+    (operator.truediv, _divide),
+):
+    _overload_operator(_operator, _intrinsic)
+
+
+@overload(operator.neg, jit_options=HERE)
+def _overload_negative(a):
+    if a == LANES:
+        return lambda a: _multiply(-1.0, a)
+    return None
+
+
+@overload(square_root, jit_options=HERE)
+def _overload_square_root(lanes):
+    return lambda lanes: _square_root(lanes)
+
+
+@overload(magnitude, jit_options=HERE)
+def _overload_magnitude(lanes):
+    return lambda lanes: _magnitude(lanes)
+
+
+@overload(four_times, jit_options=HERE)
+def _overload_four_times(number):
+    return lambda number: _fill(number)
+
+
+@overload(larger, jit_options=HERE)
+def _overload_larger(a, b):
+    return lambda a, b: _select_larger(a, b)
+
+
+@overload(largest, jit_options=HERE)
+def _overload_largest(lanes):
+    return lambda lanes: _reduce_to_largest(lanes)

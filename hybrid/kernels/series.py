@@ -30,7 +30,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.guards import guard_speed, guard_value
-from hybrid.kernels.lanes import everywhere_in_lanes, larger, largest, load, magnitude, square_root, store
+from hybrid.kernels.lanes import four_times, larger, largest, load, magnitude, square_root, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.powers import binary_logarithms, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
@@ -110,7 +110,7 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     for g in range(groups):
         weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
     scale = math.log2(rtol)
-    decisive = everywhere_in_lanes(-math.inf)
+    decisive = four_times(-math.inf)
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
         worst = load(weights, 0, 0) * magnitude(load(series, o, 0))
         for i in range(NARROW, n, NARROW):

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hybrid.kernels.lanes import load, store
+from hybrid.kernels.lanes import (
+    NARROW,
+    four_times,
+    larger,
+    largest,
+    load,
+    magnitude,
+    square_root,
+    store,
+    store_row,
+)
 
 EXPRESSIONS = {
     "sum": lambda a, b, s: a + b,
@@ -14,6 +24,8 @@ EXPRESSIONS = {
     "negative": lambda a, b, s: -a,
     "numbers on the left": lambda a, b, s: s * a + (s - b),
     "numbers on the right": lambda a, b, s: (a - s) / 2 + b * s,
+    "functions": lambda a, b, s: square_root(magnitude(a)) + larger(a, b) * four_times(s),
+    "one number": lambda a, b, s: s,
 }
 
 
@@ -30,3 +42,33 @@ def test_arithmetic(name):
     store(expected, 2, 3, EXPRESSIONS[name](load(expected, 0, 1), load(expected, 1, 2), 0.3))
     compiled(matrix, 0.3)
     np.testing.assert_allclose(matrix, expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("place", range(NARROW))
+def test_the_largest_wherever_it_is(place):
+    @njit
+    def compiled(matrix):
+        return largest(load(matrix, 0, 0))
+
+    numbers = np.array([[-3.0, 1.0, 0.5, -7.0]])
+    numbers[0, place] = 2.0
+    assert compiled(numbers) == largest(load(numbers, 0, 0)) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("count", "filled"), [(1, 4), (3, 4), (4, 4), (5, 8), (8, 8), (9, 12), (12, 12), (13, 16)]
+)
+def test_a_row_is_written_in_whole_registers(count, filled):
+    """What is not a whole register is filled up with zeros, and nothing behind it is touched."""
+    numbers = tuple(1.0 + i for i in range(count))
+
+    @njit
+    def compiled(matrix):
+        store_row(matrix, 1, 2, numbers)
+
+    matrix = np.full((3, 20), np.nan)
+    compiled(matrix)
+    expected = np.full((3, 20), np.nan)
+    expected[1, 2 : 2 + filled] = 0.0
+    store_row(expected, 1, 2, numbers)
+    np.testing.assert_array_equal(matrix, expected)

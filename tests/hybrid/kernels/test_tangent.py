@@ -12,7 +12,7 @@ from hybrid.load import load_kernels
 
 KERNELS = load_kernels("hybrid.kernels.tangent")
 _orthonormalise, _log_abs_determinant = KERNELS.orthonormalise, KERNELS.log_abs_determinant
-_solve = KERNELS.solve
+_solve, _strain = KERNELS.solve, KERNELS.strain
 COLLAPSED = KERNELS.COLLAPSED
 
 
@@ -165,3 +165,26 @@ def test_of_singular_equations_one_solution_is_found(matrix):
     known, out = np.array(matrix) @ [1.5, -0.5], np.empty(2)
     _solved(np.column_stack([matrix, known]), out)
     np.testing.assert_allclose(np.array(matrix) @ out, known, atol=1e-14)
+
+
+@njit
+def _strain_of(matrix, log_determinant):
+    return _strain(matrix, matrix.shape[0], log_determinant)
+
+
+@given(st.integers(1, 6), st.integers(0, 2**32 - 1))
+def test_strain_bounds_the_condition_number(n, seed):
+    matrix = np.random.default_rng(seed).normal(size=(n, n))
+    found = _strain_of(matrix, np.linalg.slogdet(matrix)[1])
+    assert found >= -1e-12
+    assert np.log(np.linalg.cond(matrix)) <= found + np.log(2.0) + 1e-9
+
+
+def test_rotations_and_scales_do_not_strain():
+    rotation = 3.0 * np.array([[0.6, -0.8], [0.8, 0.6]])
+    assert _strain_of(rotation, np.log(9.0)) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_singular_matrices_strain_without_bound():
+    assert _strain_of(np.zeros((2, 2)), -np.inf) == np.inf
+    assert _strain_of(np.diag([1.0, 0.0]), -np.inf) == np.inf
