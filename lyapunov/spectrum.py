@@ -107,8 +107,8 @@ def lyapunov_spectrum(
     """Lyapunov exponents by repeated orthonormalisation of tangent vectors.
 
     The variational equation carries the vectors in a mode, the saltation matrix at a jump (Mueller 1995);
-    their error is controlled with the state's. They are orthonormalised at the end of each interval and
-    around each jump.
+    their error is controlled with the state's. They are orthonormalised at the end of each interval, and
+    around jumps whose saltation matrices come close to annihilating a direction.
 
     Parameters
     ----------

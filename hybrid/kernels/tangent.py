@@ -70,8 +70,8 @@ def multiply(matrix, y, n, tangents, image):
 def strain(matrix, n, log_determinant):
     """How far a matrix is from one that keeps all angles: 0 for those, infinite if it is singular.
 
-    ``n log(|Xi|_F / sqrt(n)) - log|det Xi|``, the logarithm of a bound of its condition number, but for a factor
-    of 2 (Guggenheimer, Edelman and Johnson 1995, College Mathematics Journal 26, 2-5).
+    ``n log(|Xi|_F / sqrt(n)) - log|det Xi|``: its condition number is at most 2 times the exponential of that
+    (Guggenheimer, Edelman and Johnson 1995, College Mathematics Journal 26, 2-5).
     """
     square = 0.0
     for i in range(n):

@@ -23,7 +23,7 @@ class Taylor(RungeKutta):
       exponential forcing, is advanced by its series to rounding, whatever the tolerances, in steps as long as
       the series allows: **exact**. Where the solutions are polynomials a step is a whole flight.
     - A mode whose field has half-integer powers of a guard, such as a Hertz contact, is advanced on a clock
-      of its own, ``dt = 2 w ds`` with ``w`` the square root of the guard. Everything is smooth there, entry
+      of its own, ``dt = w ds`` with ``w`` the square root of the guard. Everything is smooth there, entry
       and exit included: **desingularised**.
     - Any other mode with an analytic field is advanced by its **Taylor series**, of an order and with steps
       that follow from the tolerances (Jorba and Zou 2005, section 3).
