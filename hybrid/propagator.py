@@ -237,7 +237,7 @@ def _write_desingularised(
     harmonics = _harmonics(field, symbols)
     field = [rate.xreplace(harmonics) for rate in field]
     driven = {symbol: body.allot() for symbol in harmonics.values()}
-    block = body.block({ROOT: root, **driven}, (symbols.t, f"out[o, {clock}]"))
+    block = body.block({ROOT: root, **driven}, (symbols.t, f"ay{len(symbols.x)}"))
     seeds = _seeds(symbols)
     slope = z.diff(symbols.t) + sympy.Add(
         *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
@@ -351,17 +351,16 @@ class _Body:
         vectors = Recurrences(
             dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, block, lanes=True
         )
-        volume = Recurrences({}, None, self.allot, "d", self.constants, block)
+        names, rates = [*names, None], [*rates, trace]
+        columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, "0.0"]
         block.expect(names, rates)
         vectors.expect(seeds.values(), tangents)
         moved = StateLoop(names, columns, rates, starts, block)
-        for place, guard in enumerate(guards):
-            block.keep(guard, str(self.n + place))
-        spread = StateLoop([None], [self.column(DIVERGENCE)], [trace], ["0.0"], volume)
+        crossing = {str(self.n + place): block.coefficient(guard) for place, guard in enumerate(guards)}
+        moved.write_front(self.behind_guards + OTHERS, crossing)
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
         self._place_blocks(block)
-        self._place_blocks(volume)
         carried.start = padded(self.columns, ALIGNED)
         lines = [
             *self.preamble,
@@ -369,7 +368,6 @@ class _Body:
             *self.constants.statements(),
             "o = 0",
             *moved.first(),
-            *spread.first(),
             *carried.first(),
             "for o in range(1, order + 1):",
             *indented(
@@ -377,7 +375,7 @@ class _Body:
                     "shrink = 1.0/o",
                     *moved.higher(),
                     "if groups > 0:",
-                    *indented([*spread.higher(), *carried.higher()]),
+                    *indented(carried.higher()),
                 ]
             ),
         ]

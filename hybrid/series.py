@@ -146,10 +146,6 @@ class Recurrences:
             return f"store(out, {order}, {column}, {value})"
         return f"out[{order}, {column}] = {value}"
 
-    def keep(self, expression: sympy.Expr, column: str) -> None:
-        """Write the series of the expression into a given column."""
-        self._both(self.put("o", column, self.coefficient(expression)))
-
     def _is_known(self, expression: sympy.Expr) -> bool:
         return self.known is not None and not expression.free_symbols & self.own
 

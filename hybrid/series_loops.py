@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import sympy
 
-from hybrid.kernels.codes import NARROW
+from hybrid.kernels.codes import NARROW, WIDE
 from hybrid.series import Recurrences
 
 
@@ -39,21 +39,27 @@ class StateLoop:
         starts: Sequence[str],
         block: Recurrences,
     ) -> None:
-        names = [f"{block.prefix}y{i}" for i in range(len(targets))]
+        self.block, self.starts = block, starts
+        self.front: list[str] = []
+        self.names = {target: f"{block.prefix}y{i}" for i, target in enumerate(targets)}
+        names = self.names.values()
         block.variables |= {symbol: name for symbol, name in zip(symbols, names, strict=True) if symbol}
         values = [block.coefficient(rate) for rate in rates]
-        self.block = block
         self.rates = [f"{block.prefix}r{i} = {value}" for i, value in enumerate(values)]
-        stored = [f"out[o, {target}] = {name}" for target, name in zip(targets, names, strict=True)]
-        self.begin = [*(f"{name} = {start}" for name, start in zip(names, starts, strict=True)), *stored]
-        shrunk = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(names)]
-        self.advance = [*shrunk, *stored]
+
+    def write_front(self, width: int, others: dict[str, str]) -> None:
+        """Let the first columns be written as one vector: those of ``y``, and the texts of ``others``."""
+        columns = self.names | others
+        self.front = [columns.get(str(i), "0.0") for i in range(width)]
 
     def first(self) -> list[str]:
         """Order zero."""
         block = self.block
-        before = [f"{name} = 0.0" for name in block.after]
-        return [*self.begin, *block.first, *self._rows(), *self.rates, *self._sums("1"), *before]
+        begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
+        # Order one is read, and multiplied by what is not there yet, before it is written.
+        nothing = f"store_row(out, 1, 0, ({'0.0, ' * len(self.front)}))"
+        before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.after)]
+        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
 
     def higher(self) -> list[str]:
         """Order ``o``, once ``shrink`` is 1/o."""
@@ -63,14 +69,19 @@ class StateLoop:
             for i, rights in enumerate(block.blocks.values())
             for place in range(len(rights))
         ]
+        step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
         after = [f"{name} = {value}" for name, value in block.after.items()]
-        sums = self._sums("o + 1")
-        return [*inner, *sums, *self.advance, *block.higher, *self._rows(), *self.rates, *after]
+        sums = [*inner, *self._sums("o + 1")]
+        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
+
+    def _separate(self) -> list[str]:
+        """Columns of ``y`` that are not among the first are written one by one."""
+        behind = [target for target in self.names if int(target) >= len(self.front)]
+        return [f"out[o, {target}] = {self.names[target]}" for target in behind]
 
     def _rows(self) -> list[str]:
-        """What is multiplied by one factor is written as one vector, so that it can be read as one soon."""
-        block = self.block
-        rows = []
+        """What stands side by side is written as one vector, so that it can be read as one soon."""
+        block, rows = self.block, [f"store_row(out, o, 0, ({', '.join(self.front)},))"]
         for i, (left, rights) in enumerate(block.blocks.items()):
             values = ", ".join(block.entries[left, right] for right in rights)
             rows.append(f"store_row(out, o, {block.prefix}b{i}, ({values},))")
@@ -79,7 +90,7 @@ class StateLoop:
     def _sums(self, order: str) -> list[str]:
         block = self.block
         return [
-            f"convolve(out, {order}, 2, {left}, {block.prefix}b{i}, {padded(len(rights))})"
+            f"convolve(out, {order}, 2, {left}, {block.prefix}b{i}, {padded(len(rights))}, {WIDE})"
             for i, (left, rights) in enumerate(block.blocks.items())
         ]
 
@@ -119,7 +130,7 @@ class TangentLoop:
         sums, inner = [], []
         for i, (left, rights) in enumerate(block.blocks.items()):
             base = f"{block.prefix}b{i}"
-            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)})")
+            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)}, {NARROW})")
             inner += [
                 f"{block.prefix}s{i}_{place} = load(out, o, {base} + {NARROW * place})"
                 for place in range(len(rights))

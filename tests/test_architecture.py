@@ -15,6 +15,7 @@ KERNELS_MAY_IMPORT = (
     "hybrid.kernels",
     "llvmlite",
     "math",
+    "operator",
     "numba",
     "numpy",
     "struct",

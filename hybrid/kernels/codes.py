@@ -79,8 +79,9 @@ NO_MODE = -1
 # Highest order of a series, and the order of exact ones: what the memory for them is laid out for.
 HIGHEST_ORDER = 28
 
-# Columns of series that are multiplied at once: blocks of them are filled up to this width.
+# Columns of series that are worked on at once, and in the widest register.
 NARROW = 4
+WIDE = 2 * NARROW
 
 # Propagators of a mode, and how people read them.
 RUNGE_KUTTA = 0

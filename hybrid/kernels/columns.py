@@ -1,7 +1,9 @@
 """Arithmetic on many series side by side in vector registers, which the compiler does not find by itself.
 
 A matrix of series ``(orders, columns)`` has its columns next to one another in memory. What is done to all of
-them alike, order after order, takes whole vectors of columns at a time.
+them alike, order after order, takes whole vectors of columns at a time. A processor has to wait for memory
+when it reads as one vector what it has just written as several: those of the state are read as wide as
+``store_row`` writes them, and those of tangent vectors four columns at a time.
 """
 
 import numpy as np
@@ -9,18 +11,19 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
-from hybrid.kernels.codes import NARROW
-from hybrid.kernels.lanes import FUSED, HERE, WIDE, built_in, everywhere, read, vector_of, write
+from hybrid.kernels.codes import NARROW, WIDE
+from hybrid.kernels.lanes import HERE, built_in, everywhere, multiply_add, read, vector_of, write
 
 # Sums that grow side by side: each term waits for the one before it in the same sum.
-SUMS_AT_ONCE = 4
+AT_ONCE = 4
 
 
-def convolve(series, order, inset, left, first, width):
+def convolve(series, order, inset, left, first, width, widest):
     """Sums of ``series[j, left] * series[order - j, c]`` over ``inset <= j <= order - inset``.
 
-    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4 known to the compiler,
-    from ``first`` on. The terms left out at both ends are those with the coefficients of the highest orders.
+    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4, from ``first`` on, and
+    no register is wider than ``widest``; both are known to the compiler. The terms left out at both ends are
+    those with the coefficients of the highest orders.
     """
     sums = np.zeros(width)
     for j in range(inset, order - inset + 1):
@@ -68,22 +71,30 @@ def gather_tangents(series, order, n, first, stride, y):
 
 
 @overload(convolve, jit_options=HERE)
-def _convolve(series, order, inset, left, first, width):
-    return lambda series, order, inset, left, first, width: _convolve_in_registers(
-        series, order, inset, left, first, width
+def _overload_convolve(series, order, inset, left, first, width, widest):
+    return lambda series, order, inset, left, first, width, widest: _convolve_in_registers(
+        series, order, inset, left, first, width, widest
     )
 
 
 @overload(evaluate, jit_options=HERE)
-def _evaluate(series, order, s, first, width):
-    return lambda series, order, s, first, width: _evaluate_in_registers(
-        series, order, s, first, width, False
-    )
+def _overload_evaluate(series, order, s, first, width):
+    def in_registers(series, order, s, first, width):
+        together = width // (AT_ONCE * NARROW) * AT_ONCE * NARROW
+        _evaluate_in_registers(series, order, s, first, together, NARROW, AT_ONCE, False)
+        _evaluate_in_registers(series, order, s, first + together, width - together, NARROW, 1, False)
+
+    return in_registers
 
 
 @overload(evaluate_with_sizes, jit_options=HERE)
-def _evaluate_with_sizes(series, order, s, first, width):
-    return lambda series, order, s, first, width: _evaluate_in_registers(series, order, s, first, width, True)
+def _overload_evaluate_with_sizes(series, order, s, first, width):
+    def in_registers(series, order, s, first, width):
+        wide = width // WIDE * WIDE
+        _evaluate_in_registers(series, order, s, first, wide, WIDE, 1, True)
+        _evaluate_in_registers(series, order, s, first + wide, width - wide, NARROW, 1, True)
+
+    return in_registers
 
 
 class _Matrix:
@@ -105,48 +116,49 @@ class _Matrix:
         return cgutils.alloca_once_value(self.builder, self.address(row, column))
 
     def walk(self, walker, rows):
-        """Move on by a number of rows."""
+        """Move on by a number of rows; returns where it was."""
         builder = self.builder
         here = builder.load(walker)
         builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
         return here
 
+    def beside(self, address, columns):
+        """Address of an entry that many columns further."""
+        return self.builder.gep(address, [self.columns.type(columns)])
 
-def _add_product(builder, total, a, b):
-    product = builder.fmul(a, b, flags=FUSED)
-    builder.store(builder.fadd(builder.load(total), product, flags=FUSED), total)
 
-
-def _registers(width):
-    """How many columns each register takes, the widest first."""
-    return [WIDE] * (width // WIDE) + [NARROW] * (width % WIDE // NARROW)
+def _registers(width, widest):
+    """First column and width of each register, the widest first."""
+    whole = width // widest * widest
+    wide = [(place, widest) for place in range(0, whole, widest)]
+    return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
 
 
 @intrinsic(prefer_literal=True)
-def _convolve_in_registers(typing_context, series, order, inset, left, first, width):
-    if not isinstance(width, types.IntegerLiteral):
+def _convolve_in_registers(typing_context, series, order, inset, left, first, width, widest):
+    if not (isinstance(width, types.IntegerLiteral) and isinstance(widest, types.IntegerLiteral)):
         return None
-    widths = _registers(width.literal_value)
-    sums_at_once = max(1, SUMS_AT_ONCE // len(widths))
+    registers = _registers(width.literal_value, widest.literal_value)
+    sums_at_once = max(1, AT_ONCE // len(registers))
 
     def generate(context, builder, signature, arguments):
-        matrix, order, inset, left, first, _ = arguments
+        matrix, order, inset, left, first, *_ = arguments
         rows = _Matrix(context, builder, signature.args[0], matrix)
         number = order.type
         # The lowest orders of the columns come first: what was written last is the slowest to read.
         factor = rows.walker(builder.sub(order, inset), left)
         other = rows.walker(inset, first)
         totals = [
-            [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for each in widths]
+            [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for _, each in registers]
             for _ in range(sums_at_once)
         ]
 
         def add_term(row_of_totals):
-            a = builder.load(rows.walk(factor, -1))
-            b = rows.walk(other, 1)
-            for place, (each, total) in enumerate(zip(widths, row_of_totals, strict=True)):
-                there = builder.gep(b, [number(sum(widths[:place]))])
-                _add_product(builder, total, everywhere(builder, a, each), read(builder, there, each))
+            a, b = builder.load(rows.walk(factor, -1)), rows.walk(other, 1)
+            for (place, each), total in zip(registers, row_of_totals, strict=True):
+                term = read(builder, rows.beside(b, place), each)
+                product = multiply_add(builder, everywhere(builder, a, each), term, builder.load(total))
+                builder.store(product, total)
 
         terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
         terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
@@ -157,48 +169,55 @@ def _convolve_in_registers(typing_context, series, order, inset, left, first, wi
             with cgutils.for_range(builder, builder.urem(terms, number(sums_at_once)), intp=number):
                 add_term(totals[0])
         target = rows.address(order, first)
-        for place in range(len(widths)):
-            parts = [builder.load(each[place]) for each in totals]
+        for i, (place, _) in enumerate(registers):
+            parts = [builder.load(each[i]) for each in totals]
             while len(parts) > 1:
-                parts = [builder.fadd(*parts[i : i + 2]) for i in range(0, len(parts), 2)]
-            write(builder, parts[0], builder.gep(target, [number(sum(widths[:place]))]))
+                parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
+            write(builder, parts[0], rows.beside(target, place))
         return context.get_dummy_value()
 
-    return types.void(series, *(types.intp,) * 5), generate
+    return types.void(series, *(types.intp,) * 6), generate
 
 
 @intrinsic(prefer_literal=True)
-def _evaluate_in_registers(typing_context, series, order, s, first, width, sizes):
-    with_sizes = sizes.literal_value
+def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes, at_once, sizes):
+    """Horner's scheme on turns of ``at_once`` registers of ``lanes`` columns."""
+    lanes, at_once, with_sizes = (each.literal_value for each in (lanes, at_once, sizes))
 
     def generate(context, builder, signature, arguments):
-        matrix, order, s, first, width, _ = arguments
+        matrix, order, s, first, width, *_ = arguments
         rows = _Matrix(context, builder, signature.args[0], matrix)
         number = order.type
+        factor = everywhere(builder, s, lanes)
 
-        def column_of_values(column, lanes):
+        def one_turn(column):
             walker = rows.walker(order, column)
-            factor = everywhere(builder, s, lanes)
-            top = read(builder, rows.walk(walker, -1), lanes)
-            value = cgutils.alloca_once_value(builder, top)
-            size = cgutils.alloca_once_value(builder, built_in(builder, "fabs", lanes, top))
+            here = rows.walk(walker, -1)
+            places = [lanes * i for i in range(at_once)]
+            tops = [read(builder, rows.beside(here, place), lanes) for place in places]
+            values = [cgutils.alloca_once_value(builder, top) for top in tops]
+            sums = [
+                cgutils.alloca_once_value(builder, built_in(builder, "fabs", lanes, top))
+                for top in (tops if with_sizes else ())
+            ]
             with cgutils.for_range(builder, order, intp=number):
-                term = read(builder, rows.walk(walker, -1), lanes)
-                sums = [(value, term)]
-                if with_sizes:
-                    sums.append((size, built_in(builder, "fabs", lanes, term)))
-                for total, next_term in sums:
-                    product = builder.fmul(builder.load(total), factor, flags=FUSED)
-                    builder.store(builder.fadd(product, next_term, flags=FUSED), total)
-            for total, below in ((value, 1), (size, 2))[: 2 if with_sizes else 1]:
-                write(builder, builder.load(total), rows.address(builder.add(order, number(below)), column))
+                here = rows.walk(walker, -1)
+                terms = [read(builder, rows.beside(here, place), lanes) for place in places]
+                for value, term in zip(values, terms, strict=True):
+                    builder.store(multiply_add(builder, builder.load(value), factor, term), value)
+                for total, term in zip(sums, terms, strict=False):
+                    size = built_in(builder, "fabs", lanes, term)
+                    builder.store(multiply_add(builder, builder.load(total), factor, size), total)
+            for below, results in ((1, values), (2, sums)):
+                target = rows.address(builder.add(order, number(below)), column)
+                for place, result in zip(places, results, strict=False):
+                    write(builder, builder.load(result), rows.beside(target, place))
 
-        narrow = builder.and_(width, number(WIDE - NARROW))
-        middle = builder.sub(builder.add(first, width), narrow)
-        with cgutils.for_range_slice(builder, first, middle, number(WIDE), number) as (column, _):
-            column_of_values(column, WIDE)
-        with builder.if_then(builder.icmp_signed(">", narrow, number(0))):
-            column_of_values(middle, NARROW)
+        end = builder.add(first, width)
+        turn = number(lanes * at_once)
+        with cgutils.for_range_slice(builder, first, end, turn, number) as (column, _):
+            one_turn(column)
         return context.get_dummy_value()
 
-    return types.void(series, types.intp, types.float64, types.intp, types.intp, types.boolean), generate
+    integers = (types.intp,) * 4
+    return types.void(series, types.intp, types.float64, *integers, types.boolean), generate

@@ -11,10 +11,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
-from hybrid.kernels.codes import NARROW
+from hybrid.kernels.codes import NARROW, WIDE
 
-# Numbers in the widest register.
-WIDE = 2 * NARROW
 FUSED = ("contract",)
 # Small and called at every order: the call would cost as much as the work.
 HERE = {"_nrt": False, "forceinline": True}
@@ -56,6 +54,11 @@ def built_in(builder, name, width, *arguments):
     return builder.call(
         cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{width}f64"), arguments
     )
+
+
+def multiply_add(builder, a, b, c):
+    """``a * b + c``."""
+    return builder.fadd(c, builder.fmul(a, b, flags=FUSED), flags=FUSED)
 
 
 def place(context, builder, matrix_type, matrix, row, column):

@@ -11,12 +11,12 @@ from hybrid.kernels.layout import MATRIX
 
 
 @cache
-def compiled_convolve(width):
-    """The width of a convolution is known when it is compiled."""
+def compiled_convolve(width, widest):
+    """The width of a convolution and its registers' are known when it is compiled."""
 
     @njit(void(MATRIX, int64, int64, int64, int64))
     def compiled(series, order, inset, left, first):
-        convolve(series, order, inset, left, first, width)
+        convolve(series, order, inset, left, first, width, widest)
 
     return compiled
 
@@ -31,22 +31,23 @@ def compiled_evaluate_with_sizes(series, order, s, first, width):
     evaluate_with_sizes(series, order, s, first, width)
 
 
-def pair(columns=40):
+def pair(columns=44):
     series = np.random.default_rng(columns).normal(size=(33, columns))
     return series, series.copy()
 
 
-@pytest.mark.parametrize("width", [4, 8, 12, 20, 28])
+@pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 7, 28])
 @pytest.mark.parametrize("inset", [1, 2])
-def test_convolve(order, width, inset):
+@pytest.mark.parametrize("widest", [4, 8])
+def test_convolve(order, width, inset, widest):
     series, plain = pair()
-    compiled_convolve(width)(series, order, inset, 3, 7)
-    convolve(plain, order, inset, 3, 7, width)
+    compiled_convolve(width, widest)(series, order, inset, 3, 7)
+    convolve(plain, order, inset, 3, 7, width, widest)
     np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
 
 
-@pytest.mark.parametrize("width", [4, 8, 12, 20, 28])
+@pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
 @pytest.mark.parametrize("order", [0, 1, 2, 28, 30])
 @pytest.mark.parametrize(
     ("plain_function", "compiled"),
