@@ -299,4 +299,6 @@ def hybrid_points(
 
 def join(chunks: list[tuple[Any, ...]]) -> tuple[np.ndarray, ...]:
     """Concatenate the columns of rows of arrays."""
+    if len(chunks) == 1:
+        return chunks[0]
     return tuple(np.concatenate(column) for column in zip(*chunks, strict=True))
