@@ -272,7 +272,8 @@ class Trajectory:
     @property
     def t(self) -> float:
         """Current time."""
-        return float(self.run.count[codes.CYCLE] * self.model.period + self.run.clock[codes.PHASE])
+        run = self.run
+        return run.count.item(codes.CYCLE) * self.model.period + run.clock.item(codes.PHASE)
 
     @property
     def x(self) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -147,7 +148,7 @@ class _Recorder:
         while code == codes.RECORD_FULL:
             code = trajectory.advance(t1, self.record, max_jumps)
             self._file()
-        jumps = Jumps(trajectory.system, *join(self.jumps))
+        jumps = Jumps(trajectory.system, *(join(self.jumps) or _no_jumps(trajectory.model.dimension)))
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, int(run.count[codes.MODE]))
         names = np.array(trajectory.system.mode_names)
@@ -179,8 +180,7 @@ class _Recorder:
     def _file(self) -> None:
         record, period = self.record, self.trajectory.model.period
         steps, jumps, grazings = record.used.tolist()
-        # The first columns have the shapes, even where there is nothing in them.
-        if jumps or not self.jumps:
+        if jumps:
             self.jumps.append(_jump_columns(record, jumps, period))
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
@@ -213,6 +213,12 @@ def _step_columns(record: Any, used: int, period: float) -> tuple[np.ndarray, ..
     cycle, mode, j = record.step_place[:used].T
     phase, h = record.step_time[:used].T
     return cycle * period + phase, h.copy(), mode.copy(), j.copy(), record.step_coefficients[:used].copy()
+
+
+@cache
+def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
+    """Columns of jumps, empty, so that any number of arcs can have the same."""
+    return _jump_columns(empty_record(dimension, 0), 0, 0.0)
 
 
 def _jump_columns(record: Any, used: int, period: float) -> tuple[np.ndarray, ...]:

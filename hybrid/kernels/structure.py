@@ -80,12 +80,11 @@ class Structure:
 
     def __getattr__(self, name):
         """An array that came from a layout, when Python first looks at it."""
-        found = self.__dict__.get("views", {}).get(name)
-        if found is None:
+        known = self.__dict__
+        if name not in known.get("arrays", ()):
             raise AttributeError(f"{type(self).__name__} has no field {name!r}.")
-        offset, shape, dtype = found
-        view = np.ndarray(shape, dtype, self.block, offset)
-        self.__dict__[name] = view
+        shape, dtype, offset = known["arrays"][name]
+        known[name] = view = np.ndarray(shape, dtype, known["memory"], known["begin"] + offset)
         return view
 
     def __setattr__(self, name, value):
@@ -140,8 +139,8 @@ class Layout:
         self.moving = np.array(moving, dtype=np.int64)
         self.table = np.array(table, dtype=np.int64) + head * self.moving
         self.length = head + end
-        self.views = {
-            name: (head + offset, shapes[name], np.dtype(str(fields[name].dtype)))
+        self.arrays = {
+            name: (shapes[name], np.dtype(str(fields[name].dtype)), head + offset)
             for name, offset in offsets.items()
         }
 
@@ -155,13 +154,14 @@ class Layout:
 
     def _structure_in(self, memory):
         start = _address(memory)
-        skipped = -start % LINE
-        block = memory[skipped:]
-        table = np.ndarray(self.table.shape, np.int64, block)
-        np.multiply(self.moving, start + skipped, out=table)
-        table += self.table
+        begin = -start % LINE
+        table = np.ndarray(self.table.shape, np.int64, memory, begin)
+        np.multiply(self.moving, start + begin, table)
+        np.add(table, self.table, table)
         made = object.__new__(self.kind)
-        made.__dict__.update(self.shared, table=table, address=start + skipped, block=block, views=self.views)
+        made.__dict__.update(
+            self.shared, table=table, address=start + begin, memory=memory, begin=begin, arrays=self.arrays
+        )
         return made
 
 
