@@ -84,11 +84,12 @@ class CompiledSystem:
         return self._with(None)
 
     def _with(self, parameters: Mapping[str, float] | None) -> Any:
-        system = self.system
-        values = system.parameter_values(parameters)
+        from hybrid.system import period_at
+
+        values = self.system.parameter_values(parameters)
         # Runs may share a model.
         values.flags.writeable = False
-        return self._model.replace(parameters=values, period=system.forcing_period(parameters) or 0.0)
+        return self._model.replace(parameters=values, period=period_at(self.system, values) or 0.0)
 
     @cached_property
     def _model(self) -> Any:

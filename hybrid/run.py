@@ -298,7 +298,7 @@ class Trajectory:
 
     def propagators(self) -> dict[str, str]:
         """How each mode is advanced in this run."""
-        kinds = (codes.PROPAGATORS[kind] for kind in self.model.propagator)
+        kinds = [codes.PROPAGATORS[kind] for kind in self.model.propagator.tolist()]
         return dict(zip(self.system.mode_names, kinds, strict=True))
 
     def jacobian(self) -> np.ndarray:
@@ -363,15 +363,15 @@ class Trajectory:
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
-        singular = int(self.run.count[codes.SINGULAR_JUMPS])
+        count = self.run.count.tolist()
+        singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
+        grazed = count[codes.ILL_CONDITIONED] if self.tangents else 0
         if self.tangents and singular:
             return Status(
                 StatusCode.SINGULAR_SALTATION,
                 f"{singular} of {self.jumps} jumps had no saltation matrix: they grazed exactly.",
                 "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
             )
-        ambiguous = int(self.run.count[codes.ORDER_MATTERED])
-        grazed = int(self.run.count[codes.ILL_CONDITIONED]) if self.tangents else 0
         if code == codes.DONE and ambiguous:
             also = f" Besides, {grazed} of {self.jumps} jumps grazed within the tolerances." if grazed else ""
             return Status(
@@ -382,7 +382,7 @@ class Trajectory:
             )
         if code == codes.DONE and grazed:
             return self._grazed(grazed)
-        last = self.run.count[codes.LAST_FIRED]
+        last = count[codes.LAST_FIRED]
         name = self.system.transition_names[last] if last >= 0 else None
         return run_status(code, self.t, self.mode, name)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -88,7 +89,7 @@ def _time_span(t_span: Any) -> tuple[float, float]:
         t0, t1 = (float(t) for t in t_span)
     except (TypeError, ValueError):
         raise ArgumentError(f"t_span must be a pair (t0, t1); got {t_span!r}.") from None
-    if not (np.isfinite(t0) and np.isfinite(t1)):
+    if not (isfinite(t0) and isfinite(t1)):
         raise ArgumentError(f"t_span must be finite; got ({t0}, {t1}).")
     if t1 < t0:
         raise ArgumentError(
@@ -133,7 +134,7 @@ class _Recorder:
         n = trajectory.model.dimension
         degree = dense_degree(trajectory.method)
         # The state at the end is at hand without any polynomial.
-        only_the_end = times is not None and bool((times >= t1).all())
+        only_the_end = times is not None and not (times.size and times[0] < t1)
         self.record = empty_record(n, degree, 0 if only_the_end else STEPS_AT_ONCE, JUMPS_AT_ONCE)
         self.steps: list[tuple[np.ndarray, ...]] = []
         self.jumps: list[tuple[np.ndarray, ...]] = []
@@ -148,7 +149,8 @@ class _Recorder:
         while code == codes.RECORD_FULL:
             code = trajectory.advance(t1, self.record, max_jumps)
             self._file()
-        jumps = Jumps(trajectory.system, *(join(self.jumps) or _no_jumps(trajectory.model.dimension)))
+        columns = join(self.jumps) if self.jumps else _no_jumps(trajectory.model.dimension)
+        jumps = Jumps(trajectory.system, *columns)
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, int(run.count[codes.MODE]))
         names = np.array(trajectory.system.mode_names)

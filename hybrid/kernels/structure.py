@@ -12,6 +12,7 @@ Structures that are made again and again, with other numbers in arrays of the sa
 
 import math
 import struct
+from ctypes import addressof, c_char
 
 import numpy as np
 from numba import types
@@ -153,7 +154,8 @@ class Layout:
         return self._structure_in(np.empty(self.length + LINE, dtype=np.uint8))
 
     def _structure_in(self, memory):
-        start = _address(memory)
+        # Three times as fast again as the address of any array, which may be empty or read-only.
+        start = addressof(c_char.from_buffer(memory))
         begin = -start % LINE
         table = np.ndarray(self.table.shape, np.int64, memory, begin)
         np.multiply(self.moving, start + begin, table)
