@@ -100,6 +100,7 @@ def _fresh_work(layout: Any, method: Any) -> Any:
     return work
 
 
+@cache
 def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     """Where the arrays of a workspace lie."""
     from hybrid.kernels.layout import Work

@@ -64,11 +64,7 @@ class Structure:
         cls.places = {name: cls.numba_type.place(name) for name in cls.__annotations__}
 
     def __init__(self, **values):
-        fields = self.numba_type.fields
-        if values.keys() != fields.keys():
-            raise TypeError(
-                f"{type(self).__name__} has the fields {', '.join(fields)}; got {', '.join(values)}."
-            )
+        _check_fields(type(self), values)
         self.__dict__.update(values)
         words = []
         for name, words_of in self.words.items():
@@ -123,8 +119,7 @@ class Layout:
     def __init__(self, kind, shapes, **shared):
         self.kind, self.shared = kind, shared
         fields = kind.numba_type.fields
-        if shapes.keys() | shared.keys() != fields.keys():
-            raise TypeError(f"{kind.__name__} has the fields {', '.join(fields)}; got other ones.")
+        _check_fields(kind, [*shapes, *shared])
         table, moving, offsets, end = [], [], {}, 0
         for name in fields:
             if name in shapes:
@@ -150,7 +145,7 @@ class Layout:
         return self._structure_in(np.zeros(self.length + LINE, dtype=np.uint8))
 
     def unwritten(self):
-        """A new structure for whom writes arrays before reading them: they hold what the memory held."""
+        """A new structure whose arrays hold what the memory held: for those who write before they read."""
         return self._structure_in(np.empty(self.length + LINE, dtype=np.uint8))
 
     def _structure_in(self, memory):
@@ -165,6 +160,12 @@ class Layout:
             self.shared, table=table, address=start + begin, memory=memory, begin=begin, arrays=self.arrays
         )
         return made
+
+
+def _check_fields(kind, given):
+    fields = kind.numba_type.fields
+    if set(given) != fields.keys():
+        raise TypeError(f"{kind.__name__} has the fields {', '.join(fields)}; got {', '.join(given)}.")
 
 
 def _whole_lines(size):
