@@ -60,14 +60,15 @@ class Structure:
     def __init_subclass__(cls):
         """Derive the numba type from the annotations."""
         cls.numba_type = StructureType(cls.__name__, cls.__annotations__)
-        cls.words = {name: _words_of(name, kind) for name, kind in cls.__annotations__.items()}
-        cls.places = {name: cls.numba_type.place(name) for name in cls.__annotations__}
+        # Underscored: a field may have any other name.
+        cls._words = {name: _words_of(name, kind) for name, kind in cls.__annotations__.items()}
+        cls._places = {name: cls.numba_type.place(name) for name in cls.__annotations__}
 
     def __init__(self, **values):
         _check_fields(type(self), values)
         self.__dict__.update(values)
         words = []
-        for name, words_of in self.words.items():
+        for name, words_of in self._words.items():
             words += words_of(values[name])
         self._fill(np.array(words, dtype=np.int64))
 
@@ -78,10 +79,10 @@ class Structure:
     def __getattr__(self, name):
         """An array that came from a layout, when Python first looks at it."""
         known = self.__dict__
-        if name not in known.get("arrays", ()):
+        if name not in known.get("_arrays", ()):
             raise AttributeError(f"{type(self).__name__} has no field {name!r}.")
-        shape, dtype, offset = known["arrays"][name]
-        known[name] = view = np.ndarray(shape, dtype, known["memory"], known["begin"] + offset)
+        shape, dtype, offset = known["_arrays"][name]
+        known[name] = view = np.ndarray(shape, dtype, known["_memory"], known["_begin"] + offset)
         return view
 
     def __setattr__(self, name, value):
@@ -92,7 +93,7 @@ class Structure:
         copy, table = object.__new__(type(self)), self.table.copy()
         copy.__dict__.update(self.__dict__)
         for name, value in changes.items():
-            place, words = self.places[name], self.words[name](value)
+            place, words = self._places[name], self._words[name](value)
             table[place : place + len(words)] = words
             copy.__dict__[name] = value
         copy._fill(table)
@@ -127,7 +128,7 @@ class Layout:
                 entry = (end, *shapes[name])
                 end += _whole_lines(math.prod(shapes[name]) * WORD)
             else:
-                entry = kind.words[name](shared[name])
+                entry = kind._words[name](shared[name])
             table += entry
             moving += [name in shapes] + [False] * (len(entry) - 1)
         # The table itself comes first. An offset becomes an address when the block's own is added.
@@ -157,7 +158,7 @@ class Layout:
         np.add(table, self.table, table)
         made = object.__new__(self.kind)
         made.__dict__.update(
-            self.shared, table=table, address=start + begin, memory=memory, begin=begin, arrays=self.arrays
+            self.shared, table=table, address=start + begin, _memory=memory, _begin=begin, _arrays=self.arrays
         )
         return made
 
