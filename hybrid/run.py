@@ -93,6 +93,7 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
 
 
 def _fresh_work(layout: Any, method: Any) -> Any:
+    """Scratch memory that knows nothing of another run."""
     work = layout.zeros()
     if method.implicit:
         # There is no last step whose polynomial could be a guess.
