@@ -286,17 +286,22 @@ def hybrid_points(
     system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Times, jump counts, states, mode indices in order: step starts, states before jumps, the end."""
-    sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
     t_end, x_end, mode_end = end
-    t = np.concatenate([pieces.t, jumps.t, [t_end]])
-    j = np.concatenate([pieces.j, np.arange(len(jumps)), [len(jumps)]])
-    x = np.concatenate([pieces.coefficients[:, 0, :-1], jumps.x_minus, [x_end]])
-    mode = np.concatenate([pieces.mode, sources[jumps.transition], [mode_end]])
-    kind = np.concatenate([np.zeros(len(pieces.t)), np.ones(len(jumps)), [1]])
+    last = [t_end], [len(jumps)], [x_end], [mode_end]
+    starts = pieces.t, pieces.j, pieces.coefficients[:, 0, :-1], pieces.mode
+    if not len(jumps):
+        t, j, x, mode = join([starts, last])
+        return t, j, x, mode
+    sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
+    before = jumps.t, np.arange(len(jumps)), jumps.x_minus, sources[jumps.transition]
+    t, j, x, mode = join([starts, before, last])
+    kind = np.repeat([0, 1, 1], [len(pieces.t), len(jumps), 1])
     order = np.lexsort((kind, j))
     return t[order], j[order], x[order], mode[order]
 
 
 def join(chunks: list[tuple[Any, ...]]) -> tuple[np.ndarray, ...]:
     """Concatenate the columns of rows of arrays."""
+    if len(chunks) == 1:
+        return chunks[0]
     return tuple(np.concatenate(column) for column in zip(*chunks, strict=True))

@@ -52,11 +52,14 @@ class CompiledSystem:
         The generated source and what tracing could prove of the model.
     roles
         The compiled functions, in the order of ``ROLES``.
+    plans
+        What runs by one solver have in common, kept here by those who make runs.
     """
 
     system: HybridSystem
     emitted: Emitted
     roles: tuple[Any, ...]
+    plans: dict[Any, Any] = attrs.field(factory=dict, init=False)
 
     def __repr__(self) -> str:
         system = self.system
@@ -76,10 +79,19 @@ class CompiledSystem:
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
         """What the kernels are given: roles, parameter values, graph."""
-        system = self.system
-        return self._model.replace(
-            parameters=system.parameter_values(parameters), period=system.forcing_period(parameters) or 0.0
-        )
+        return self._with(parameters) if parameters else self._default_model
+
+    @cached_property
+    def _default_model(self) -> Any:
+        return self._with(None)
+
+    def _with(self, parameters: Mapping[str, float] | None) -> Any:
+        from hybrid.system import period_at
+
+        values = self.system.parameter_values(parameters)
+        # Runs may share a model.
+        values.flags.writeable = False
+        return self._model.replace(parameters=values, period=period_at(self.system, values) or 0.0)
 
     @cached_property
     def _model(self) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from math import floor, isfinite
 from typing import Any
 
 import attrs
@@ -11,6 +12,7 @@ import numpy as np
 
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
+from hybrid.first_mode import choose_mode
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.solvers import RungeKutta, Taylor
@@ -22,6 +24,7 @@ FIT_DEGREE = 8
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
 UNLIMITED = np.iinfo(np.int64).max
+DEFAULT_SOLVER = Taylor()
 
 
 @cache
@@ -86,44 +89,57 @@ def dense_degree(method: Any) -> int:
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     """Scratch memory for one run; ``columns`` are those of series."""
+    return _fresh_work(work_layout(method, dimension, tangents, columns), method)
+
+
+def _fresh_work(layout: Any, method: Any) -> Any:
+    """Scratch memory that knows nothing of another run."""
+    work = layout.zeros()
+    if method.implicit:
+        # There is no last step whose polynomial could be a guess.
+        work.systems[-1] = -1.0
+    return work
+
+
+@cache
+def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any:
+    """Where the arrays of a workspace lie."""
     from hybrid.kernels.layout import Work
+    from hybrid.kernels.structure import Layout
 
     n, length = dimension, dimension * (1 + tangents)
     stages, degree = len(method.a), len(method.interpolant) - 1
     coupled = len(method.b) if method.implicit else 0
-    systems = np.zeros((n + coupled * (n + 1) + 4, coupled * n))
-    systems[-1:] = -1.0
     nodes, fit = _fit_of_guards()
     # Whole vectors of columns are evaluated: there may be a few more than are in use.
-    width_of_series = -(-columns // (2 * codes.NARROW)) * 2 * codes.NARROW
+    width_of_series = -(-columns // codes.WIDE) * codes.WIDE
     width = max(dense_degree(method), FIT_DEGREE) + 4
-    return Work(
-        stages=np.zeros((stages, length + 1)),
-        speeds=np.zeros(stages),
-        trial=np.zeros(length),
-        new=np.zeros(length),
-        error=np.zeros(length),
-        second_error=np.zeros(length),
-        jacobian=np.zeros((n, n + 1)),
-        reset_jacobian=np.zeros((n, n + 1)),
-        gradient=np.zeros(n + 1),
-        scalar=np.zeros(1),
-        field=np.zeros(n),
-        field_after=np.zeros(n),
-        state=np.zeros(n),
-        settled=np.zeros(n),
-        saltation=np.zeros((n, n)),
-        coefficients=np.zeros((degree + 1, n)),
-        polynomial=np.zeros(width),
-        stack=np.zeros((ISOLATION_DEPTH, width)),
-        intervals=np.zeros((ISOLATION_DEPTH, 2)),
-        nodes=nodes,
-        fit=fit,
-        systems=systems,
-        pivots=np.zeros((coupled + 1) * n, dtype=np.int64),
-        series=np.zeros((codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0)),
-        weights=np.zeros((1, width_of_series)),
-    )
+    shapes = {
+        "stages": (stages, length + 1),
+        "speeds": (stages,),
+        "trial": (length,),
+        "new": (length,),
+        "error": (length,),
+        "second_error": (length,),
+        "jacobian": (n, n + 1),
+        "reset_jacobian": (n, n + 1),
+        "gradient": (n + 1,),
+        "scalar": (1,),
+        "field": (n,),
+        "field_after": (n,),
+        "state": (n,),
+        "settled": (n,),
+        "saltation": (n, n),
+        "coefficients": (degree + 1, n),
+        "polynomial": (width,),
+        "stack": (ISOLATION_DEPTH, width),
+        "intervals": (ISOLATION_DEPTH, 2),
+        "systems": (n + coupled * (n + 1) + 4, coupled * n),
+        "pivots": ((coupled + 1) * n,),
+        "series": (codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0),
+        "weights": (1, width_of_series),
+    }
+    return Layout(Work, shapes, nodes=nodes, fit=fit)
 
 
 @cache
@@ -139,22 +155,55 @@ def _fit_of_guards() -> tuple[np.ndarray, np.ndarray]:
 
 def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
     """A record with room for that many steps and jumps; none means that they are not kept."""
+    # Room that is not used costs nothing, not even to be cleared: all is written before it is read.
+    record = _record_layout(dimension, degree, steps, jumps).unwritten()
+    record.used[:] = 0
+    return record
+
+
+@cache
+def _record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
     from hybrid.kernels.layout import Record
+    from hybrid.kernels.structure import Layout
 
     n = dimension
-    return Record(
-        used=np.zeros(3, dtype=np.int64),
-        step_time=np.zeros((steps, 2)),
-        step_place=np.zeros((steps, 3), dtype=np.int64),
-        step_coefficients=np.zeros((steps, degree + 1, n + 1)),
-        jump_time=np.zeros((jumps, 2)),
-        jump_place=np.zeros((jumps, 3), dtype=np.int64),
-        jump_states=np.zeros((jumps, 2, n)),
-        jump_saltation=np.zeros((jumps, n, n)),
-        grazing_time=np.zeros((jumps, 3)),
-        grazing_place=np.zeros((jumps, 3), dtype=np.int64),
-        grazing_state=np.zeros((jumps, n)),
-    )
+    shapes = {
+        "used": (3,),
+        "step_time": (steps, 2),
+        "step_place": (steps, 3),
+        "step_coefficients": (steps, degree + 1, n + 1),
+        "jump_time": (jumps, 2),
+        "jump_place": (jumps, 3),
+        "jump_states": (jumps, 2, n),
+        "jump_saltation": (jumps, n, n),
+        "grazing_time": (jumps, 3),
+        "grazing_place": (jumps, 3),
+        "grazing_state": (jumps, n),
+    }
+    return Layout(Record, shapes)
+
+
+@cache
+def _run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
+    from hybrid.kernels.layout import Run
+    from hybrid.kernels.structure import Layout
+
+    n = dimension
+    shapes = {
+        "count": (codes.COUNTERS,),
+        "clock": (codes.CLOCKS,),
+        "y": (n * (1 + tangents),),
+        "side": (transitions,),
+        "on_guard": (transitions,),
+        "first_step": (modes,),
+        "scale": (n,),
+        "growth": (tangents,),
+        "trail": (3, n + 1),
+        "before": (n * tangents,),
+        "growth_before": (tangents,),
+        "instant": (n * (1 + n),),
+    }
+    return Layout(Run, shapes)
 
 
 def check_state(system: HybridSystem, x0: Any) -> np.ndarray:
@@ -163,14 +212,17 @@ def check_state(system: HybridSystem, x0: Any) -> np.ndarray:
         state = np.array(x0, dtype=float)
     except (TypeError, ValueError):
         raise ArgumentError(f"x0 must hold {system.dimension} numbers; got {x0!r}.") from None
-    names = ", ".join(system.state_names)
     if state.shape != (system.dimension,):
+        names = ", ".join(system.state_names)
         raise ArgumentError(
             f"x0 has shape {state.shape}; the state needs shape ({system.dimension},): {names}."
         )
-    for name, value in zip(system.state_names, state, strict=True):
-        if not np.isfinite(value):
-            raise ArgumentError(f"x0: component {name!r} must be finite; got {value}.")
+    values = state.tolist()
+    if not all(map(isfinite, values)):
+        name, value = next(
+            pair for pair in zip(system.state_names, values, strict=True) if not isfinite(pair[1])
+        )
+        raise ArgumentError(f"x0: component {name!r} must be finite; got {value}.")
     return state
 
 
@@ -183,7 +235,7 @@ def check_count(name: str, value: object, least: int) -> None:
 def check_solver(solver: object) -> RungeKutta:
     """The solver, or the default one; ArgumentError for anything else."""
     if solver is None:
-        return Taylor()
+        return DEFAULT_SOLVER
     if isinstance(solver, RungeKutta) and hasattr(solver, "tableau"):
         return solver
     raise ArgumentError(
@@ -195,7 +247,7 @@ def split_time(t: float, period: float) -> tuple[int, float]:
     """Time as whole periods and a phase in ``[0, period)``; without a period (0) all of it is phase."""
     if period <= 0.0:
         return 0, float(t)
-    cycle = int(np.floor(t / period))
+    cycle = floor(t / period)
     phase = t - cycle * period
     return (cycle + 1, 0.0) if phase >= period else (cycle, max(phase, 0.0))
 
@@ -222,7 +274,8 @@ class Trajectory:
     @property
     def t(self) -> float:
         """Current time."""
-        return float(self.run.count[codes.CYCLE] * self.model.period + self.run.clock[codes.PHASE])
+        run = self.run
+        return run.count.item(codes.CYCLE) * self.model.period + run.clock.item(codes.PHASE)
 
     @property
     def x(self) -> np.ndarray:
@@ -247,7 +300,7 @@ class Trajectory:
 
     def propagators(self) -> dict[str, str]:
         """How each mode is advanced in this run."""
-        kinds = (codes.PROPAGATORS[kind] for kind in self.model.propagator)
+        kinds = [codes.PROPAGATORS[kind] for kind in self.model.propagator.tolist()]
         return dict(zip(self.system.mode_names, kinds, strict=True))
 
     def jacobian(self) -> np.ndarray:
@@ -312,15 +365,15 @@ class Trajectory:
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
-        singular = int(self.run.count[codes.SINGULAR_JUMPS])
+        count = self.run.count.tolist()
+        singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
+        grazed = count[codes.ILL_CONDITIONED] if self.tangents else 0
         if self.tangents and singular:
             return Status(
                 StatusCode.SINGULAR_SALTATION,
                 f"{singular} of {self.jumps} jumps had no saltation matrix: they grazed exactly.",
                 "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
             )
-        ambiguous = int(self.run.count[codes.ORDER_MATTERED])
-        grazed = int(self.run.count[codes.ILL_CONDITIONED]) if self.tangents else 0
         if code == codes.DONE and ambiguous:
             also = f" Besides, {grazed} of {self.jumps} jumps grazed within the tolerances." if grazed else ""
             return Status(
@@ -331,7 +384,7 @@ class Trajectory:
             )
         if code == codes.DONE and grazed:
             return self._grazed(grazed)
-        last = self.run.count[codes.LAST_FIRED]
+        last = count[codes.LAST_FIRED]
         name = self.system.transition_names[last] if last >= 0 else None
         return run_status(code, self.t, self.mode, name)
 
@@ -354,112 +407,62 @@ def start(
     state = check_state(system, x0)
     solver = check_solver(solver)
     model = compiled.model(parameters)
-    if not isinstance(solver, Taylor):
-        model = model.replace(propagator=np.full_like(model.propagator, codes.RUNGE_KUTTA))
-    method = kernel_method(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
-    y = state if tangent is None else np.concatenate([state, tangent.T.ravel()])
-    run = _fresh_run(system, model, y, tangents, t0)
-    work = workspace(method, system.dimension, tangents, compiled.series_columns(tangents))
-    run.count[codes.MODE] = choose_mode(system, model, run, work, mode)
-    phase0 = split_time(t0, model.period)[1]
-    return Trajectory(
-        compiled,
-        model,
-        method,
-        run,
-        work,
-        tangents,
-        solver_parts(compiled, solver),
-        solver.max_steps,
-        phase0,
-    )
+    plan = plan_of(compiled, solver, tangents)
+    if plan.propagator is not None:
+        model = model.replace(propagator=plan.propagator)
+    run, phase0 = _fresh_run(plan.run_layout, model, state, tangent, t0)
+    work = _fresh_work(plan.work_layout, plan.method)
+    run.count[codes.MODE] = choose_mode(system, plan.parts, model, run, work, mode)
+    return Trajectory(compiled, model, plan.method, run, work, tangents, plan.parts, solver.max_steps, phase0)
 
 
-def _fresh_run(system: HybridSystem, model: Any, y: np.ndarray, tangents: int, t0: float) -> Any:
-    from hybrid.kernels.layout import Run
+@attrs.frozen(eq=False)
+class Plan:
+    """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
-    count = np.zeros(codes.COUNTERS, dtype=np.int64)
-    clock = np.zeros(codes.CLOCKS)
-    count[codes.CYCLE], clock[codes.PHASE] = split_time(t0, model.period)
+    ``propagator`` replaces that of the model if it is not None: only Taylor series come from the model.
+    """
+
+    method: Any
+    parts: Any
+    propagator: np.ndarray | None
+    run_layout: Any
+    work_layout: Any
+
+
+def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan:
+    """The plan of a run, made once; kernels that the run needs are loaded."""
+    plan = compiled.plans.get((solver, tangents))
+    if plan is None:
+        system, method = compiled.system, kernel_method(solver)
+        load_kernels("hybrid.kernels.first_mode")
+        n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
+        plan = Plan(
+            method,
+            solver_parts(compiled, solver),
+            None if isinstance(solver, Taylor) else np.full(modes, codes.RUNGE_KUTTA, dtype=np.int64),
+            _run_layout(n, tangents, modes, transitions),
+            work_layout(method, n, tangents, compiled.series_columns(tangents)),
+        )
+        compiled.plans[solver, tangents] = plan
+    return plan
+
+
+def _fresh_run(
+    layout: Any, model: Any, state: np.ndarray, tangent: np.ndarray | None, t0: float
+) -> tuple[Any, float]:
+    """The run at its start, in no mode yet, and the phase of the start."""
+    run, n = layout.zeros(), model.dimension
+    count, clock, y = run.count, run.clock, run.y
+    cycle, phase = split_time(t0, model.period)
+    count[codes.CYCLE], clock[codes.PHASE] = cycle, phase
     count[codes.PHASE_OF_RUN] = codes.ENTERING
     for slot in (codes.LAST_FIRED, codes.PENDING, codes.PREVIOUS_MODE):
         count[slot] = codes.NO_TRANSITION
     clock[codes.LAST_JUMP_PHASE] = np.nan
-    transitions = len(system.transitions)
-    return Run(
-        count=count,
-        clock=clock,
-        y=y,
-        side=np.zeros(transitions, dtype=np.int64),
-        on_guard=np.zeros(transitions, dtype=np.int64),
-        first_step=np.zeros(len(system.modes)),
-        scale=np.abs(y[: system.dimension]),
-        growth=np.zeros(tangents),
-        trail=np.zeros((3, system.dimension + 1)),
-        before=np.zeros(system.dimension * tangents),
-        growth_before=np.zeros(tangents),
-        instant=np.zeros(system.dimension * (1 + system.dimension)),
-    )
-
-
-def choose_mode(system: HybridSystem, model: Any, run: Any, work: Any, mode: str | None) -> int:
-    """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
-
-    Raises
-    ------
-    ModelError
-        If the name is unknown; if the state violates every mode, or more than one allows it.
-    """
-    if mode is not None:
-        index = system.mode_index(mode)
-        _guards_beyond(system, model, run, work, index)
-        return index
-    beyond = [_guards_beyond(system, model, run, work, index) for index in range(len(system.modes))]
-    if len(system.modes) == 1:
-        strictly = [name for name, on_guard in beyond[0] if not on_guard]
-        if not strictly:
-            return 0
-    allowed = [index for index, guards in enumerate(beyond) if not guards]
-    if len(allowed) == 1:
-        return allowed[0]
-    where = f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}"
-    if not allowed:
-        faults = "; ".join(
-            f"mode {name!r} is left through {', '.join(repr(guard) for guard, _ in guards)}"
-            for name, guards in zip(system.mode_names, beyond, strict=True)
-        )
-        raise ArgumentError(
-            f"{where} violates every mode: {faults}. Start on the other side of a guard, or name the mode "
-            "with mode= if that side is meant."
-        )
-    candidates = ", ".join(system.mode_names[index] for index in allowed)
-    raise ArgumentError(f"{where} is allowed in more than one mode: {candidates}. Choose one with mode=.")
-
-
-def _guards_beyond(
-    system: HybridSystem, model: Any, run: Any, work: Any, index: int
-) -> list[tuple[str, bool]]:
-    """Transitions of the mode whose guard the state is on, moving beyond, or beyond; and whether just on."""
-    from hybrid.kernels.guards import guard_values
-    from hybrid.kernels.jump import enter
-
-    phase = run.clock[codes.PHASE]
-    values = np.ones(2 * len(system.transitions))
-    entry(guard_values)(model, phase, run.y, values)
-    run.count[codes.MODE] = index
-    entry(enter)(model, run, work)
-    beyond = []
-    for i, transition in enumerate(system.transitions):
-        if transition.source != system.mode_names[index]:
-            continue
-        if not np.isfinite(values[i]):
-            raise ArgumentError(
-                f"Transition {transition.name!r}: the guard is {values[i]} at t = {phase}, "
-                f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}. "
-                "A guard must be finite wherever its mode runs."
-            )
-        allowed = values[i + len(system.transitions)] > 0.0
-        if transition.guard.direction == run.side[i] and allowed and not transition.is_marker:
-            beyond.append((transition.name, bool(run.on_guard[i])))
-    return beyond
+    y[:n] = state
+    if tangent is not None:
+        y[n:] = tangent.T.ravel()
+    np.abs(state, out=run.scale)
+    return run, phase

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -87,7 +89,7 @@ def _time_span(t_span: Any) -> tuple[float, float]:
         t0, t1 = (float(t) for t in t_span)
     except (TypeError, ValueError):
         raise ArgumentError(f"t_span must be a pair (t0, t1); got {t_span!r}.") from None
-    if not (np.isfinite(t0) and np.isfinite(t1)):
+    if not (isfinite(t0) and isfinite(t1)):
         raise ArgumentError(f"t_span must be finite; got ({t0}, {t1}).")
     if t1 < t0:
         raise ArgumentError(
@@ -99,7 +101,7 @@ def _time_span(t_span: Any) -> tuple[float, float]:
 
 def _sample_times(samples: ArrayLike, t0: float, t1: float) -> np.ndarray:
     times = np.array(samples, dtype=float)
-    if times.ndim != 1 or not np.all(np.diff(times) >= 0):
+    if times.ndim != 1 or (times.size > 1 and not np.all(np.diff(times) >= 0)):
         raise ArgumentError(f"samples must be increasing times of shape (N,); got shape {times.shape}.")
     if times.size and not (times[0] >= t0 and times[-1] <= t1):
         raise ArgumentError(
@@ -132,14 +134,13 @@ class _Recorder:
         n = trajectory.model.dimension
         degree = dense_degree(trajectory.method)
         # The state at the end is at hand without any polynomial.
-        only_the_end = times is not None and bool(np.all(times >= t1))
+        only_the_end = times is not None and not (times.size and times[0] < t1)
         self.record = empty_record(n, degree, 0 if only_the_end else STEPS_AT_ONCE, JUMPS_AT_ONCE)
-        # Nothing yet, in the right shapes.
-        self.steps = [_step_columns(self.record, 0.0)]
-        self.jumps = [_jump_columns(self.record, 0.0)]
-        self.grazings = [_grazing_columns(self.record, 0.0)]
-        self.states = np.full((0 if times is None else len(times), n), np.nan)
-        self.places = np.zeros((len(self.states), 2), dtype=np.int64)
+        self.steps: list[tuple[np.ndarray, ...]] = []
+        self.jumps: list[tuple[np.ndarray, ...]] = []
+        self.grazings: list[Grazing] = []
+        self.states = np.empty((0 if times is None else len(times), n))
+        self.places = np.empty((len(self.states), 2), dtype=np.int64)
         self.sampled = 0
 
     def run(self, t0: float, t1: float, max_jumps: int) -> HybridArc:
@@ -148,7 +149,8 @@ class _Recorder:
         while code == codes.RECORD_FULL:
             code = trajectory.advance(t1, self.record, max_jumps)
             self._file()
-        jumps = Jumps(trajectory.system, *join(self.jumps))
+        columns = join(self.jumps) if self.jumps else _no_jumps(trajectory.model.dimension)
+        jumps = Jumps(trajectory.system, *columns)
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, int(run.count[codes.MODE]))
         names = np.array(trajectory.system.mode_names)
@@ -162,13 +164,13 @@ class _Recorder:
             mode, j = self.places[: self.sampled].T
         return HybridArc(
             system=trajectory.system,
-            parameters=trajectory.model.parameters,
+            parameters=trajectory.model.parameters.copy(),
             t=t,
             j=j,
             x=x,
             mode=names[mode],
             jumps=jumps,
-            grazings=_grazings(trajectory.system, *join(self.grazings)),
+            grazings=tuple(self.grazings),
             status=trajectory.status(code),
             fundamental=trajectory.tangent_matrix if trajectory.tangents else None,
             propagators=trajectory.propagators(),
@@ -178,21 +180,23 @@ class _Recorder:
         )
 
     def _file(self) -> None:
-        period = self.trajectory.model.period
-        columns = _step_columns(self.record, period)
-        self.jumps.append(_jump_columns(self.record, period))
-        self.grazings.append(_grazing_columns(self.record, period))
+        record, period = self.record, self.trajectory.model.period
+        steps, jumps, grazings = record.used.tolist()
+        if jumps:
+            self.jumps.append(_jump_columns(record, jumps, period))
+        if grazings:
+            self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
-            self.steps.append(columns)
-        else:
-            self._sample(Pieces(*columns))
-        self.record.used[:] = 0
+            self.steps.append(_step_columns(record, steps, period))
+        elif steps:
+            self._sample(Pieces(*_step_columns(record, steps, period)))
+        record.used[:] = 0
 
     def _sample(self, pieces: Pieces) -> None:
         """States at the samples that fall before the current end of the run."""
         assert self.times is not None
-        stop = int(np.searchsorted(self.times, self.trajectory.t, side="left"))
-        if stop > self.sampled and len(pieces.t):
+        stop = int(self.times.searchsorted(self.trajectory.t, side="left"))
+        if stop > self.sampled:
             part = slice(self.sampled, stop)
             self.states[part], index = pieces.at(self.times[part])
             self.places[part] = np.column_stack([pieces.mode[index], pieces.j[index]])
@@ -201,21 +205,25 @@ class _Recorder:
     def _sample_end(self, t: float, x: np.ndarray, mode: int) -> None:
         """States at the samples that fall on the very end of the run: those after its last jump."""
         assert self.times is not None
-        stop = int(np.searchsorted(self.times, t, side="right"))
+        stop = int(self.times.searchsorted(t, side="right"))
         self.states[self.sampled : stop] = x
         self.places[self.sampled : stop] = mode, self.trajectory.jumps
         self.sampled = stop
 
 
-def _step_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
-    used = record.used[0]
+def _step_columns(record: Any, used: int, period: float) -> tuple[np.ndarray, ...]:
     cycle, mode, j = record.step_place[:used].T
     phase, h = record.step_time[:used].T
     return cycle * period + phase, h.copy(), mode.copy(), j.copy(), record.step_coefficients[:used].copy()
 
 
-def _jump_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
-    used = record.used[1]
+@cache
+def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
+    """Columns of jumps, empty, so that any number of arcs can have the same."""
+    return _jump_columns(empty_record(dimension, 0), 0, 0.0)
+
+
+def _jump_columns(record: Any, used: int, period: float) -> tuple[np.ndarray, ...]:
     cycle, transition, kind = record.jump_place[:used].T
     phase, transversality = record.jump_time[:used].T
     states = record.jump_states[:used]
@@ -230,16 +238,12 @@ def _jump_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
     )
 
 
-def _grazing_columns(record: Any, period: float) -> tuple[np.ndarray, ...]:
-    used = record.used[2]
+def _grazings(system: HybridSystem, record: Any, used: int, period: float) -> list[Grazing]:
     cycle, transition, j = record.grazing_place[:used].T
     phase, value, acceleration = record.grazing_time[:used].T
     x = record.grazing_state[:used].copy()
-    return cycle * period + phase, value.copy(), acceleration.copy(), transition.copy(), j.copy(), x
-
-
-def _grazings(system: HybridSystem, *columns: np.ndarray) -> tuple[Grazing, ...]:
-    return tuple(
+    columns = cycle * period + phase, j, transition, x, value, acceleration
+    return [
         Grazing(float(t), int(j), system.transition_names[transition], x, float(value), float(acceleration))
-        for t, value, acceleration, transition, j, x in zip(*columns, strict=True)
-    )
+        for t, j, transition, x, value, acceleration in zip(*columns, strict=True)
+    ]

@@ -53,10 +53,11 @@ SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
 
 def run_status(code: int, t: float, mode: str, transition: str | None) -> Status:
     """Status of a run that ended with a kernel code at time ``t`` in a mode, after a transition (or None)."""
+    if code == StatusCode.SUCCESS:
+        return SUCCESS
     where = f"at t = {t:.12g} in mode {mode!r}"
     last = f"transition {transition!r}" if transition else "a transition"
     texts = {
-        StatusCode.SUCCESS: ("Reached the end.", ""),
         StatusCode.MAX_STEPS: (
             f"The limit of steps was reached {where}.",
             "Raise max_steps of the solver, loosen its tolerances, or check whether the mode is stiff.",

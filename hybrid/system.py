@@ -5,6 +5,7 @@ from __future__ import annotations
 import keyword
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
+from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -260,7 +261,7 @@ def finite_number(what: str, value: object) -> float:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise ArgumentError(f"{what} must be a number; got {value!r}.") from None
-    if not np.isfinite(number):
+    if not isfinite(number):
         raise ArgumentError(f"{what} must be finite; got {number}.")
     return number
 
@@ -368,17 +369,7 @@ class HybridSystem:
 
     def forcing_period(self, overrides: Mapping[str, float] | None = None) -> float | None:
         """Forcing period at the given parameters, or None if the system declares none."""
-        if self.period is None:
-            return None
-        value: Any = self.period
-        if callable(value):
-            value = value(
-                named_values("Parameters", tuple(self.parameters), self.parameter_values(overrides))
-            )
-        period = finite_number("HybridSystem: period", value)
-        if period <= 0:
-            raise ArgumentError(f"HybridSystem: period must be positive; got {period}. Check the parameters.")
-        return period
+        return None if self.period is None else period_at(self, self.parameter_values(overrides))
 
     def _check_graph(self) -> None:
         if not self.modes:
@@ -418,3 +409,16 @@ class HybridSystem:
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a system of its own."
             )
+
+
+def period_at(system: HybridSystem, values: np.ndarray) -> float | None:
+    """Forcing period of a system at a parameter vector ``(m,)``, or None if it declares none."""
+    value: Any = system.period
+    if value is None:
+        return None
+    if callable(value):
+        value = value(named_values("Parameters", tuple(system.parameters), values))
+    period = finite_number("HybridSystem: period", value)
+    if period <= 0:
+        raise ArgumentError(f"HybridSystem: period must be positive; got {period}. Check the parameters.")
+    return period

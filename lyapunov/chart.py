@@ -19,7 +19,7 @@ from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode,
 from hybrid.kernels import codes
 from hybrid.load import load_kernels
 from hybrid.progress import progress_bar
-from hybrid.run import Trajectory, check_count, check_solver, check_state, solver_parts, start
+from hybrid.run import Trajectory, check_count, check_solver, check_state, plan_of, start
 from hybrid.section import strobe
 from hybrid.solvers import RungeKutta
 from lyapunov.spectrum import Estimate, first_vectors, interval_length
@@ -224,7 +224,7 @@ class _Rows:
         """Load all kernels that rows need, before threads do so at once."""
         load_kernels("lyapunov.kernels")
         load_kernels("hybrid.kernels.sections")
-        solver_parts(compile_system(self.system), self.solver)
+        plan_of(compile_system(self.system), self.solver, self.vectors.shape[1])
 
     def start(
         self, values: Mapping[str, float], state: np.ndarray, mode: str | None, vectors: np.ndarray | None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import attrs
@@ -179,6 +180,7 @@ def interval_length(trajectory: Trajectory, interval: float | None) -> float:
     return 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
 
 
+@cache
 def generic_directions(n: int, k: int) -> np.ndarray:
     """Orthonormal ``(n, k)``, the same every time, with no component along any axis that is zero.
 
@@ -186,6 +188,8 @@ def generic_directions(n: int, k: int) -> np.ndarray:
     exponent.
     """
     directions, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))
+    # All who ask get the same array.
+    directions.flags.writeable = False
     return np.asarray(directions[:, :k])
 
 

@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("hybrid", "models", "lyapunov")
 KERNELS_MAY_IMPORT = (
     "__future__",
+    "ctypes",
     "hybrid.kernels",
     "llvmlite",
     "math",

@@ -76,6 +76,12 @@ LIMIT_OF_CHATTER = 2
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 
+# What a guard says of the start of a run: nothing against it, that it lies on the guard and moves beyond, or
+# that it lies beyond.
+NO_OBJECTION = 0
+LEAVES = 1
+BEYOND = 2
+
 # Highest order of a series, and the order of exact ones: what the memory for them is laid out for.
 HIGHEST_ORDER = 28
 

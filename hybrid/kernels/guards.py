@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, njit, void
+from numba import njit
 
 from hybrid.kernels.bernstein import (
     NO_ROOT,
@@ -23,7 +23,7 @@ from hybrid.kernels.codes import (
     NO_TRANSITION,
     PHASE,
 )
-from hybrid.kernels.layout import ENTRY, EPSILON, INLINE, KERNEL, MODEL, VECTOR
+from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.step import attempt_again
 
 # A fitted guard polynomial is believed where it misses the guard by less than this, relative to its size: two
@@ -55,16 +55,6 @@ def allowed(model, transition, t, x, scalar):
     """Whether the condition of a transition holds; one without a condition always does."""
     scalar[0] = 1.0
     return guard_value(model, transition + model.target.shape[0], t, x, scalar) > 0.0
-
-
-@njit(void(MODEL, float64, VECTOR, VECTOR), **ENTRY)
-def guard_values(model, t, x, out):
-    """Every guard of the system, in whichever mode, and then every condition, into ``out (2 transitions,)``.
-
-    What has no condition keeps the value that is in ``out``.
-    """
-    for index in range(out.shape[0]):
-        model.guard(index, t, x, model.parameters, out[index : index + 1])
 
 
 @njit(**INLINE)

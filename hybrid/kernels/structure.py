@@ -5,9 +5,14 @@ that the compiler has to build. A structure is a table of words in memory instea
 and their numba types, an instance fills the table once, and ``work.gradient`` in a kernel reads the array's
 address and shape there. What the table holds never changes, so the compiler reads it once, not in each turn
 of a loop; what the arrays hold may change freely.
+
+Structures that are made again and again, with other numbers in arrays of the same shapes, come from a
+``Layout``.
 """
 
+import math
 import struct
+from ctypes import addressof, c_char
 
 import numpy as np
 from numba import types
@@ -22,6 +27,10 @@ from numba.extending import (
     unbox,
 )
 from numba.np.arrayobj import populate_array
+
+# Bytes of a word of a table, of a number in an array, and of a cache line.
+WORD = 8
+LINE = 64
 
 
 class StructureType(types.Type):
@@ -51,23 +60,30 @@ class Structure:
     def __init_subclass__(cls):
         """Derive the numba type from the annotations."""
         cls.numba_type = StructureType(cls.__name__, cls.__annotations__)
-        cls.words = {name: _words_of(name, kind) for name, kind in cls.__annotations__.items()}
+        # Underscored: a field may have any other name.
+        cls._words = {name: _words_of(name, kind) for name, kind in cls.__annotations__.items()}
+        cls._places = {name: cls.numba_type.place(name) for name in cls.__annotations__}
 
     def __init__(self, **values):
-        fields = self.numba_type.fields
-        if values.keys() != fields.keys():
-            raise TypeError(
-                f"{type(self).__name__} has the fields {', '.join(fields)}; got {', '.join(values)}."
-            )
+        _check_fields(type(self), values)
         self.__dict__.update(values)
         words = []
-        for name, words_of in self.words.items():
+        for name, words_of in self._words.items():
             words += words_of(values[name])
         self._fill(np.array(words, dtype=np.int64))
 
     def _fill(self, table):
         self.__dict__["table"] = table
         self.__dict__["address"] = _address(table)
+
+    def __getattr__(self, name):
+        """An array that came from a layout, when Python first looks at it."""
+        known = self.__dict__
+        if name not in known.get("_arrays", ()):
+            raise AttributeError(f"{type(self).__name__} has no field {name!r}.")
+        shape, dtype, offset = known["_arrays"][name]
+        known[name] = view = np.ndarray(shape, dtype, known["_memory"], known["_begin"] + offset)
+        return view
 
     def __setattr__(self, name, value):
         raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
@@ -77,11 +93,85 @@ class Structure:
         copy, table = object.__new__(type(self)), self.table.copy()
         copy.__dict__.update(self.__dict__)
         for name, value in changes.items():
-            place, words = self.numba_type.place(name), self.words[name](value)
+            place, words = self._places[name], self._words[name](value)
             table[place : place + len(words)] = words
             copy.__dict__[name] = value
         copy._fill(table)
         return copy
+
+
+class Layout:
+    """Where the arrays of a structure lie in one block of memory, for one set of shapes.
+
+    Each run needs dozens of arrays, and those of the next run have the same shapes. With their places worked
+    out once, a structure is one allocation and one sum of addresses; views of the arrays are made where
+    Python looks at them. Each array begins on a cache line. A layout never changes, so threads may share it.
+
+    Parameters
+    ----------
+    kind
+        The class of the structures.
+    shapes
+        Shape of each array that every structure has for itself, by name.
+    shared
+        The other fields, common to all structures.
+    """
+
+    def __init__(self, kind, shapes, **shared):
+        self.kind, self.shared = kind, shared
+        fields = kind.numba_type.fields
+        _check_fields(kind, [*shapes, *shared])
+        table, moving, offsets, end = [], [], {}, 0
+        for name in fields:
+            if name in shapes:
+                offsets[name] = end
+                entry = (end, *shapes[name])
+                end += _whole_lines(math.prod(shapes[name]) * WORD)
+            else:
+                entry = kind._words[name](shared[name])
+            table += entry
+            moving += [name in shapes] + [False] * (len(entry) - 1)
+        # The table itself comes first. An offset becomes an address when the block's own is added.
+        head = _whole_lines(len(table) * WORD)
+        self.moving = np.array(moving, dtype=np.int64)
+        self.table = np.array(table, dtype=np.int64) + head * self.moving
+        self.length = head + end
+        self.arrays = {
+            name: (shapes[name], np.dtype(str(fields[name].dtype)), head + offset)
+            for name, offset in offsets.items()
+        }
+
+    def zeros(self):
+        """A new structure whose arrays are zero."""
+        return self._structure_in(np.zeros(self.length + LINE, dtype=np.uint8))
+
+    def unwritten(self):
+        """A new structure whose arrays hold what the memory held: for those who write before they read."""
+        return self._structure_in(np.empty(self.length + LINE, dtype=np.uint8))
+
+    def _structure_in(self, memory):
+        # Three times as fast again as the address of any array, which may be empty or read-only.
+        start = addressof(c_char.from_buffer(memory))
+        begin = -start % LINE
+        table = np.ndarray(self.table.shape, np.int64, memory, begin)
+        np.multiply(self.moving, start + begin, table)
+        np.add(table, self.table, table)
+        made = object.__new__(self.kind)
+        made.__dict__.update(
+            self.shared, table=table, address=start + begin, _memory=memory, _begin=begin, _arrays=self.arrays
+        )
+        return made
+
+
+def _check_fields(kind, given):
+    fields = kind.numba_type.fields
+    if set(given) != fields.keys():
+        raise TypeError(f"{kind.__name__} has the fields {', '.join(fields)}; got {', '.join(given)}.")
+
+
+def _whole_lines(size):
+    """Bytes rounded up to whole cache lines."""
+    return -(-size // LINE) * LINE
 
 
 def _address(array):

@@ -234,6 +234,42 @@ class TestPeriodicTime:
         np.testing.assert_allclose(moved.x[-1], base.x[-1], atol=1e-11)
 
 
+class TestRunsKnowNothingOfOneAnother:
+    @pytest.mark.parametrize("samples", [None, [9.0]])
+    @pytest.mark.parametrize("solver", [None, hybrid.DOP853(), hybrid.RadauIIA()])
+    def test_the_same_run_again(self, oscillator, samples, solver):
+        def arc(x0, parameters=None):
+            return simulate(
+                oscillator,
+                x0,
+                (0.0, 9.0),
+                parameters=parameters,
+                solver=solver,
+                tangent=True,
+                samples=samples,
+            )
+
+        first = arc((0.1, 0.3))
+        arc((-1.0, 5.0), {"r": 0.3})
+        again = arc((0.1, 0.3))
+        for name in ("t", "j", "x", "parameters", "fundamental"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
+        np.testing.assert_array_equal(again.jumps.saltation, first.jumps.saltation)
+        assert (again.steps, again.rejected) == (first.steps, first.rejected)
+
+    def test_what_is_written_into_an_arc_stays_there(self, oscillator):
+        first = simulate(oscillator, (0.1, 0.3), (0.0, 9.0), tangent=True)
+        kept = first.x.copy(), first.parameters.copy()
+        for array in (first.x, first.parameters, first.fundamental, first.jumps.x_plus):
+            array[:] = np.nan
+        first.propagators.clear()
+        again = simulate(oscillator, (0.1, 0.3), (0.0, 9.0), tangent=True)
+        np.testing.assert_array_equal(again.x, kept[0])
+        np.testing.assert_array_equal(again.parameters, kept[1])
+        assert np.isfinite(again.fundamental).all()
+        assert again.propagators
+
+
 class TestMemory:
     def test_of_a_run_that_keeps_samples_does_not_grow(self, oscillator):
         import tracemalloc

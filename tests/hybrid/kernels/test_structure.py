@@ -7,7 +7,7 @@ numba = pytest.importorskip("numba")
 from numba import float64, int64, types  # noqa: E402
 
 from hybrid.kernels.layout import CUBE, INDICES, KERNEL, MATRIX, VECTOR  # noqa: E402
-from hybrid.kernels.structure import Structure  # noqa: E402
+from hybrid.kernels.structure import Layout, Structure  # noqa: E402
 
 
 @numba.cfunc(float64(float64))
@@ -84,3 +84,58 @@ def test_an_array_that_is_not_what_the_kernels_expect_is_refused(wrong):
 def test_missing_fields_are_named():
     with pytest.raises(TypeError, match="Box has the fields places, parcel; got places"):
         Box(places=np.zeros(2, dtype=np.int64))
+
+
+class TestLayout:
+    """Structures in one block of memory are as good as those of separate arrays."""
+
+    SHAPES = {"vector": (3,), "matrix": (2, 3)}  # noqa: RUF012
+
+    def layout(self):
+        return Layout(Parcel, self.SHAPES, count=-7, function=double, size=0.1, cube=parcel().cube)
+
+    def test_a_kernel_finds_what_python_wrote_and_the_other_way_round(self):
+        inner = self.layout().zeros()
+        assert not inner.vector.any()
+        inner.vector[:], inner.matrix[:] = parcel().vector, parcel().matrix
+        box, out = Layout(Box, {"places": (2,)}, parcel=inner).zeros(), np.zeros(6)
+        read(box, out)
+        np.testing.assert_array_equal(out, [-7.0, 0.1, 0.2, 3.0, 23.0, 233.0])
+        np.testing.assert_array_equal(inner.vector, [0.0, 1.0, 5.0])
+        np.testing.assert_array_equal(box.places, [0, 42])
+
+    def test_arrays_are_each_structures_own_and_begin_on_a_cache_line(self):
+        layout = self.layout()
+        one, other = layout.zeros(), layout.unwritten()
+        arrays = [getattr(each, name) for each in (one, other) for name in self.SHAPES]
+        for i, array in enumerate(arrays):
+            assert array.shape == self.SHAPES["vector" if array.ndim == 1 else "matrix"]
+            assert array.ctypes.data % 64 == 0
+            assert not any(np.shares_memory(array, later) for later in arrays[i + 1 :])
+        assert one.cube is other.cube
+        assert one.vector is one.vector
+
+    def test_an_array_outlives_its_structure(self):
+        vector = self.layout().zeros().vector
+        np.testing.assert_array_equal(vector, np.zeros(3))
+
+    def test_arrays_can_have_no_length(self):
+        inner = Layout(
+            Parcel, {"vector": (0,), "matrix": (0, 3), "cube": (2, 0, 1)}, count=1, function=double, size=1.0
+        )
+        assert inner.zeros().matrix.shape == (0, 3)
+        assert inner.zeros().cube.shape == (2, 0, 1)
+
+    def test_replace_changes_a_copy_with_the_same_arrays(self):
+        inner = self.layout().zeros()
+        changed = inner.replace(count=3)
+        assert (inner.count, changed.count) == (-7, 3)
+        assert np.shares_memory(inner.vector, changed.vector)
+
+    def test_what_is_no_field_is_named(self):
+        with pytest.raises(AttributeError, match="Parcel has no field 'vectro'"):
+            self.layout().zeros().vectro  # noqa: B018
+
+    def test_missing_fields_are_named(self):
+        with pytest.raises(TypeError, match="Box has the fields places, parcel; got places"):
+            Layout(Box, {"places": (2,)})

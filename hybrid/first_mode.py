@@ -1,0 +1,70 @@
+"""The mode that a run starts in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ArgumentError
+from hybrid.kernels import codes
+from hybrid.load import entry, load_kernels
+from hybrid.system import HybridSystem
+
+
+def choose_mode(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None) -> int:
+    """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
+
+    Raises
+    ------
+    ModelError
+        If the name is unknown; if the state violates every mode, or more than one allows it.
+    """
+    if mode is not None:
+        index = system.mode_index(mode)
+        _verdicts(system, parts, model, run, work, range(index, index + 1))
+        return index
+    modes = system.mode_names
+    verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
+    if len(modes) == 1 and codes.BEYOND not in verdicts:
+        return 0
+    violated = {tr.source for tr, verdict in zip(system.transitions, verdicts, strict=True) if verdict}
+    allowed = [name for name in modes if name not in violated]
+    if len(allowed) == 1:
+        return modes.index(allowed[0])
+    if not allowed:
+        raise ArgumentError(
+            f"{_place(system, run)} violates every mode: {_faults(system, verdicts)}. Start on the other "
+            "side of a guard, or name the mode with mode= if that side is meant."
+        )
+    candidates = ", ".join(allowed)
+    raise ArgumentError(
+        f"{_place(system, run)} is allowed in more than one mode: {candidates}. Choose one with mode=."
+    )
+
+
+def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: range) -> list[int]:
+    """What each transition that leaves one of the modes says of the start of the run, a code each."""
+    verdicts = np.zeros(len(system.transitions), dtype=np.int64)
+    kernel = entry(load_kernels("hybrid.kernels.first_mode").try_modes)
+    undefined = kernel(parts, model, run, work, modes.start, modes.stop, verdicts)
+    if undefined != codes.NO_TRANSITION:
+        raise ArgumentError(
+            f"Transition {system.transition_names[undefined]!r}: the guard is {work.scalar[0]} at "
+            f"t = {run.clock[codes.PHASE]}, {_place(system, run)}. "
+            "A guard must be finite wherever its mode runs."
+        )
+    return verdicts.tolist()
+
+
+def _faults(system: HybridSystem, verdicts: list[int]) -> str:
+    """The guards against each mode."""
+    against = [tr for tr, verdict in zip(system.transitions, verdicts, strict=True) if verdict]
+    return "; ".join(
+        f"mode {name!r} is left through {', '.join(repr(tr.name) for tr in against if tr.source == name)}"
+        for name in system.mode_names
+    )
+
+
+def _place(system: HybridSystem, run: Any) -> str:
+    return f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}"

@@ -1,0 +1,30 @@
+"""What the guards of modes say of the start of a run."""
+
+import math
+
+from numba import int64, njit
+
+from hybrid.kernels.codes import BEYOND, LEAVES, MODE, NO_TRANSITION, PHASE
+from hybrid.kernels.guards import allowed, guard_value
+from hybrid.kernels.layout import ENTRY, INDICES, MODEL, PARTS, RUN, WORK
+
+
+@njit(int64(PARTS, MODEL, RUN, WORK, int64, int64, INDICES), **ENTRY)
+def try_modes(parts, model, run, work, first, stop, verdicts):
+    """Enter the modes from ``first`` to before ``stop`` at the start of a run, one after the other.
+
+    What each of their guards says of it goes to ``verdicts (transitions,)``, which is zero before. Returns
+    the first transition whose guard is not finite, its value in ``work.scalar``, or NO_TRANSITION.
+    """
+    t = run.clock[PHASE]
+    for mode in range(first, stop):
+        run.count[MODE] = mode
+        parts.enter(model, run, work)
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            transition = model.outgoing[slot]
+            if not math.isfinite(guard_value(model, transition, t, run.y, work.scalar)):
+                return transition
+            crossed = model.direction[transition] == run.side[transition] and model.marker[transition] == 0
+            if crossed and allowed(model, transition, t, run.y, work.scalar):
+                verdicts[transition] = LEAVES if run.on_guard[transition] > 0 else BEYOND
+    return NO_TRANSITION
