@@ -20,6 +20,7 @@ from hybrid.kernels.codes import (
     PROPAGATORS,
     RUNGE_KUTTA,
     TAYLOR,
+    WIDE,
 )
 from hybrid.printer import assignments
 from hybrid.series import ONE_THEN_ZERO, PAIRS, Constants, NoSeries, Recurrences, directional
@@ -39,10 +40,9 @@ from hybrid.trace import Symbols
 ROOT = sympy.Symbol("w", positive=True)
 HALF = sympy.Rational(1, 2)
 ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
-# Columns between those of the guards and the others: the time since the step's start, the integral of div f.
+# Columns behind those of the guards: the time since the step's start, the integral of div f. All these are
+# written and evaluated as whole vectors; the others follow, the root of a desingularised mode first.
 CLOCK, DIVERGENCE, OTHERS = range(3)
-# Columns that whole vectors begin at.
-ALIGNED = 8
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
 
@@ -317,7 +317,7 @@ class _Body:
         self.symbols = symbols
         self.n = len(symbols.x)
         self.behind_guards = self.n + len(guards)
-        self.columns = self.behind_guards + OTHERS
+        self.columns = padded(self.behind_guards + OTHERS, WIDE)
         self.constants = Constants()
         self.preamble: list[str] = []
 
@@ -361,7 +361,7 @@ class _Body:
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
         self._place_blocks(block)
-        carried.start = padded(self.columns, ALIGNED)
+        carried.start = padded(self.columns, WIDE)
         lines = [
             *self.preamble,
             f"groups = (len(x)//{self.n} + {NARROW - 2})//{NARROW}",
@@ -383,6 +383,6 @@ class _Body:
 
     def _place_blocks(self, block: Recurrences) -> None:
         for i, rights in enumerate(block.blocks.values()):
-            self.columns = padded(self.columns, ALIGNED)
+            self.columns = padded(self.columns, WIDE)
             self.preamble.append(f"{block.prefix}b{i} = {self.columns}")
             self.columns += padded(len(rights))

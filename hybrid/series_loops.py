@@ -130,7 +130,7 @@ class TangentLoop:
         sums, inner = [], []
         for i, (left, rights) in enumerate(block.blocks.items()):
             base = f"{block.prefix}b{i}"
-            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)}, {NARROW})")
+            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)}, {WIDE})")
             inner += [
                 f"{block.prefix}s{i}_{place} = load(out, o, {base} + {NARROW * place})"
                 for place in range(len(rights))

@@ -21,8 +21,8 @@ AT_ONCE = 4
 def convolve(series, order, inset, left, first, width, widest):
     """Sums of ``series[j, left] * series[order - j, c]`` over ``inset <= j <= order - inset``.
 
-    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4, from ``first`` on, and
-    no register is wider than ``widest``; both are known to the compiler. The terms left out at both ends are
+    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4, from ``first`` on. No
+    register is wider than ``widest``; both are known to the compiler. The terms left out at both ends are
     those with the coefficients of the highest orders.
     """
     sums = np.zeros(width)
@@ -32,7 +32,10 @@ def convolve(series, order, inset, left, first, width, widest):
 
 
 def evaluate(series, order, s, first, width):
-    """Values at ``s`` of ``width`` series, a multiple of 4, from ``first`` on, into ``series[order + 1]``."""
+    """Values at ``s`` of ``width`` series, a multiple of 4, from ``first`` on, into ``series[order + 1]``.
+
+    The order is at least 1.
+    """
     total = series[order, first : first + width].copy()
     for o in range(order - 1, -1, -1):
         total = total * s + series[o, first : first + width]
@@ -80,9 +83,12 @@ def _overload_convolve(series, order, inset, left, first, width, widest):
 @overload(evaluate, jit_options=HERE)
 def _overload_evaluate(series, order, s, first, width):
     def in_registers(series, order, s, first, width):
-        together = width // (AT_ONCE * NARROW) * AT_ONCE * NARROW
-        _evaluate_in_registers(series, order, s, first, together, NARROW, AT_ONCE, False)
-        _evaluate_in_registers(series, order, s, first + together, width - together, NARROW, 1, False)
+        # Sums in one loop do not wait for each other.
+        four = width // (4 * NARROW) * 4 * NARROW
+        _evaluate_in_registers(series, order, s, first, four, NARROW, 4, False)
+        two = (width - four) // (2 * NARROW) * 2 * NARROW
+        _evaluate_in_registers(series, order, s, first + four, two, NARROW, 2, False)
+        _evaluate_in_registers(series, order, s, first + four + two, width - four - two, NARROW, 1, False)
 
     return in_registers
 
@@ -181,7 +187,10 @@ def _convolve_in_registers(typing_context, series, order, inset, left, first, wi
 
 @intrinsic(prefer_literal=True)
 def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes, at_once, sizes):
-    """Horner's scheme on turns of ``at_once`` registers of ``lanes`` columns."""
+    """Horner's scheme in ``s**2`` for even and for odd terms, on turns of ``at_once`` registers.
+
+    Each has ``lanes`` columns. Every step of the scheme waits for the one before: so there are half as many.
+    """
     lanes, at_once, with_sizes = (each.literal_value for each in (lanes, at_once, sizes))
 
     def generate(context, builder, signature, arguments):
@@ -189,29 +198,41 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
         rows = _Matrix(context, builder, signature.args[0], matrix)
         number = order.type
         factor = everywhere(builder, s, lanes)
+        square = everywhere(builder, builder.fmul(s, s), lanes)
+        places = [lanes * i for i in range(at_once)]
+        is_even = builder.icmp_signed("==", builder.and_(order, number(1)), number(0))
+        pairs = builder.ashr(builder.sub(order, number(1)), number(1))
+
+        def terms_of(row):
+            terms = [read(builder, rows.beside(row, place), lanes) for place in places]
+            sizes = [built_in(builder, "fabs", lanes, term) for term in terms] if with_sizes else []
+            return terms + sizes
 
         def one_turn(column):
             walker = rows.walker(order, column)
-            here = rows.walk(walker, -1)
-            places = [lanes * i for i in range(at_once)]
-            tops = [read(builder, rows.beside(here, place), lanes) for place in places]
-            values = [cgutils.alloca_once_value(builder, top) for top in tops]
-            sums = [
-                cgutils.alloca_once_value(builder, built_in(builder, "fabs", lanes, top))
-                for top in (tops if with_sizes else ())
-            ]
-            with cgutils.for_range(builder, order, intp=number):
-                here = rows.walk(walker, -1)
-                terms = [read(builder, rows.beside(here, place), lanes) for place in places]
-                for value, term in zip(values, terms, strict=True):
-                    builder.store(multiply_add(builder, builder.load(value), factor, term), value)
-                for total, term in zip(sums, terms, strict=False):
-                    size = built_in(builder, "fabs", lanes, term)
-                    builder.store(multiply_add(builder, builder.load(total), factor, size), total)
-            for below, results in ((1, values), (2, sums)):
-                target = rows.address(builder.add(order, number(below)), column)
-                for place, result in zip(places, results, strict=False):
-                    write(builder, builder.load(result), rows.beside(target, place))
+            # The sums that begin with the last term, and those that begin with the one before it.
+            last, other = (
+                [cgutils.alloca_once_value(builder, term) for term in terms_of(rows.walk(walker, -1))]
+                for _ in range(2)
+            )
+
+            def add_terms(totals):
+                for total, term in zip(totals, terms_of(rows.walk(walker, -1)), strict=True):
+                    builder.store(multiply_add(builder, builder.load(total), square, term), total)
+
+            with cgutils.for_range(builder, pairs, intp=number):
+                add_terms(last)
+                add_terms(other)
+            with builder.if_then(is_even):
+                add_terms(last)
+            results = []
+            for one, two in zip(last, other, strict=True):
+                ends = builder.load(one), builder.load(two)
+                even, odd = builder.select(is_even, *ends), builder.select(is_even, *reversed(ends))
+                results.append(multiply_add(builder, odd, factor, even))
+            for i, result in enumerate(results):
+                below = builder.add(order, number(1 + i // at_once))
+                write(builder, result, rows.address(below, builder.add(column, number(places[i % at_once]))))
 
         end = builder.add(first, width)
         turn = number(lanes * at_once)

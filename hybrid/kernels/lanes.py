@@ -90,7 +90,14 @@ def store(matrix, row, column, lanes):
 
 def store_row(matrix, row, column, numbers):
     """Write a tuple of numbers side by side, in registers that are filled up with zeros."""
-    matrix[row, column : column + len(numbers)] = numbers
+    filled = sum(_widths(len(numbers)))
+    matrix[row, column : column + filled] = [*numbers, *[0.0] * (filled - len(numbers))]
+
+
+def _widths(count):
+    """The registers that a row of that many numbers is written in."""
+    rest = count % WIDE
+    return [WIDE] * (count // WIDE) + ([] if rest == 0 else [NARROW if rest <= NARROW else WIDE])
 
 
 @overload(load, jit_options=HERE)
@@ -135,13 +142,11 @@ def _write_row(typing_context, matrix, row, column, numbers):
         *where, numbers = arguments
         values = cgutils.unpack_tuple(builder, numbers)
         address = place(context, builder, signature.args[0], *where)
-        for start in range(0, len(values), WIDE):
-            some = values[start : start + WIDE]
-            width = WIDE if len(some) > NARROW else NARROW
+        for i, width in enumerate(_widths(len(values))):
             vector = vector_of(width)([0.0] * width)
-            for lane, value in enumerate(some):
+            for lane, value in enumerate(values[WIDE * i : WIDE * (i + 1)]):
                 vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
-            write(builder, vector, builder.gep(address, [ir.IntType(64)(start)]))
+            write(builder, vector, builder.gep(address, [ir.IntType(64)(WIDE * i)]))
         return context.get_dummy_value()
 
     count = len(numbers)

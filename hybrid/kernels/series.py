@@ -27,6 +27,7 @@ from hybrid.kernels.codes import (
     PHASE,
     STEP_TOO_SMALL,
     STEPS,
+    WIDE,
 )
 from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.guards import guard_speed, guard_value
@@ -73,7 +74,7 @@ def weigh_state(series, n, rtol, atol, exact, weights):
     floor = SHARE * rtol * largest + TINY if exact else atol + TINY
     for i in range(0, n, NARROW):
         store(weights, 0, i, 1.0 / (floor + rtol * magnitude(load(series, 0, i))))
-    for i in range(n, whole_registers(n)):
+    for i in range(n, whole_registers(n, NARROW)):
         weights[0, i] = 0.0
 
 
@@ -91,9 +92,9 @@ def weigh_tangents(series, n, first, rtol, exact, weights):
 
 
 @njit(**INLINE)
-def whole_registers(width):
+def whole_registers(width, register):
     """The least number of columns, no less than ``width``, that fill vector registers."""
-    return (width + NARROW - 1) // NARROW * NARROW
+    return (width + register - 1) // register * register
 
 
 @njit(**KERNEL)
@@ -174,7 +175,7 @@ def step_until(series, clock, order, h, remaining, work):
 
     Beyond a zero of the root, where the mode ends, that clock would run backwards.
     """
-    degree = powers_on_step(series, clock + 2, order, h, 0, work.polynomial)
+    degree = powers_on_step(series, whole_registers(clock + 2, WIDE), order, h, 0, work.polynomial)
     to_bernstein(work.polynomial, degree)
     theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
     longest = min(theta, 1.0) * h
@@ -273,7 +274,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
     clock = n + guards if kind == DESINGULARISED else -1
     # State, guards, clock and divergence are evaluated together, in whole vectors.
-    front = whole_registers(n + guards + 2)
+    front = whole_registers(n + guards + 2, NARROW)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.count[STEPS] += 1

@@ -232,8 +232,8 @@ def test_series_on_the_clock_of_a_contact(power):
         slopes = np.arange(1, ORDER + 1)[:, None] * series[1:]
         return np.polynomial.polynomial.polyval(s, series), np.polynomial.polynomial.polyval(s, slopes)
 
-    values, rates = value_and_rate(out[:, :6])
-    x, y, clock, w = values[0], values[1], values[3], values[5]
+    values, rates = value_and_rate(out[:, :9])
+    x, y, clock, w = values[0], values[1], values[3], values[8]
     assert w == pytest.approx(np.sqrt(x), rel=1e-14)
     assert rates[3] == pytest.approx(w, rel=1e-14)
     assert rates[0] == pytest.approx(w * y, rel=1e-13)
