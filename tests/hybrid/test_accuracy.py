@@ -104,7 +104,8 @@ def test_a_chaotic_run_beyond_its_digits_says_so():
     assert found.status.code == StatusCode.NOT_CONVERGED
     assert "Runs at tighter tolerances agree on the first" in str(found.status)
     assert found.jumps[0] < 1e-9
-    assert found.jumps[-1] > 0.1
+    # Jumps lie on a lattice of half units: one by one those of different orbits may coincide.
+    assert np.median(found.jumps[-10:]) > 0.1
     assert found.x.max() > 0.1
 
 
