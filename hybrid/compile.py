@@ -75,7 +75,8 @@ class CompiledSystem:
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
         groups = -(-tangents // NARROW)
-        return max(each.tangent_start + groups * each.tangent_columns for each in self.emitted.propagators)
+        widest = max(each.tangent_columns for each in self.emitted.propagators)
+        return self.emitted.tangent_start + groups * widest
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
         """What the kernels are given: roles, parameter values, graph."""
@@ -119,7 +120,7 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
-            tangent_start=_indices(propagator.tangent_start for propagator in self.emitted.propagators),
+            tangent_start=self.emitted.tangent_start,
             tangent_columns=_indices(propagator.tangent_columns for propagator in self.emitted.propagators),
             period=0.0,
         )

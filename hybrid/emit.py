@@ -18,11 +18,13 @@ import sympy
 
 from hybrid.derivative import COMPLEX_STEP, complex_step_error, symbolic_jacobian
 from hybrid.errors import ModelError
+from hybrid.kernels.codes import WIDE
 from hybrid.names import PARAMETERS, STATE, plain_class
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
 from hybrid.propagator import Boundary, Propagator, propagator
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
+from hybrid.series_loops import padded
 from hybrid.symbolic import JUMPING, ONE, ZERO, Select
 from hybrid.trace import Symbols, TraceError, model_symbols, trace
 
@@ -56,6 +58,8 @@ class Emitted:
         By mode: whether the field is proved not to depend on time.
     propagators
         By mode: how it is best advanced.
+    tangent_start
+        The first column of tangent vectors in series.
     """
 
     source: str
@@ -64,6 +68,7 @@ class Emitted:
     affine_mode: tuple[bool, ...]
     autonomous: tuple[bool, ...]
     propagators: tuple[Propagator, ...]
+    tangent_start: int
 
 
 def emit(system: HybridSystem) -> Emitted:
@@ -89,7 +94,7 @@ def emit(system: HybridSystem) -> Emitted:
         _function("guard_gradient", [guard.derivative for guard in guards]),
         _function("reset", [reset.value for reset in resets]),
         _function("reset_jacobian", [reset.derivative for reset in resets]),
-        _function("series", [each.statements for each in propagators], "index, t, x, p, order, out"),
+        _function("series", _placed(propagators), "index, t, x, p, order, out"),
     )
     symbols = writer.symbols
     return Emitted(
@@ -99,7 +104,29 @@ def emit(system: HybridSystem) -> Emitted:
         affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
         propagators=tuple(propagators),
+        tangent_start=_tangent_start(propagators),
     )
+
+
+def _placed(propagators: Sequence[Propagator]) -> list[list[str]]:
+    """The bodies of the series of all modes, each with its columns in the matrix that they share.
+
+    Every mode has a table of its own, which stays when another mode writes its series.
+    """
+    table, vectors = max(each.columns for each in propagators), _tangent_start(propagators)
+    bodies = []
+    for each in propagators:
+        bodies.append(
+            [f"table = {table}", f"vectors = {vectors}", *each.statements] if each.statements else []
+        )
+        table += each.table_columns
+    return bodies
+
+
+def _tangent_start(propagators: Sequence[Propagator]) -> int:
+    """The first column of tangent vectors: behind those of the state and behind all tables."""
+    whole = max(each.columns for each in propagators) + sum(each.table_columns for each in propagators)
+    return padded(whole, WIDE)
 
 
 @attrs.frozen

@@ -22,6 +22,7 @@ from hybrid.kernels.codes import (
     TAYLOR,
     WIDE,
 )
+from hybrid.linear_series import LinearForm, linear_form, table_statements
 from hybrid.printer import assignments
 from hybrid.series import ONE_THEN_ZERO, PAIRS, Constants, NoSeries, Recurrences, directional
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
@@ -68,18 +69,19 @@ class Propagator:
     reason
         What tracing found.
     statements
-        Body of the mode in the role ``series``.
-    tangent_start
-        Columns before those of the tangent vectors.
-    tangent_columns
-        Columns that four tangent vectors need.
+        Body of the mode in the role ``series``. ``table`` and ``vectors`` in it are the first columns of its
+        table and of the tangent vectors.
+    columns, table_columns, tangent_columns
+        Columns that the series need for the state and what it is made of, for a table that stays, and for
+        four tangent vectors.
     """
 
     kind: int
     degree: int
     reason: str
     statements: tuple[str, ...] = ()
-    tangent_start: int = 0
+    columns: int = 0
+    table_columns: int = 0
     tangent_columns: int = 0
 
     def __str__(self) -> str:
@@ -115,18 +117,22 @@ def _series(
         return Propagator(
             DESINGULARISED, 0, "half-integer powers of a guard, on the clock dt = w ds", *written
         )
-    written = _write(field, guards, symbols)
     jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
     if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
-        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *written)
+        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *_write(field, guards, symbols))
     if not all(_elementary(entry, symbols) for entry in field):
+        written = _write(field, guards, symbols)
         return Propagator(TAYLOR, 0, "affine, its forcing has no short series", *written)
     powers = [_polynomial(guard, symbols) for guard in guards] or [1]
     degree = _degree(field, jacobian, symbols) * max(powers) * (0 not in powers)
-    if degree > HIGHEST_ORDER:
-        degree = 0
-    how = f"polynomials of degree {degree}" if degree else "affine in the state"
-    return Propagator(EXACT, degree, how, *written)
+    if 0 < degree <= HIGHEST_ORDER:
+        written = _write(field, guards, symbols)
+        return Propagator(EXACT, degree, f"polynomials of degree {degree}", *written)
+    harmonics = _harmonics([*field, *guards], symbols)
+    form = linear_form(field, guards, harmonics, symbols)
+    if form is None:
+        return Propagator(EXACT, 0, "affine in the state", *_write(field, guards, symbols))
+    return Propagator(EXACT, 0, "affine in the state", *_write_linear(form, harmonics, len(guards), symbols))
 
 
 def _simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
@@ -215,7 +221,7 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 
 def _write(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
-) -> tuple[tuple[str, ...], int, int]:
+) -> tuple[tuple[str, ...], int, int, int]:
     body = _Body(symbols, guards)
     block = body.block({}, (symbols.t, ONE_THEN_ZERO))
     seeds = _seeds(symbols)
@@ -224,9 +230,21 @@ def _write(
     return body.assemble(block, symbols.x, *_state(symbols), field, guards, trace, tangents, seeds)
 
 
+def _write_linear(
+    form: LinearForm, harmonics: dict[sympy.Expr, sympy.Symbol], guards: int, symbols: Symbols
+) -> tuple[tuple[str, ...], int, int, int]:
+    n, constants = len(symbols.x), Constants()
+    begun = [f"start{i}" for i in range(len(harmonics))]
+    starts = [*_state(symbols)[1], *begun, "1.0"]
+    lines, table, tangents = table_statements(form, n, constants, starts)
+    groups = f"groups = (len(x)//{n} + {NARROW - 2})//{NARROW}"
+    lines = [groups, *constants.statements(), *assignments(begun, list(harmonics)), *lines]
+    return tuple(lines), padded(n + guards + OTHERS, WIDE), table, tangents
+
+
 def _write_desingularised(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols
-) -> tuple[tuple[str, ...], int, int]:
+) -> tuple[tuple[str, ...], int, int, int]:
     """Series on the clock ``dt = w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
 
     All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
@@ -346,8 +364,8 @@ class _Body:
         trace: sympy.Expr,
         tangents: Sequence[sympy.Expr],
         seeds: dict[sympy.Symbol, sympy.Symbol],
-    ) -> tuple[tuple[str, ...], int, int]:
-        """The statements, where the columns of tangent vectors begin, and how many four of them need."""
+    ) -> tuple[tuple[str, ...], int, int, int]:
+        """The statements, and the numbers of columns as in ``Propagator``."""
         vectors = Recurrences(
             dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, block, lanes=True
         )
@@ -361,7 +379,6 @@ class _Body:
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
         self._place_blocks(block)
-        carried.start = padded(self.columns, WIDE)
         lines = [
             *self.preamble,
             f"groups = (len(x)//{self.n} + {NARROW - 2})//{NARROW}",
@@ -379,7 +396,7 @@ class _Body:
                 ]
             ),
         ]
-        return tuple(lines), carried.start, carried.columns
+        return tuple(lines), padded(self.columns, WIDE), 0, carried.columns
 
     def _place_blocks(self, block: Recurrences) -> None:
         for i, rights in enumerate(block.blocks.values()):

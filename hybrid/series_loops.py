@@ -96,7 +96,7 @@ class StateLoop:
 
 
 class TangentLoop:
-    """Statements for the series of four tangent vectors at a time, whose columns begin at ``start``.
+    """Statements for the series of four tangent vectors at a time, whose columns begin at ``vectors``.
 
     The four coefficients of a component are one vector, those of the components stand one after the other,
     behind them what is multiplied by common factors.
@@ -104,7 +104,7 @@ class TangentLoop:
 
     def __init__(self, seeds: Sequence[sympy.Symbol], block: Recurrences) -> None:
         block.rows |= {seed: f"v + {NARROW * i}" for i, seed in enumerate(seeds)}
-        self.start, self.components, self.block = 0, len(seeds), block
+        self.components, self.block = len(seeds), block
         self.values: list[str] = []
 
     def compute(self, rates: Sequence[sympy.Expr]) -> None:
@@ -120,7 +120,7 @@ class TangentLoop:
         """Order zero, and of the vectors themselves order one."""
         later = self._later("1", "{}")
         return [
-            f"spread_tangents(x, {self.components}, out, {self.start}, {self.columns})",
+            f"spread_tangents(x, {self.components}, out, vectors, {self.columns})",
             *self._each([*self.block.first, *later]),
         ]
 
@@ -150,5 +150,5 @@ class TangentLoop:
         for i, rights in enumerate(self.block.blocks.values()):
             bases.append(f"{self.block.prefix}b{i} = v + {place}")
             place += NARROW * len(rights)
-        start = f"v = {self.start} + g*{self.columns}"
+        start = f"v = vectors + g*{self.columns}"
         return ["for g in range(groups):", *indented([start, *bases, *statements])]

@@ -86,6 +86,19 @@ def first_crossing(coefficients, degree, side, direction, stack):
     return start + (end - start) * simple_root(stack[top][2:], degree, -side), side
 
 
+@njit(**INLINE)
+def halve(stack, top, degree):
+    """Cut the part in a row of the stack in two: the left half, to be looked at first, goes on top."""
+    row, left = stack[top], stack[top + 1]
+    middle = 0.5 * (row[0] + row[1])
+    left[0], left[1] = row[0], middle
+    row[0] = middle
+    for level in range(degree, -1, -1):
+        left[2 + degree - level] = row[2]
+        for i in range(2, level + 2):
+            row[i] = 0.5 * (row[i] + row[i + 1])
+
+
 @njit(**KERNEL)
 def bracket_crossing(coefficients, degree, side, direction, stack):
     """Where ``first_crossing`` is: ``(start, end, row, side after it)``, a place if the ends agree.
@@ -119,14 +132,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
             if direction == 0 or direction == first:
                 return start, start, top, side
         if variations > 1 and end - start > CLUSTER:
-            middle = 0.5 * (start + end)
-            left = stack[top + 1]
-            left[0], left[1] = start, middle
-            row[0] = middle
-            for level in range(degree, -1, -1):
-                left[2 + degree - level] = row[2]
-                for i in range(2, level + 2):
-                    row[i] = 0.5 * (row[i] + row[i + 1])
+            halve(stack, top, degree)
             top += 1
             continue
         if last != side:

@@ -51,6 +51,24 @@ def evaluate_with_sizes(series, order, s, first, width):
     series[order + 2, first : first + width] = total
 
 
+def combine(series, order, table, width, numbers):
+    """Every order of the first ``width`` columns as a combination of blocks of as many columns of that order.
+
+    The blocks begin at the column ``table``, one for each of the tuple ``numbers``.
+    """
+    rows = series[: order + 1, table : table + width * len(numbers)]
+    series[: order + 1, :width] = np.tensordot(rows.reshape(order + 1, -1, width), numbers, (1, 0))
+
+
+def combine_tangents(series, order, table, width, first, n):
+    """Every order but zero of four tangent vectors from order zero and the first ``n`` blocks of a table."""
+    rows = series[1 : order + 1, table : table + width * n].reshape(order, n, width)[:, :, :n]
+    vectors = series[0, first : first + NARROW * n].reshape(n, NARROW)
+    series[1 : order + 1, first : first + NARROW * n] = np.einsum("oji,jl->oil", rows, vectors).reshape(
+        order, -1
+    )
+
+
 @register_jitable
 def spread_tangents(y, n, series, first, stride):
     """Tangent vectors from ``y (n (1 + k),)`` into order zero of their series: four at a time, by component.
@@ -77,6 +95,20 @@ def gather_tangents(series, order, n, first, stride, y):
 def _overload_convolve(series, order, inset, left, first, width, widest):
     return lambda series, order, inset, left, first, width, widest: _convolve_in_registers(
         series, order, inset, left, first, width, widest
+    )
+
+
+@overload(combine, jit_options=HERE)
+def _overload_combine(series, order, table, width, numbers):
+    return lambda series, order, table, width, numbers: _combine_in_registers(
+        series, order, table, width, numbers
+    )
+
+
+@overload(combine_tangents, jit_options=HERE)
+def _overload_combine_tangents(series, order, table, width, first, n):
+    return lambda series, order, table, width, first, n: _combine_tangents_in_registers(
+        series, order, table, width, first, n
     )
 
 
@@ -242,3 +274,58 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
 
     integers = (types.intp,) * 4
     return types.void(series, types.intp, types.float64, *integers, types.boolean), generate
+
+
+def _weighted_sum(builder, factors, terms):
+    total = builder.fmul(factors[0], terms[0])
+    for factor, term in zip(factors[1:], terms[1:], strict=True):
+        total = multiply_add(builder, factor, term, total)
+    return total
+
+
+@intrinsic(prefer_literal=True)
+def _combine_in_registers(typing_context, series, order, table, width, numbers):
+    if not isinstance(width, types.IntegerLiteral):
+        return None
+    width = width.literal_value
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, table, _, numbers = arguments
+        rows = _Matrix(context, builder, signature.args[0], matrix)
+        number, numbers = order.type, cgutils.unpack_tuple(builder, numbers)
+        target, source = rows.walker(number(0), number(0)), rows.walker(number(0), table)
+        with cgutils.for_range(builder, builder.add(order, number(1)), intp=number):
+            here, there = rows.walk(target, 1), rows.walk(source, 1)
+            for place, lanes in _registers(width, WIDE):
+                factors = [everywhere(builder, each, lanes) for each in numbers]
+                blocks = [rows.beside(there, width * c + place) for c in range(len(numbers))]
+                terms = [read(builder, block, lanes) for block in blocks]
+                write(builder, _weighted_sum(builder, factors, terms), rows.beside(here, place))
+        return context.get_dummy_value()
+
+    numbers = types.UniTuple(types.float64, len(numbers))
+    return types.void(series, *(types.intp,) * 3, numbers), generate
+
+
+@intrinsic(prefer_literal=True)
+def _combine_tangents_in_registers(typing_context, series, order, table, width, first, n):
+    if not (isinstance(width, types.IntegerLiteral) and isinstance(n, types.IntegerLiteral)):
+        return None
+    width, n = width.literal_value, n.literal_value
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, table, _, first, _ = arguments
+        rows = _Matrix(context, builder, signature.args[0], matrix)
+        number = order.type
+        start = rows.address(number(0), first)
+        vectors = [read(builder, rows.beside(start, NARROW * j), NARROW) for j in range(n)]
+        target, source = rows.walker(number(1), first), rows.walker(number(1), table)
+        with cgutils.for_range(builder, order, intp=number):
+            here, there = rows.walk(target, 1), rows.walk(source, 1)
+            for i in range(n):
+                entries = [builder.load(rows.beside(there, width * j + i)) for j in range(n)]
+                factors = [everywhere(builder, entry, NARROW) for entry in entries]
+                write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
+        return context.get_dummy_value()
+
+    return types.void(series, *(types.intp,) * 5), generate

@@ -30,8 +30,8 @@ class Model(Structure):
     run. ``boundary`` is 1 for a transition that a state on the far side of its guard
     must take at once, 0 for one that only crossings fire; ``accumulates_to`` the mode after a complete
     chatter, or -1. ``propagator`` says how each mode is advanced; ``degree`` is that of its solutions in time
-    where they are polynomials, else 0. ``tangent_start`` and ``tangent_columns`` say where in its series the
-    tangent vectors are, four at a time. ``period`` is 0 without a forcing period.
+    where they are polynomials, else 0. ``tangent_start`` is the first column of tangent vectors in series,
+    ``tangent_columns`` how many four of them have in each mode. ``period`` is 0 without a forcing period.
     """
 
     flow: VECTOR_ROLE
@@ -54,7 +54,7 @@ class Model(Structure):
     accumulates_to: INDICES
     propagator: INDICES
     degree: INDICES
-    tangent_start: INDICES
+    tangent_start: int64
     tangent_columns: INDICES
     period: float64
 

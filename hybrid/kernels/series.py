@@ -202,7 +202,7 @@ def accept_series(model, run, tangents, order, h, work):
         run.y[i] = series[order + 1, i]
     if tangents > 0:
         run.clock[DIVERGENCE] += series[order + 1, n + last - first + 1]
-        start, stride = model.tangent_start[mode], model.tangent_columns[mode]
+        start, stride = model.tangent_start, model.tangent_columns[mode]
         for g in range((tangents + NARROW - 1) // NARROW):
             evaluate(series, order, h, start + g * stride, NARROW * n)
         gather_tangents(series, order + 1, n, start, stride, run.y[: n * (1 + tangents)])
@@ -281,7 +281,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
     h = math.inf
     if degree == 0:
-        start, stride = model.tangent_start[mode], model.tangent_columns[mode]
+        start, stride = model.tangent_start, model.tangent_columns[mode]
         groups = (tangents + NARROW - 1) // NARROW
         h = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
     if not h > 0.0:

@@ -2,13 +2,15 @@
 
 import math
 
+import numpy as np
 from numba import njit
 
-from hybrid.kernels.bernstein import NO_ROOT, SETTLED, bracket_crossing, stays
+from hybrid.kernels.bernstein import NO_ROOT, SETTLED, bracket_crossing, halve, stays
 from hybrid.kernels.codes import (
     DESINGULARISED,
     EXACT,
     GRAZING_PLACE,
+    HIGHEST_ORDER,
     MODE,
     NO_TRANSITION,
 )
@@ -17,6 +19,16 @@ from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 
 # Share of a guard's size that the high powers of its series may reach together to be left out of a proof.
 NEGLIGIBLE = 0.01
+
+
+# What a power of the variable is divided by in Bernstein form: ``C(degree, k)``.
+SHARES = np.array(
+    [[1.0 / max(math.comb(n, k), 1) for k in range(HIGHEST_ORDER + 1)] for n in range(HIGHEST_ORDER + 1)]
+)
+# Verdicts on a guard.
+CLEAR, CROSSES, UNKNOWN = range(3)
+# What is not decided on a part this short is left to the whole polynomial.
+SHORTEST_PART = 0.2
 
 
 @njit(**INLINE)
@@ -40,10 +52,8 @@ def slope_at(series, column, order, s):
 @njit(**INLINE)
 def to_bernstein(coefficients, degree):
     """Turn power coefficients on ``[0, 1]`` into Bernstein coefficients, in place."""
-    share = 1.0
     for k in range(1, degree + 1):
-        share *= k / (degree - k + 1.0)
-        coefficients[k] *= share
+        coefficients[k] *= SHARES[degree, k]
     for level in range(degree):
         # A view of what changes: its indices are plainly not negative, and need no check in the inner loop.
         row = coefficients[level : degree + 1]
@@ -61,10 +71,8 @@ def raised_to_bernstein(coefficients, order, degree):
     The scaled power coefficients are the forward differences of the result at its start: as many times as
     there are of them they are summed up.
     """
-    share = 1.0
     for k in range(1, order + 1):
-        share *= k / (degree - k + 1.0)
-        coefficients[k] *= share
+        coefficients[k] *= SHARES[degree, k]
     highest = coefficients[order]
     for k in range(order, degree + 1):
         coefficients[k] = highest
@@ -130,6 +138,40 @@ def falls_throughout(coefficients, degree, slope_of_rest, side):
         if not (coefficients[i] - coefficients[i + 1]) * side > least:
             return False
     return degree > 0
+
+
+@njit(**KERNEL)
+def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
+    """What the leading powers of a guard prove of it, part by part from the start of the step on.
+
+    ``stack[0, 2:]`` are their Bernstein coefficients; all the others add no more than ``rest``, and no more
+    than ``slope_of_rest`` to the slope; ``last`` is the value at the end of the step, with them. Returns
+    ``CLEAR`` if the guard keeps beyond ``band`` on its side; ``CROSSES`` and a part with signs that differ at
+    its ends if it falls throughout that part, and is clear before; else ``UNKNOWN``. The row of ``stack``
+    that holds the part comes last.
+    """
+    top = 0
+    stack[0, 0], stack[0, 1] = 0.0, 1.0
+    while top >= 0:
+        row = stack[top]
+        start, end = row[0], row[1]
+        if stays(row[2:], degree, side, band + rest):
+            top -= 1
+            continue
+        # At the ends of the step the values are known as they are.
+        left = row[2] * side - (rest + band if start > 0.0 else 0.0)
+        right = last * side if end == 1.0 else row[2 + degree] * side + rest
+        if (
+            left > 0.0
+            and right < 0.0
+            and falls_throughout(row[2:], degree, slope_of_rest * (end - start), side)
+        ):
+            return CROSSES, start, end, top
+        if end - start < SHORTEST_PART:
+            return UNKNOWN, start, end, top
+        halve(stack, top, degree)
+        top += 1
+    return CLEAR, 0.0, 1.0, 0
 
 
 @njit(**KERNEL)
@@ -225,19 +267,16 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
         # The second cheap proof: the leading powers keep to their side, even if the others are against it.
         degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
         to_bernstein(work.polynomial, degree)
-        if stays(work.polynomial, degree, side, band + rest):
+        for k in range(degree + 1):
+            work.stack[0, 2 + k] = work.polynomial[k]
+        verdict, start, end, row = judge_leading(
+            degree, rest, order * rest, side, band, series[order + 1, column], work.stack
+        )
+        if verdict == CLEAR:
             continue
-        # And the third: there is one crossing, of a guard that falls throughout.
-        start, end = work.polynomial[0], series[order + 1, column]
-        falls = falls_throughout(work.polynomial, degree, order * rest, side)
-        if (
-            falls
-            and on_guard == 0
-            and start * side > 0.0
-            and end * side < 0.0
-            and crosses_towards(model.direction[transition], -side)
-        ):
-            theta = root_between(series, column, order, 0, h, 0.0, h, start, end) / h
+        if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
+            ends = work.stack[row, 2], work.stack[row, 2 + degree]
+            theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
             if theta < earliest:
                 earliest, fired = theta, transition
             continue

@@ -62,9 +62,9 @@ def series_of(system, x, *, t=0.0, mode=0, tangents=0, vectors=None, parameters=
     vectors = np.eye(n)[:tangents] if vectors is None else vectors
     tangents = len(vectors)
     y = np.concatenate([x, *vectors])
-    out = np.full((ORDER + 2, 240), np.nan)
+    out = np.full((ORDER + 3, 400), np.nan)
     scope["series"](mode, t, y, np.array(parameters), ORDER, out)
-    start, stride = emitted.propagators[mode].tangent_start, emitted.propagators[mode].tangent_columns
+    start, stride = emitted.tangent_start, emitted.propagators[mode].tangent_columns
     columns = [start + i // NARROW * stride + NARROW * np.arange(n) + i % NARROW for i in range(tangents)]
     return out[: ORDER + 1, :start], [out[: ORDER + 1, each] for each in columns]
 
