@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from numba import float64, int64, njit, void
 
-from hybrid.kernels.columns import convolve, evaluate, evaluate_with_sizes
+from hybrid.kernels.columns import (
+    combine,
+    combine_tangents,
+    convolve,
+    evaluate,
+    evaluate_with_sizes,
+    gather_tangents,
+    spread_tangents,
+)
 from hybrid.kernels.layout import MATRIX
 
 
@@ -62,3 +70,47 @@ def test_evaluate(order, width, plain_function, compiled):
     np.testing.assert_allclose(series[order + 1, 2 : 2 + width], powers @ terms, rtol=1e-12, atol=1e-14)
     if plain_function is evaluate_with_sizes:
         np.testing.assert_allclose(series[order + 2, 2 : 2 + width], powers @ abs(terms), rtol=1e-12)
+
+
+@pytest.mark.parametrize("width", [4, 8, 12])
+@pytest.mark.parametrize("count", [1, 2, 7])
+@pytest.mark.parametrize("order", [1, 2, 28])
+def test_combine(order, count, width):
+    numbers = tuple(np.random.default_rng(count).normal(size=count))
+
+    @njit
+    def compiled(series):
+        combine(series, order, 14, width, numbers)
+
+    series, plain = pair(100)
+    compiled(series)
+    combine(plain, order, 14, width, numbers)
+    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+    expected = sum(number * plain[order, 14 + width * c] for c, number in enumerate(numbers))
+    assert series[order, 0] == pytest.approx(expected, rel=1e-13, abs=1e-14)
+
+
+@pytest.mark.parametrize(("n", "width"), [(1, 4), (2, 8), (4, 8), (7, 12)])
+def test_combine_tangents(n, width):
+    @njit
+    def compiled(series):
+        combine_tangents(series, 9, 5, width, 100, n)
+
+    series, plain = pair(140)
+    compiled(series)
+    combine_tangents(plain, 9, 5, width, 100, n)
+    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+    matrix = plain[9, 5 : 5 + width * n].reshape(n, width)[:, :n].T
+    vectors = plain[0, 100 : 100 + 4 * n].reshape(n, 4)
+    np.testing.assert_allclose(series[9, 100 : 100 + 4 * n].reshape(n, 4), matrix @ vectors, rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 4, 6])
+def test_tangent_vectors_there_and_back(count):
+    y = np.random.default_rng(count).normal(size=3 * (1 + count))
+    series, back = np.zeros((2, 60)), y.copy()
+    spread_tangents(y, 3, series, 8, 20)
+    back[3:] = 0.0
+    gather_tangents(series, 0, 3, 8, 20, back)
+    np.testing.assert_array_equal(back, y)
+    assert series[0, 8 + 4] == y[4]
