@@ -64,6 +64,9 @@ def linear_form(
 
 def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbol) -> list[sympy.Expr] | None:
     """Coefficients of the variables, then the constant term; None if it is not affine in them alone."""
+    # The derivative of a sign is zero too.
+    if not entry.is_polynomial(*variables):
+        return None
     slopes = [entry.diff(variable) for variable in variables]
     rest = entry.xreplace(dict.fromkeys(variables, sympy.Integer(0)))
     if any(each.has(time, *variables) for each in (*slopes, rest)):

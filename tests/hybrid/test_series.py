@@ -260,3 +260,31 @@ def test_the_reason_is_told():
     reasons = [str(each) for each in emit(contact(1.25)).propagators]
     assert reasons[0] == "exact (affine in the state)"
     assert reasons[1].startswith("Runge-Kutta pair (it has the power 5/4 of a guard")
+
+
+def test_a_linear_mode_has_a_table_and_what_only_looks_linear_has_none():
+    def tables(field):
+        return [each.table_columns for each in emit(system_of(field)).propagators]
+
+    assert tables(lambda t, x, p: (x.y, np.cos(3 * t) - x.x)) == [4 * 5]
+    assert tables(lambda t, x, p: (x.y, t * np.cos(3 * t) - x.x)) == [0]
+    assert tables(lambda t, x, p: (x.y, np.cos(3 * t) ** 2 - x.x)) == [0]
+    assert tables(lambda t, x, p: (x.y, -np.sign(x.y) - x.x)) == [0]
+
+
+def test_a_table_and_recurrences_agree():
+    """A guard that is not linear in the state and harmonics takes the mode's table away."""
+
+    def field(t, x, p):
+        return x.y, np.cos(3 * t + 1) * 2 - np.exp(-t / 2) - 4 * x.x - x.y / 5 + 1
+
+    wall = Transition("a", "a", Guard(lambda t, x, p: x.x - 2 + np.sin(t), +1), name="wall")
+    ramp = Transition("a", "a", Guard(lambda t, x, p: x.x - t**2, +1), name="ramp")
+    fast, slow = system_of(field, wall), system_of(field, wall, ramp)
+    assert [emit(each).propagators[0].table_columns > 0 for each in (fast, slow)] == [True, False]
+    out, vectors = series_of(fast, [0.5, -1.0], t=0.7, tangents=2)
+    expected, others = series_of(slow, [0.5, -1.0], t=0.7, tangents=2)
+    np.testing.assert_allclose(out[:, :3], expected[:, :3], rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(vectors, others, rtol=1e-13, atol=1e-15)
+    divergence = [0.0, -0.2, *[0.0] * (ORDER - 1)]
+    np.testing.assert_array_equal(out[:, 4], divergence)
