@@ -9,19 +9,34 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hybrid import beside
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 
 DRIVER = "hybrid.kernels.drive"
+# What every run needs besides: a second process compiles them meanwhile.
+EVENTS = ("hybrid.kernels.jump", "hybrid.kernels.corner")
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
     """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
-    folder = cache_directory() / f"kernels-{kernels_key()}"
-    kept = any(folder.rglob(f"{module.rpartition('.')[2]}.*.nbi"))
-    with compiled_into(folder), nullcontext() if kept else announced(MESSAGE):
-        return importlib.import_module(module)
+    kept = _kept(module)
+    if module == DRIVER and not kept:
+        beside.start([each for each in EVENTS if not _kept(each)])
+    with nullcontext() if kept else announced(MESSAGE):
+        if module in EVENTS:
+            beside.finish()
+        with compiled_into(_folder()):
+            return importlib.import_module(module)
+
+
+def _folder() -> Path:
+    return cache_directory() / f"kernels-{kernels_key()}"
+
+
+def _kept(module: str) -> bool:
+    return any(_folder().rglob(f"{module.rpartition('.')[2]}.*.nbi"))
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -129,11 +130,10 @@ def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
 @cache
 def _fit_of_guards() -> tuple[np.ndarray, np.ndarray]:
     """Nodes on [0, 1] and the matrix from values there to Bernstein coefficients."""
-    from scipy.special import comb
-
     j = np.arange(FIT_DEGREE + 1)
     nodes = 0.5 * (1 - np.cos(np.pi * j / FIT_DEGREE))
-    basis = comb(FIT_DEGREE, j) * nodes[:, None] ** j * (1 - nodes[:, None]) ** (FIT_DEGREE - j)
+    binomials = np.array([math.comb(FIT_DEGREE, k) for k in j.tolist()])
+    basis = binomials * nodes[:, None] ** j * (1 - nodes[:, None]) ** (FIT_DEGREE - j)
     return nodes, np.linalg.inv(basis)
 
 
@@ -442,13 +442,12 @@ def _guards_beyond(
 ) -> list[tuple[str, bool]]:
     """Transitions of the mode whose guard the state is on, moving beyond, or beyond; and whether just on."""
     from hybrid.kernels.guards import guard_values
-    from hybrid.kernels.jump import enter
 
     phase = run.clock[codes.PHASE]
     values = np.ones(2 * len(system.transitions))
     entry(guard_values)(model, phase, run.y, values)
     run.count[codes.MODE] = index
-    entry(enter)(model, run, work)
+    entry(load_kernels("hybrid.kernels.jump").enter)(model, run, work)
     beyond = []
     for i, transition in enumerate(system.transitions):
         if transition.source != system.mode_names[index]:
