@@ -34,12 +34,11 @@ def load_kernels(module: str = DRIVER) -> ModuleType:
 
 @cache
 def _import_numba() -> None:
-    """Import numba's array functions without SciPy's linear algebra, a fifth of a second that kernels need not.
+    """Import numba's array functions without SciPy's linear algebra, which kernels do not need.
 
-    They look for its BLAS as they are imported, which is there since this package requires SciPy. What calls
-    BLAS looks for it again.
+    They look for its BLAS as they are imported, and it takes a fifth of a second. It is there, since this
+    package requires SciPy; what calls BLAS looks for it again.
     """
-    import numba  # noqa: F401
     from numba.np import linalg
 
     look = linalg.ensure_blas
@@ -48,7 +47,7 @@ def _import_numba() -> None:
         from numba.np import arraymath
     finally:
         linalg.ensure_blas = look
-    arraymath.ensure_blas = look
+    vars(arraymath)["ensure_blas"] = look
 
 
 def _folder() -> Path:
