@@ -10,11 +10,9 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
-# What every step and every jump of a run goes through. Optimised by itself as well, it comes out faster by a
+# What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out faster by a
 # few parts in a hundred.
-THOROUGHLY = tuple(
-    f"hybrid.kernels.{name}" for name in ("series", "series_guards", "bernstein", "drive", "jump", "tangent")
-)
+THOROUGHLY = tuple(f"hybrid.kernels.{name}" for name in ("series", "series_guards", "tangent"))
 
 
 class _NoEnvironment:
