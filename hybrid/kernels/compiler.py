@@ -2,7 +2,7 @@
 
 Numba optimises every function by itself and makes machine code of it, before it links the function into its
 callers and optimises it there again. Nobody calls the machine code of a part, and what is optimised in the
-caller need not be before: left out, both are two fifths of the time that all kernels take.
+caller need not be before, with few exceptions: both together are a third of the time that all kernels take.
 """
 
 from numba.core.codegen import JITCodeLibrary
@@ -10,8 +10,8 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
-# What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out faster by a
-# few parts in a hundred.
+# What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out a few
+# parts in a hundred faster.
 THOROUGHLY = tuple(f"hybrid.kernels.{name}" for name in ("series", "series_guards", "tangent"))
 
 
