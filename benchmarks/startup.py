@@ -43,12 +43,12 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         cache = {"HYBRID_CACHE_DIR": folder}
         first = fresh_process(RUN, cache)
-        report("first run ever, empty cache", first, 30)
-        report("the next process", fastest_process(RUN, cache), 1.5)
+        report("first run ever, empty cache", first, 20)
+        report("the next process", fastest_process(RUN, cache), 1)
         report("first spectrum after that", fresh_process(SPECTRUM, cache))
-        report("the next process with a spectrum", fastest_process(SPECTRUM, cache), 1.5)
+        report("the next process with a spectrum", fastest_process(SPECTRUM, cache), 1)
         report("first run of a new model", fresh_process(OWN_MODEL, cache))
-        report("the next process with it", fastest_process(OWN_MODEL, cache), 1.5)
+        report("the next process with it", fastest_process(OWN_MODEL, cache), 1)
     table(["", "on the clock", "of a processor", "target"], rows)
     print("Said meanwhile:", first.messages.replace("\n", " ") or "nothing")
 

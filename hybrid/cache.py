@@ -34,6 +34,14 @@ def source_key(*texts: str) -> str:
     return digest.hexdigest()[:24]
 
 
+def write_whole(path: Path, text: str) -> None:
+    """Write a file whole or not at all: other processes may be doing the same, or reading it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.stem}.{os.getpid()}.{threading.get_ident()}")
+    draft.write_text(text, encoding="utf-8")
+    draft.replace(path)
+
+
 @contextmanager
 def compiled_into(folder: Path) -> Iterator[None]:
     """Let numba keep what is decorated inside this block in ``folder``, and nothing decorated elsewhere.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import sys
 from collections.abc import Mapping
 from functools import cached_property
@@ -14,13 +13,14 @@ from weakref import WeakKeyDictionary
 import attrs
 import numpy as np
 
-from hybrid.cache import announced, cache_directory, compiled_into, source_key
+from hybrid.cache import announced, compiled_into, source_key, write_whole
 from hybrid.errors import ArgumentError
+from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
-from hybrid.load import kernels_key, load_kernels
+from hybrid.load import load_kernels
 
 if TYPE_CHECKING:
-    from hybrid.emit import Emitted
+    from hybrid.emitted import Emitted
     from hybrid.system import HybridSystem
 
 ROLES = (
@@ -154,10 +154,8 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
         raise ArgumentError(f"system must be a HybridSystem; got {system!r}. Call the model's factory first.")
     compiled = _COMPILED.get(system)
     if compiled is None:
-        from hybrid.emit import emit
-
         load_kernels()
-        emitted = emit(system)
+        emitted = traced_or_kept(system)
         with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
             compiled = CompiledSystem(system, emitted, _compiled_roles(emitted))
         _COMPILED[system] = compiled
@@ -169,7 +167,7 @@ def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
         return _decorated(_executed(emitted), cached=False)
     if emitted.source not in _ROLES:
         # Series call a kernel, which becomes part of them.
-        folder = cache_directory() / f"models-{kernels_key()}"
+        folder = models_folder()
         namespace = _imported(_written(emitted.source, folder))
         with compiled_into(folder):
             _ROLES[emitted.source] = _decorated(namespace, cached=True)
@@ -201,13 +199,10 @@ def _executed(emitted: Emitted) -> dict[str, Any]:
 
 
 def _written(source: str, folder: Path) -> Path:
-    """The file that holds ``source``, written whole or not at all: other processes may be doing the same."""
+    """The file that holds ``source``."""
     path = folder / f"hybrid_model_{source_key(source)}.py"
     if not path.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        draft = folder / f".{path.stem}.{os.getpid()}"
-        draft.write_text(source, encoding="utf-8")
-        draft.replace(path)
+        write_whole(path, source)
     return path
 
 

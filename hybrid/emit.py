@@ -17,12 +17,13 @@ import attrs
 import sympy
 
 from hybrid.derivative import COMPLEX_STEP, complex_step_error, symbolic_jacobian
+from hybrid.emitted import Emitted, Propagator
 from hybrid.errors import ModelError
 from hybrid.kernels.codes import WIDE
 from hybrid.names import PARAMETERS, STATE, plain_class
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
-from hybrid.propagator import Boundary, Propagator, propagator
+from hybrid.propagator import Boundary, propagator
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
 from hybrid.series_loops import padded
 from hybrid.symbolic import JUMPING, ONE, ZERO, Select
@@ -33,42 +34,6 @@ if TYPE_CHECKING:
 
 # A cell of a matrix in the statements for a derivative.
 _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
-
-
-@attrs.frozen
-class Emitted:
-    """What the compiler needs to know of a system.
-
-    Parameters
-    ----------
-    source
-        Text of a module with the functions ``flow``, ``flow_jacobian``, ``variational_flow``, ``guard``,
-        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. Behind the
-        guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
-        model gives the same text, in any process.
-    opaque
-        What the text refers to by name: the model functions that tracing could not follow, to be
-        compiled themselves, and the named tuples they take. Empty if all were traced.
-    affine_guard
-        By transition: whether the guard's gradient, its slope in time included, is proved to depend on
-        parameters only.
-    affine_mode
-        By mode: whether the field's derivative in the state is proved not to depend on the state.
-    autonomous
-        By mode: whether the field is proved not to depend on time.
-    propagators
-        By mode: how it is best advanced.
-    tangent_start
-        The first column of tangent vectors in series.
-    """
-
-    source: str
-    opaque: dict[str, object]
-    affine_guard: tuple[bool, ...]
-    affine_mode: tuple[bool, ...]
-    autonomous: tuple[bool, ...]
-    propagators: tuple[Propagator, ...]
-    tangent_start: int
 
 
 def emit(system: HybridSystem) -> Emitted:

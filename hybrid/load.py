@@ -9,19 +9,53 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from hybrid import beside
 from hybrid.cache import announced, cache_directory, compiled_into, source_key
 
 DRIVER = "hybrid.kernels.drive"
+# What every run needs besides: a second process compiles them meanwhile.
+EVENTS = ("hybrid.kernels.jump", "hybrid.kernels.corner", "hybrid.kernels.first_mode")
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
     """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
-    folder = cache_directory() / f"kernels-{kernels_key()}"
-    kept = any(folder.rglob(f"{module.rpartition('.')[2]}.*.nbi"))
-    with compiled_into(folder), nullcontext() if kept else announced(MESSAGE):
-        return importlib.import_module(module)
+    kept = _kept(module)
+    if module == DRIVER and not kept:
+        beside.start([each for each in EVENTS if not _kept(each)])
+    with nullcontext() if kept else announced(MESSAGE):
+        if module in EVENTS:
+            beside.finish()
+        _import_numba()
+        with compiled_into(_folder()):
+            return importlib.import_module(module)
+
+
+@cache
+def _import_numba() -> None:
+    """Import numba's array functions without SciPy's linear algebra, which kernels do not need.
+
+    They look for its BLAS as they are imported, and it takes a fifth of a second. It is there, since this
+    package requires SciPy; what calls BLAS looks for it again.
+    """
+    from numba.np import linalg
+
+    look = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        from numba.np import arraymath
+    finally:
+        linalg.ensure_blas = look
+    vars(arraymath)["ensure_blas"] = look
+
+
+def _folder() -> Path:
+    return cache_directory() / f"kernels-{kernels_key()}"
+
+
+def _kept(module: str) -> bool:
+    return any(_folder().rglob(f"{module.rpartition('.')[2]}.*.nbi"))
 
 
 @cache

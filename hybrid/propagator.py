@@ -12,12 +12,12 @@ import attrs
 import sympy
 from sympy.core.parameters import distribute
 
+from hybrid.emitted import Propagator
 from hybrid.kernels.codes import (
     DESINGULARISED,
     EXACT,
     HIGHEST_ORDER,
     NARROW,
-    PROPAGATORS,
     RUNGE_KUTTA,
     TAYLOR,
     WIDE,
@@ -54,38 +54,6 @@ class Boundary:
 
     guard: sympy.Expr | None
     inside: int
-
-
-@attrs.frozen
-class Propagator:
-    """How a mode is advanced, and why.
-
-    Attributes
-    ----------
-    kind
-        A code of ``hybrid.kernels.codes``: RUNGE_KUTTA, TAYLOR, EXACT or DESINGULARISED.
-    degree
-        Degree in time of every solution, and of every guard along it, if those are polynomials, else 0.
-    reason
-        What tracing found.
-    statements
-        Body of the mode in the role ``series``. ``table`` and ``vectors`` in it are the first columns of its
-        table and of the tangent vectors.
-    columns, table_columns, tangent_columns
-        Columns that the series need for the state and what it is made of, for a table that stays, and for
-        four tangent vectors.
-    """
-
-    kind: int
-    degree: int
-    reason: str
-    statements: tuple[str, ...] = ()
-    columns: int = 0
-    table_columns: int = 0
-    tangent_columns: int = 0
-
-    def __str__(self) -> str:
-        return f"{PROPAGATORS[self.kind]} ({self.reason})"
 
 
 def propagator(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import floor, isfinite
+from math import comb, floor, isfinite
 from typing import Any
 
 import attrs
@@ -145,11 +145,10 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any
 @cache
 def _fit_of_guards() -> tuple[np.ndarray, np.ndarray]:
     """Nodes on [0, 1] and the matrix from values there to Bernstein coefficients."""
-    from scipy.special import comb
-
     j = np.arange(FIT_DEGREE + 1)
     nodes = 0.5 * (1 - np.cos(np.pi * j / FIT_DEGREE))
-    basis = comb(FIT_DEGREE, j) * nodes[:, None] ** j * (1 - nodes[:, None]) ** (FIT_DEGREE - j)
+    binomials = np.array([comb(FIT_DEGREE, k) for k in j.tolist()])
+    basis = binomials * nodes[:, None] ** j * (1 - nodes[:, None]) ** (FIT_DEGREE - j)
     return nodes, np.linalg.inv(basis)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.load import load_kernels
 from hybrid.run import check_state, kernel_method, split_time, workspace
 from hybrid.solvers import Tsit5
 from hybrid.system import HybridSystem, Transition, finite_number
@@ -63,8 +64,7 @@ def saltation_matrix(
     work = workspace(kernel_method(Tsit5()), system.dimension, 0, 0)
     phase = split_time(finite_number("t", t), model.period)[1]
     source = system.mode_index(system.transitions[index].source)
-    from hybrid.kernels.jump import saltation
-
+    saltation = load_kernels("hybrid.kernels.jump").saltation
     transversality = saltation(model, index, source, phase, state, np.empty(system.dimension), work)
     if not np.all(np.isfinite(work.saltation)):
         raise ArgumentError(

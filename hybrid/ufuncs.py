@@ -32,6 +32,7 @@ from hybrid.symbolic import (
     TruncatedRemainder,
     number,
 )
+from hybrid.traced import WHERE
 
 
 def _clip(a: sympy.Expr, low: sympy.Expr, high: sympy.Expr) -> sympy.Expr:
@@ -125,7 +126,5 @@ RULES: dict[str, Callable[..., sympy.Expr]] = {
     "bitwise_and": And,
     "bitwise_or": Or,
     "invert": Not,
+    WHERE: Select,
 }
-
-# These contract arrays by sums of products, which object arrays do through the scalars' operators.
-CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")

@@ -4,6 +4,7 @@ import math
 
 from numba import boolean, float64, int64, njit
 
+from hybrid.kernels.clock import forward, time_left
 from hybrid.kernels.codes import (
     ACCUMULATION,
     CYCLE,
@@ -35,8 +36,7 @@ from hybrid.kernels.codes import (
     TERMINAL,
 )
 from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, widen_scale
-from hybrid.kernels.jump import forward
-from hybrid.kernels.layout import ENTRY, INLINE, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
+from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.series import series_step
 
 # More jumps than this at one instant are not going to end.
@@ -70,12 +70,6 @@ def arrived(model, run, work):
     for i in range(model.dimension):
         run.scale[i] = max(run.scale[i], work.settled[i])
     return found
-
-
-@njit(**INLINE)
-def time_left(model, run, stop_cycle, stop_phase):
-    """Time until the stop; periods are counted, not measured, so that none of their digits is lost."""
-    return (stop_cycle - run.count[CYCLE]) * model.period + (stop_phase - run.clock[PHASE])
 
 
 @njit(**KERNEL)

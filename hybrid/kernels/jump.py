@@ -12,6 +12,7 @@ from hybrid.kernels.chatter import (
     drift_is_known,
     remember_impulse,
 )
+from hybrid.kernels.clock import forward
 from hybrid.kernels.codes import (
     CYCLE,
     EARLIER_JUMP_CYCLE,
@@ -332,16 +333,6 @@ def remember_flight(run, record, n, span, x_limit):
         for i in range(n):
             record.step_coefficients[slot, j, i] = run.y[i] + (x_limit[i] - run.y[i]) * j / degree
         record.step_coefficients[slot, j, n] = span * j / degree
-
-
-@njit(**KERNEL)
-def forward(run, period, span):
-    """Move the clock of a run on, keeping the phase below the period."""
-    phase = run.clock[PHASE] + span
-    while period > 0.0 and phase >= period:
-        phase -= period
-        run.count[CYCLE] += 1
-    run.clock[PHASE] = phase
 
 
 @njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)

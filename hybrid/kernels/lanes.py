@@ -12,10 +12,11 @@ from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
 from hybrid.kernels.codes import NARROW, WIDE
+from hybrid.kernels.compiler import PartCompiler
 
 FUSED = ("contract",)
 # Small and called at every order: the call would cost as much as the work.
-HERE = {"_nrt": False, "forceinline": True}
+HERE = {"_nrt": False, "forceinline": True, "pipeline_class": PartCompiler}
 
 
 class LanesType(types.Type):

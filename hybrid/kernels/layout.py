@@ -6,6 +6,7 @@ one after the other, so that each of them is contiguous. ``n`` is the dimension,
 
 from numba import boolean, float64, int64, types, void
 
+from hybrid.kernels.compiler import PartCompiler
 from hybrid.kernels.structure import Structure
 
 EPSILON = 2.220446049250313e-16
@@ -241,8 +242,12 @@ _MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz
 ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}
 # Handed to the driver as a first-class function.
 PART = ENTRY | {"no_cpython_wrapper": True}
-# Called by other kernels only: it becomes part of them, so it is neither wrapped nor kept by itself and takes
-# its types from its callers. A process that finds its callers on disk never looks at it.
-KERNEL = _MATHEMATICS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# Called by other kernels only: it becomes part of them, so by itself it is neither wrapped nor kept nor made
+# machine code, and it takes its types from its callers. A process that finds these on disk never looks at it.
+KERNEL = _MATHEMATICS | {
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": PartCompiler,
+}
 # Small and called at every stage: the call would cost as much as the work.
 INLINE = KERNEL | {"forceinline": True}

@@ -13,12 +13,24 @@ from hybrid.load import load_kernels
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
+import sys
 import hybrid, models
 arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0))
 section = hybrid.stroboscopic_section(models.impact_oscillator(), (0.0, 0.0), periods=3)
 print(round(arc.jumps[0].t, 12), arc.status.code.name, len(section))
 from hybrid.compile import _ROLES
 print(sum(role.cache_hits for roles in _ROLES.values() for role in roles))
+print(*sorted(sys.modules.keys() & {"scipy.linalg", "scipy.special", "sympy"}))
+"""
+LINEAR_ALGEBRA = """
+import sys
+from hybrid.load import load_kernels
+load_kernels()
+assert "scipy.linalg" not in sys.modules
+import numba, numpy as np
+a = np.arange(9.0).reshape(3, 3) + np.eye(3)
+assert np.array_equal(numba.njit(lambda a: np.linalg.inv(a @ a) @ np.cov(a))(a).shape, (3, 3))
+assert "scipy.linalg" in sys.modules
 """
 
 
@@ -78,18 +90,28 @@ def test_a_second_process_loads_what_the_first_one_compiled(shared_kernels):
             [sys.executable, "-c", PROGRAM], cwd=ROOT, env=environment, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stderr
-        answer, hits = done.stdout.splitlines()
-        return answer, int(hits)
+        answer, hits, imported = done.stdout.splitlines()
+        return answer, int(hits), imported
 
-    first, hits = run()
+    first, hits, _ = run()
     assert first == "0.451523640986 SUCCESS 3"
     assert hits == 0
     [models] = shared_kernels.glob("models-*")
     kept = sorted(models.rglob("*.nbi"))
     assert len(kept) == 16
     stamps = [path.stat().st_mtime_ns for path in kept]
-    second, hits = run()
+    second, hits, imported = run()
     assert second == first
+    assert imported == ""
     assert hits == 16
     assert [path.stat().st_mtime_ns for path in kept] == stamps
     assert len(list(models.glob("hybrid_model_*.py"))) == 2
+    assert len(list(models.glob("emitted_*.json"))) == 2
+
+
+def test_linear_algebra_is_loaded_when_a_compiled_function_needs_it(shared_kernels):
+    environment = os.environ | {"HYBRID_CACHE_DIR": str(shared_kernels)}
+    done = subprocess.run(
+        [sys.executable, "-c", LINEAR_ALGEBRA], cwd=ROOT, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr

@@ -6,7 +6,7 @@ import pytest
 numba = pytest.importorskip("numba")
 from numba import float64, int64, types  # noqa: E402
 
-from hybrid.kernels.layout import CUBE, INDICES, KERNEL, MATRIX, VECTOR  # noqa: E402
+from hybrid.kernels.layout import CUBE, ENTRY, INDICES, MATRIX, VECTOR  # noqa: E402
 from hybrid.kernels.structure import Layout, Structure  # noqa: E402
 
 
@@ -40,7 +40,7 @@ def parcel():
     )
 
 
-@numba.njit(**{key: value for key, value in KERNEL.items() if not key.startswith("no_c")})
+@numba.njit(**ENTRY | {"cache": False})
 def read(box, out):
     inner = box.parcel
     out[0], out[1], out[2] = inner.count, inner.size, inner.function(inner.size)

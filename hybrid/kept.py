@@ -1,0 +1,151 @@
+"""What tracing found out about a system, kept on disk, so that the next process need not wait for SymPy.
+
+A model function may depend on anything: constants, closures, globals, what it calls. None of that is looked
+at. The function is called again, as tracing would call it, on numbers that only list what is done with them;
+the list is all that tracing ever learns of the function. The same lists give the same expressions, and these
+the same code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid.cache import cache_directory, write_whole
+from hybrid.emitted import Emitted, Propagator
+from hybrid.load import kernels_key
+from hybrid.roles import roles
+from hybrid.traced import TraceError, values_of
+
+if TYPE_CHECKING:
+    from hybrid.roles import Role
+    from hybrid.system import HybridSystem
+
+
+class Operations:
+    """Traced numbers as places in a list of operations; what has been done before is not listed twice."""
+
+    def __init__(self) -> None:
+        self.places: dict[tuple[Any, ...], int] = {}
+
+    def listed(self, *operation: Any) -> int:
+        """Place of an operation."""
+        return self.places.setdefault(operation, len(self.places))
+
+    def number(self, value: Any) -> int:
+        """Place of a number, to the last bit."""
+        return self.listed("number", float(value).hex())
+
+    def combined(self, name: str, contents: tuple[int, ...]) -> int:
+        """Place of a function's value."""
+        return self.listed(name, *contents)
+
+    def expression(self, content: int) -> Any:
+        """A function that asks for expressions is to be traced by SymPy each time."""
+        raise TraceError("there is no expression where operations are only listed")
+
+
+def traced_or_kept(system: HybridSystem) -> Emitted:
+    """What `emit` makes of a system, or what it made of the same one before."""
+    operations = operations_of(system)
+    if operations is None:
+        return _traced(system)[0]
+    path = models_folder() / f"emitted_{_digest(operations)}.json"
+    kept = _read(path)
+    if kept is not None:
+        return kept
+    emitted, complete = _traced(system)
+    if complete:
+        write_whole(path, json.dumps(attrs.asdict(emitted), default=int))
+    return emitted
+
+
+def models_folder() -> Path:
+    """Folder of what is kept of models. Series call a kernel, which becomes part of them."""
+    return cache_directory() / f"models-{kernels_key()}"
+
+
+def operations_of(system: HybridSystem) -> str | None:
+    """All that emitting depends on, as text: names, graph, and the operations of every function.
+
+    None if they cannot be listed: a function fails, or asks for more than the results of operations.
+    """
+    try:
+        functions = [_listed(system, role) for role in roles(system)]
+    except Exception:
+        return None
+    graph = [
+        [
+            transition.name,
+            transition.source,
+            transition.target,
+            transition.accumulates_to,
+            int(transition.guard.direction),
+            transition.guard.when is None,
+            transition.reset is None,
+        ]
+        for transition in system.transitions
+    ]
+    return json.dumps([system.state, [*system.parameters], [*system.mode_names], graph, functions])
+
+
+def _listed(system: HybridSystem, role: Role) -> list[Any]:
+    """Owner and name of a role, and for its function and its derivative the operations and the results."""
+    names = tuple(system.parameters)
+    lists: list[Any] = []
+    for function in (role.function, role.derivative):
+        if function is None:
+            lists.append(None)
+            continue
+        operations = Operations()
+        t = operations.listed("t")
+        x = [operations.listed("x", i) for i in range(system.dimension)]
+        p = [operations.listed("p", i) for i in range(len(names))]
+        values = values_of(function, system.state, names, operations, (t, x, p))
+        lists.append([[*operations.places], values])
+    return [role.owner, role.name, *lists]
+
+
+def _digest(operations: str) -> str:
+    return hashlib.sha256(f"{_tracer()}\n{operations}".encode()).hexdigest()
+
+
+@cache
+def _tracer() -> str:
+    """What does the tracing: this package and what it stands on."""
+    import importlib.metadata
+
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
+    versions = [importlib.metadata.version(package) for package in ("sympy", "mpmath")]
+    return " ".join([digest, sys.version, np.__version__, *versions])
+
+
+def _traced(system: HybridSystem) -> tuple[Emitted, bool]:
+    """What emitting finds, and whether all of it follows from operations."""
+    from hybrid.emit import emit
+    from hybrid.trace import SYMBOLIC
+
+    failures = SYMBOLIC.failures
+    emitted = emit(system)
+    return emitted, not emitted.opaque and SYMBOLIC.failures == failures
+
+
+def _read(path: Path) -> Emitted | None:
+    try:
+        kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        for name in ("affine_guard", "affine_mode", "autonomous"):
+            kept[name] = tuple(kept[name])
+        for each in kept["propagators"]:
+            each["statements"] = tuple(each["statements"])
+        kept["propagators"] = tuple(Propagator(**each) for each in kept["propagators"])
+        return Emitted(**kept)
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
