@@ -81,7 +81,7 @@ def weigh_state(series, n, rtol, atol, exact, weights):
 @njit(**INLINE)
 def weigh_tangents(series, n, first, rtol, exact, weights):
     """One over the tolerance of every component of four tangent vectors, each measured against itself."""
-    square = 0.0 * load(weights, 0, first)
+    square = four_times(0.0)
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
         square = component * component + square
@@ -113,8 +113,9 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     scale = math.log2(rtol)
     decisive = four_times(-math.inf)
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
-        worst = load(weights, 0, 0) * magnitude(load(series, o, 0))
-        for i in range(NARROW, n, NARROW):
+        # What is not a number is left out here, and met with when the series is summed.
+        worst = four_times(0.0)
+        for i in range(0, n, NARROW):
             worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
         for g in range(groups):
             for i in range(first + g * stride, first + g * stride + NARROW * n, NARROW):
