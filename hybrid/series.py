@@ -195,8 +195,7 @@ class Recurrences:
         column = f"{self.prefix}b{block} + {place}"
         # The last coefficients but one of both factors. For the first order there are none, for the second
         # both terms would be the same.
-        before, left_before = f"{self.prefix}p{block}_{place}", f"{self.prefix}q{block}"
-        self.after[before] = f"{left}:{column}"
+        before, left_before = self._before(left, right), f"{self.prefix}q{block}"
         self.after[left_before] = f"out[o, {left}] if o > 1 else 0.0"
         return f"({inner} + out[1, {left}]*{before} + {left_before}*out[1, {column}])", column
 
@@ -210,11 +209,15 @@ class Recurrences:
     def _enter(self, left: str, right: sympy.Expr, column: str, value: str) -> None:
         """Give a convolution the coefficient of its other factor. Those of one block are written together."""
         self.entries[left, right] = value
-        self.after = {
-            name: value if text == f"{left}:{column}" else text for name, text in self.after.items()
-        }
         if self.lanes:
             self._both(self.put("o", column, value))
+        else:
+            self.after[self._before(left, right)] = value
+
+    def _before(self, left: str, right: sympy.Expr) -> str:
+        """Name of the last coefficient but one of a factor beside the column ``left``."""
+        block = list(self.blocks).index(left)
+        return f"{self.prefix}p{block}_{self.blocks[left].index(right)}"
 
     def _slope(self, u: sympy.Expr) -> str:
         """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""
