@@ -172,6 +172,14 @@ def _registers(width, widest):
     return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
 
 
+def _as_known(*kinds):
+    """The types of numbers that instructions are written for: what the compiler knows stays known.
+
+    Numba looks for what it has written by these types alone. It would take one width for another.
+    """
+    return tuple(kind if isinstance(kind, types.Literal) else types.intp for kind in kinds)
+
+
 @intrinsic(prefer_literal=True)
 def _convolve_in_registers(typing_context, series, order, inset, left, first, width, widest):
     if not (isinstance(width, types.IntegerLiteral) and isinstance(widest, types.IntegerLiteral)):
@@ -214,7 +222,8 @@ def _convolve_in_registers(typing_context, series, order, inset, left, first, wi
             write(builder, parts[0], rows.beside(target, place))
         return context.get_dummy_value()
 
-    return types.void(series, *(types.intp,) * 6), generate
+    known = _as_known(order, inset, left, first, width, widest)
+    return types.void(series, *known), generate
 
 
 @intrinsic(prefer_literal=True)
@@ -223,6 +232,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
 
     Each has ``lanes`` columns. Every step of the scheme waits for the one before: so there are half as many.
     """
+    known = _as_known(first, width, lanes, at_once, sizes)
     lanes, at_once, with_sizes = (each.literal_value for each in (lanes, at_once, sizes))
 
     def generate(context, builder, signature, arguments):
@@ -272,8 +282,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
             one_turn(column)
         return context.get_dummy_value()
 
-    integers = (types.intp,) * 4
-    return types.void(series, types.intp, types.float64, *integers, types.boolean), generate
+    return types.void(series, types.intp, types.float64, *known), generate
 
 
 def _weighted_sum(builder, factors, terms):
@@ -287,6 +296,7 @@ def _weighted_sum(builder, factors, terms):
 def _combine_in_registers(typing_context, series, order, table, width, numbers):
     if not isinstance(width, types.IntegerLiteral):
         return None
+    known = _as_known(order, table, width)
     width = width.literal_value
 
     def generate(context, builder, signature, arguments):
@@ -304,13 +314,14 @@ def _combine_in_registers(typing_context, series, order, table, width, numbers):
         return context.get_dummy_value()
 
     numbers = types.UniTuple(types.float64, len(numbers))
-    return types.void(series, *(types.intp,) * 3, numbers), generate
+    return types.void(series, *known, numbers), generate
 
 
 @intrinsic(prefer_literal=True)
 def _combine_tangents_in_registers(typing_context, series, order, table, width, first, n):
     if not (isinstance(width, types.IntegerLiteral) and isinstance(n, types.IntegerLiteral)):
         return None
+    known = _as_known(order, table, width, first, n)
     width, n = width.literal_value, n.literal_value
 
     def generate(context, builder, signature, arguments):
@@ -328,4 +339,4 @@ def _combine_tangents_in_registers(typing_context, series, order, table, width, 
                 write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
         return context.get_dummy_value()
 
-    return types.void(series, *(types.intp,) * 5), generate
+    return types.void(series, *known), generate

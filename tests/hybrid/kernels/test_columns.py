@@ -55,6 +55,23 @@ def test_convolve(order, width, inset, widest):
     np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
 
 
+def test_what_was_compiled_for_one_width_does_not_serve_another():
+    """Compiled once more, under other options, it is still written for its own width."""
+
+    def wide(series):
+        convolve(series, 9, 1, 3, 7, 16, 8)
+
+    def narrow(series):
+        convolve(series, 9, 1, 3, 7, 4, 8)
+
+    series, plain = pair()
+    for function, fastmath in ((wide, False), (narrow, False), (wide, {"nsz"})):
+        series[:] = plain
+        njit(void(MATRIX), fastmath=fastmath)(function)(series)
+    wide(plain)
+    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+
+
 @pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
 @pytest.mark.parametrize("order", [1, 2, 3, 13, 28, 30])
 @pytest.mark.parametrize(
