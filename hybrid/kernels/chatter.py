@@ -14,7 +14,7 @@ from hybrid.kernels.codes import (
     RESTITUTION,
 )
 from hybrid.kernels.guards import guard_acceleration, guard_speed, rounding_band
-from hybrid.kernels.layout import EPSILON, KERNEL
+from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 
 # Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
 BEFORE = 0
@@ -30,6 +30,8 @@ SHORT = 1e-5
 LONG = 1.0
 # Largest relative change of the limit that rounding may be blamed for.
 ROUGH = 1e-6
+# Where its time still changes by more than this share, the limit is not looked for.
+FAR = 1e3 * ROUGH
 
 
 @njit(**KERNEL)
@@ -86,15 +88,20 @@ def follow_mean(model, run, transition, speed, span, work):
             work.settled[i] += weight * slope[i]
 
 
-@njit(**KERNEL)
-def change_of_limit(model, method, run, ratio, shift, span, work):
-    """What later jumps will still change of the limit in ``work.settled``, in units of the tolerances.
+@njit(**INLINE)
+def change_of_limit_time(method, run, ratio, shift, span):
+    """What later jumps will still change of the time to the limit, in units of the tolerances.
 
-    Judged from the change since the jump before, of the limit time by ``shift``, and from its order, the
-    second in the speed.
+    Judged from the change since the jump before, by ``shift``, and from its order, the second in the speed.
     """
     gain = ratio * ratio / (1.0 - ratio * ratio)
-    misfit = gain * abs(shift) / (method.rtol * span + 8.0 * EPSILON * abs(run.clock[PHASE]))
+    return gain * abs(shift) / (method.rtol * span + 8.0 * EPSILON * abs(run.clock[PHASE]))
+
+
+@njit(**KERNEL)
+def change_of_limit(model, method, run, ratio, misfit, work):
+    """The same of the limit in ``work.settled``; ``misfit`` is that of its time."""
+    gain = ratio * ratio / (1.0 - ratio * ratio)
     for i in range(model.dimension):
         limit = work.settled[i]
         scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
@@ -128,9 +135,14 @@ def accumulation(model, method, run, transition, since_last, work):
         band = rounding_band(model, run, run.clock[PHASE], work.gradient)
         drowned = height <= band
         shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
-        follow_mean(model, run, transition, side * speed, span, work)
         shift = span - (run.trail[LIMIT, n] - since_last)
-        misfit = change_of_limit(model, method, run, ratio, shift, span, work)
+        misfit = change_of_limit_time(method, run, ratio, shift, span)
+        if drowned or not misfit * method.rtol > FAR:
+            follow_mean(model, run, transition, side * speed, span, work)
+            misfit = change_of_limit(model, method, run, ratio, misfit, work)
+        else:
+            # Jumps that are driven, and no chatter yet: there is no limit to compare the next one with.
+            run.trail[LIMIT, 0] = math.inf
         # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
         # takes over.
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
