@@ -12,11 +12,15 @@ from hybrid.kernels.codes import (
     GRAZING_PLACE,
     HIGHEST_ORDER,
     MODE,
+    NARROW,
     NO_TRANSITION,
 )
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
+from hybrid.kernels.lanes import four_times, load, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 
+# The error of the last step towards a root is taken to be this many times its estimate.
+UNSEEN = 64.0
 # Share of a guard's size that the high powers of its series may reach together to be left out of a proof.
 NEGLIGIBLE = 0.01
 
@@ -24,6 +28,16 @@ NEGLIGIBLE = 0.01
 # What a power of the variable is divided by in Bernstein form: ``C(degree, k)``.
 SHARES = np.array(
     [[1.0 / max(math.comb(n, k), 1) for k in range(HIGHEST_ORDER + 1)] for n in range(HIGHEST_ORDER + 1)]
+)
+# What a power of the variable adds to each Bernstein coefficient: ``C(i, k) / C(degree, k)`` in the row
+# ``DEGREES * degree + k``.
+DEGREES = 4 * NARROW
+POWERS = np.array(
+    [
+        [math.comb(i, k) / max(math.comb(n, k), 1) for i in range(DEGREES)]
+        for n in range(DEGREES)
+        for k in range(DEGREES)
+    ]
 )
 # Verdicts on a guard.
 CLEAR, CROSSES, UNKNOWN = range(3)
@@ -62,6 +76,28 @@ def to_bernstein(coefficients, degree):
             entry = row[j]
             row[j] = entry + before
             before = entry
+
+
+@njit(**KERNEL)
+def leading_to_bernstein(coefficients, degree, stack):
+    """As ``to_bernstein``, from ``coefficients`` into the first row of a stack, a column a register."""
+    if degree >= DEGREES:
+        for k in range(degree + 1):
+            stack[0, 2 + k] = coefficients[k]
+        to_bernstein(stack[0, 2:], degree)
+        return
+    a, b, c, d = four_times(0.0), four_times(0.0), four_times(0.0), four_times(0.0)
+    row = DEGREES * degree
+    for k in range(degree + 1):
+        power = coefficients[k]
+        a = load(POWERS, row + k, 0) * power + a
+        b = load(POWERS, row + k, NARROW) * power + b
+        c = load(POWERS, row + k, 2 * NARROW) * power + c
+        d = load(POWERS, row + k, 3 * NARROW) * power + d
+    store(stack, 0, 2, a)
+    store(stack, 0, 2 + NARROW, b)
+    store(stack, 0, 2 + 2 * NARROW, c)
+    store(stack, 0, 2 + 3 * NARROW, d)
 
 
 @njit(**KERNEL)
@@ -174,18 +210,44 @@ def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
     return CLEAR, 0.0, 1.0, 0
 
 
+@njit(**INLINE)
+def expanded_at(series, column, first, order, s):
+    """Value, derivative and half the second one of a series divided by its variable to the power ``first``.
+
+    Horner's scheme in ``s**2`` for even and for odd terms, which do not wait for each other.
+    """
+    square = s * s
+    even, even_slope, even_bend = 0.0, 0.0, 0.0
+    odd, odd_slope, odd_bend = 0.0, 0.0, 0.0
+    top = order
+    if (order - first) % 2 == 0:
+        even = series[order, column]
+        top = order - 1
+    for o in range(top, first, -2):
+        odd_bend = odd_bend * square + odd_slope
+        odd_slope = odd_slope * square + odd
+        odd = odd * square + series[o, column]
+        even_bend = even_bend * square + even_slope
+        even_slope = even_slope * square + even
+        even = even * square + series[o - 1, column]
+    value = even + s * odd
+    slope = odd + 2.0 * (s * even_slope + square * odd_slope)
+    bend = even_slope + s * (3.0 * odd_slope + 4.0 * (s * even_bend + square * odd_bend))
+    return value, slope, bend
+
+
 @njit(**KERNEL)
 def root_between(series, column, order, known_roots, h, low, high, left, right):
     """The one root of a series in an open interval of the step ``h``.
 
     ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
-    variable for each known root at 0. Newton, kept inside its bracket; in the end on the series as it is,
-    which at 0 is zero up to rounding only; but not to a root at 0, where the step begins.
+    variable for each known root at 0; in the end it is taken as it is, which at 0 is zero up to rounding
+    only; but not to a root at 0, where the step begins.
     """
-    s = simple_root_of(series, column, order, known_roots, low, high, left, right)
+    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right)
     for _ in range(3 if known_roots > 0 else 0):
-        slope = slope_at(series, column, order, s)
-        shift = -value_at(series, column, order, s) / slope if slope != 0.0 else 0.0
+        value, slope, _ = expanded_at(series, column, 0, order, s)
+        shift = -value / slope if slope != 0.0 else 0.0
         if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
             break
         s += shift
@@ -195,33 +257,41 @@ def root_between(series, column, order, known_roots, h, low, high, left, right):
 
 
 @njit(**INLINE)
-def simple_root_of(series, column, order, known_roots, low, high, left, right):
-    """``root_between`` of the series divided by what is known."""
+def simple_root_of(series, column, order, known_roots, h, low, high, left, right):
+    """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
+
+    The error after a step of Halley's is about the cube of the step, over the square of the length on which
+    the guard bends: where that is rounding, it need not be looked at.
+    """
     s, last = low + (high - low) * (left / (left - right)), high - low
     if not low < s < high:
         s = 0.5 * (low + high)
     for _ in range(100):
-        value, slope = series[order, column], 0.0
-        for o in range(order - 1, known_roots - 1, -1):
-            slope = slope * s + value
-            value = value * s + series[o, column]
+        value, slope, bend = expanded_at(series, column, known_roots, order, s)
         if value == 0.0:
             return s
         if (value > 0.0) == (left > 0.0):
             low = s
         else:
             high = s
-        newton = s - value / slope if slope != 0.0 else -1.0
-        change = abs(newton - s)
-        # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
+        shift = -value / slope if slope != 0.0 else math.inf
+        curve = bend / slope if slope != 0.0 else math.inf
+        # Far from the root, next to a turning point, Halley's steps would be as short as the slope is small.
+        if abs(shift * curve) < 0.5:
+            shift /= 1.0 + shift * curve
+        closer, change = s + shift, abs(shift)
+        # Its steps shrink here; one that does not is the rounding of the value.
         if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
             return s
-        if not low < newton < high:
-            newton = 0.5 * (low + high)
+        if low < closer < high:
+            if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
+                return closer
+        else:
+            closer = 0.5 * (low + high)
             change = high - low
         if high - low <= EPSILON * high:
-            return newton
-        s, last = newton, change
+            return closer
+        s, last = closer, change
     return s
 
 
@@ -266,9 +336,7 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
             run.on_guard[transition] = 0
         # The second cheap proof: the leading powers keep to their side, even if the others are against it.
         degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
-        to_bernstein(work.polynomial, degree)
-        for k in range(degree + 1):
-            work.stack[0, 2 + k] = work.polynomial[k]
+        leading_to_bernstein(work.polynomial, degree, work.stack)
         verdict, start, end, row = judge_leading(
             degree, rest, order * rest, side, band, series[order + 1, column], work.stack
         )
