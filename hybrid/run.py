@@ -195,6 +195,7 @@ def _run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> 
         "side": (transitions,),
         "on_guard": (transitions,),
         "first_step": (modes,),
+        "stay": (modes,),
         "scale": (n,),
         "growth": (tangents,),
         "trail": (3, n + 1),

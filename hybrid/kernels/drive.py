@@ -30,6 +30,7 @@ from hybrid.kernels.codes import (
     RESTING,
     RESUMING,
     RUNGE_KUTTA,
+    SINCE_ENTRY,
     STALE,
     STEPS,
     STUCK,
@@ -172,6 +173,7 @@ def advance(
         if code != GO_ON:
             return int(code)
         forward(run, model.period, span)
+        run.clock[SINCE_ENTRY] += span
         fired = run.count[PENDING]
         past = time_left(model, run, stop_cycle, stop_phase) < 0.0
         if past or (span >= remaining and fired == NO_TRANSITION):

@@ -40,6 +40,7 @@ from hybrid.kernels.codes import (
     PREVIOUS_MODE,
     RESTING,
     RESUMING,
+    SINCE_ENTRY,
     SINGULAR_JUMPS,
     STEPS,
     STRAIN,
@@ -261,6 +262,7 @@ def move(model, run, transition, target, x_plus):
     run.clock[LAST_JUMP_CYCLE] = run.count[CYCLE]
     run.count[JUMPS] += 1
     run.count[LAST_FIRED] = transition
+    run.stay[run.count[MODE]], run.clock[SINCE_ENTRY] = run.clock[SINCE_ENTRY], 0.0
     run.count[PREVIOUS_MODE] = run.count[MODE]
     run.count[MODE] = target
     run.count[PHASE_OF_RUN] = ENTERING

@@ -99,10 +99,10 @@ class Run(Structure):
     ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
     the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
     vanishes at the entry of the mode and has not been left since, 2 where its speed does too, 3 where its
-    acceleration does as well; ``first_step (modes,)`` remembers the step a mode began with; ``scale (n,)``
-    the size of the components over the last step, against which rounding is judged; ``growth (k,)`` sums the
-    logarithms of the lengths taken out of the tangent vectors by orthonormalisation.
-    ``trail (3, n + 1)`` follows the jumps of one transition to their limit. The last three serve the jumps
+    acceleration does as well; ``first_step (modes,)`` remembers the step a mode began with and ``stay
+    (modes,)`` how long the last stay in it was; ``scale (n,)`` the size of the components over the last step,
+    against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the
+    tangent vectors by orthonormalisation. ``trail (3, n + 1)`` follows the jumps of one transition to their limit. The last three serve the jumps
     that one jump sets off at once: ``before (n k,)`` and ``growth_before (k,)`` are the tangent vectors and
     their growth before it, ``instant (n (1 + n),)`` what it and they make of a tangent vector since, first
     the derivative of their instant and then the columns of the tangent map.
@@ -114,6 +114,7 @@ class Run(Structure):
     side: INDICES
     on_guard: INDICES
     first_step: VECTOR
+    stay: VECTOR
     scale: VECTOR
     growth: VECTOR
     trail: MATRIX

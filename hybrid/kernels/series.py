@@ -25,6 +25,7 @@ from hybrid.kernels.codes import (
     NON_FINITE,
     PENDING,
     PHASE,
+    SINCE_ENTRY,
     STEP_TOO_SMALL,
     STEPS,
     WIDE,
@@ -59,6 +60,8 @@ TAIL_OF_EXACT = 3
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
 LONG = 100.0
+# Share of the last stay in a mode by which a step goes beyond it.
+AHEAD = 0.25
 
 
 @njit(**INLINE)
@@ -288,7 +291,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock < 0:
-        h = min(h, method.max_step, remaining)
+        h = min(h, method.max_step, remaining, as_far_as_last_time(run, mode))
         if not h < 1e100:
             h = unhurried(series, n, run)
     else:
@@ -327,6 +330,16 @@ def series_step(model, method, run, record, tangents, remaining, work):
         longest = math.inf if clock >= 0 else CLOSE * span
         span += reach_guard(model, run, tangents, fired, t + span, longest, work)
     return GO_ON, span
+
+
+@njit(**INLINE)
+def as_far_as_last_time(run, mode):
+    """A little more than is left of a stay as long as the last one; anything if it is longer already.
+
+    The event that ends it is found on the way; a longer step would only make it harder to find.
+    """
+    left = run.stay[mode] - run.clock[SINCE_ENTRY]
+    return left + AHEAD * run.stay[mode] if left > 0.0 else math.inf
 
 
 @njit(**KERNEL)
