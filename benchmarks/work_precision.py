@@ -114,7 +114,7 @@ def draw(results: dict[str, WorkPrecision], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--repeats", type=int, default=7, help="runs that the median is taken of")
+    parser.add_argument("--repeats", type=int, default=7, help="runs that the median is taken of, at least")
     parser.add_argument("--peers", nargs="*", choices=PEERS, default=list(PEERS), help="all by default")
     parser.add_argument("--only", nargs="*", default=None, help="problems whose short names begin so")
     parser.add_argument("--full", action="store_true", help="print every run, too")

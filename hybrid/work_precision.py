@@ -28,7 +28,9 @@ METHODS: Mapping[str, RungeKutta] = {"Taylor": Taylor(), "DOP853": DOP853(), "Ts
 # The default reference, and the run of another method that its own error is taken from.
 REFERENCE = Taylor(rtol=1e-14, atol=1e-16)
 CHECK = DOP853(rtol=1e-13, atol=1e-15)
-
+# Seconds after which the time of short runs no longer depends on what ran before them.
+SETTLED = 0.05
+MOST_REPEATS = 1000
 
 Method = RungeKutta | Callable[[float], Any]
 
@@ -182,8 +184,8 @@ def work_precision(
 ) -> WorkPrecision:
     """Error against time of methods over a range of tolerances, on one run of one system.
 
-    Every method runs once to get ready at each tolerance, then ``repeats`` times; its time is the median. The
-    library's own solvers keep the end of the run and its jumps, no steps.
+    Every method runs once to get ready at each tolerance, then at least ``repeats`` times; its time is the
+    median. The library's own solvers keep the end of the run and its jumps, no steps.
 
     Parameters
     ----------
@@ -203,7 +205,8 @@ def work_precision(
     tangent
         Whether the solvers carry the fundamental matrix, whose error and exponents are then measured too.
     repeats
-        Runs that the median is taken of.
+        Runs that the median is taken of, at least: short ones go on for a twentieth of a second, since what
+        ran before them is still in the processor's memories when they begin. With 1 there is one.
     longest
         Seconds beyond which a run is not repeated, and the method's finer tolerances are left out.
     clock
@@ -344,7 +347,10 @@ def _measured(
     try:
         result, seconds = timed()
         times = [seconds]
-        while len(times) < repeats and times[-1] <= longest:
+        most = repeats if repeats == 1 else max(repeats, MOST_REPEATS)
+        while len(times) < most and times[-1] <= longest:
+            if len(times) >= repeats and sum(times) >= SETTLED:
+                break
             times.append(timed()[1])
     except ArgumentError:
         raise
