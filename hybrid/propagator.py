@@ -6,7 +6,7 @@ mode, ``max(x1 - x2, 0)`` is ``x1 - x2`` there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import attrs
 import sympy
@@ -190,12 +190,11 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 def _write(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
 ) -> tuple[tuple[str, ...], int, int, int]:
-    body = _Body(symbols, guards)
-    block = body.block({}, (symbols.t, ONE_THEN_ZERO))
+    body = _Body(symbols, guards, {}, ONE_THEN_ZERO)
     seeds = _seeds(symbols)
     tangents = [directional(rate, seeds) for rate in field]
     trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
-    return body.assemble(block, symbols.x, *_state(symbols), field, guards, trace, tangents, seeds)
+    return body.assemble(symbols.x, *_state(symbols), field, guards, trace, tangents, seeds)
 
 
 def _write_linear(
@@ -218,12 +217,11 @@ def _write_desingularised(
     All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
     with a speed of zero too it would stay there. What it is started at is below the rounding of ``z``.
     """
-    body = _Body(symbols, guards)
-    clock, root = body.column(CLOCK), body.allot()
     harmonics = _harmonics(field, symbols)
     field = [rate.xreplace(harmonics) for rate in field]
-    driven = {symbol: body.allot() for symbol in harmonics.values()}
-    block = body.block({ROOT: root, **driven}, (symbols.t, f"ay{len(symbols.x)}"))
+    # The time since the start comes behind the states among what is advanced.
+    body = _Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
+    clock, (root, *driven) = body.column(CLOCK), body.rows.values()
     seeds = _seeds(symbols)
     slope = z.diff(symbols.t) + sympy.Add(
         *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
@@ -240,9 +238,8 @@ def _write_desingularised(
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
     return body.assemble(
-        block,
-        [*symbols.x, None, ROOT, *driven],
-        [*columns, clock, root, *driven.values()],
+        [*symbols.x, None, ROOT, *harmonics.values()],
+        [*columns, clock, root, *driven],
         [*starts, "0.0", "root", *begun],
         [*rates, ROOT, _in_roots(slope / 2, z), *turning],
         crossing,
@@ -297,13 +294,24 @@ def _state(symbols: Symbols) -> tuple[list[str], list[str]]:
 
 
 class _Body:
-    """The body of one mode: allots columns, and puts the loops one into the other."""
+    """The body of one mode: allots columns, and puts the loops one into the other.
 
-    def __init__(self, symbols: Symbols, guards: Sequence[sympy.Expr]) -> None:
-        self.symbols = symbols
+    Parameters
+    ----------
+    others
+        Symbols besides the states, each of which has a column.
+    time
+        Text of the coefficients of time from the first on; the prefix of the local variables goes into it.
+    """
+
+    def __init__(
+        self, symbols: Symbols, guards: Sequence[sympy.Expr], others: Iterable[sympy.Symbol], time: str
+    ) -> None:
+        self.symbols, self.time = symbols, time
         self.n = len(symbols.x)
         self.behind_guards = self.n + len(guards)
         self.columns = padded(self.behind_guards + OTHERS, WIDE)
+        self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
         self.preamble: list[str] = []
 
@@ -316,14 +324,8 @@ class _Body:
         self.columns += 1
         return str(self.columns - 1)
 
-    def block(self, rows: dict[sympy.Symbol, str], time: tuple[sympy.Symbol, str]) -> Recurrences:
-        """The recurrences of the state, and of what is in other ``rows``."""
-        state = {x: str(i) for i, x in enumerate(self.symbols.x)}
-        return Recurrences({**state, **rows}, time, self.allot, "a", self.constants)
-
     def assemble(
         self,
-        block: Recurrences,
         names: Sequence[sympy.Symbol | None],
         columns: list[str],
         starts: list[str],
@@ -333,41 +335,63 @@ class _Body:
         tangents: Sequence[sympy.Expr],
         seeds: dict[sympy.Symbol, sympy.Symbol],
     ) -> tuple[tuple[str, ...], int, int, int]:
-        """The statements, and the numbers of columns as in ``Propagator``."""
-        vectors = Recurrences(
-            dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, block, lanes=True
-        )
+        """The statements, and the numbers of columns as in ``Propagator``.
+
+        Runs without tangent vectors have statements of their own, which know nothing of what only these need:
+        the products in their rates, and the divergence.
+        """
+        free = self.columns
+        alone = self._state("s", names, columns, starts, rates, guards)
+        self._place_blocks(alone.block)
+        width, self.columns = self.columns, free
         names, rates = [*names, None], [*rates, trace]
         columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, "0.0"]
-        block.expect(names, rates)
+        moved = self._state("a", names, columns, starts, rates, guards)
+        vectors = Recurrences(
+            dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, moved.block, lanes=True
+        )
         vectors.expect(seeds.values(), tangents)
-        moved = StateLoop(names, columns, rates, starts, block)
-        crossing = {str(self.n + place): block.coefficient(guard) for place, guard in enumerate(guards)}
-        moved.write_front(self.behind_guards + OTHERS, crossing)
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
-        self._place_blocks(block)
+        self._place_blocks(moved.block)
+        together = [*moved.higher(), *carried.higher()]
         lines = [
             *self.preamble,
             f"groups = (len(x)//{self.n} + {NARROW - 2})//{NARROW}",
             *self.constants.statements(),
             "o = 0",
-            *moved.first(),
-            *carried.first(),
-            "for o in range(1, order + 1):",
-            *indented(
-                [
-                    "shrink = 1.0/o",
-                    *moved.higher(),
-                    "if groups > 0:",
-                    *indented(carried.higher()),
-                ]
-            ),
+            "if groups == 0:",
+            *indented([*alone.first(), *_each_order(alone.higher())]),
+            "else:",
+            *indented([*moved.first(), *carried.first(), *_each_order(together)]),
         ]
-        return tuple(lines), padded(self.columns, WIDE), 0, carried.columns
+        return tuple(lines), padded(max(width, self.columns), WIDE), 0, carried.columns
+
+    def _state(
+        self,
+        prefix: str,
+        names: Sequence[sympy.Symbol | None],
+        columns: list[str],
+        starts: list[str],
+        rates: Sequence[sympy.Expr],
+        guards: Sequence[sympy.Expr],
+    ) -> StateLoop:
+        """The loop of the state, and of what else there are ``rates`` for; local names have a prefix."""
+        state = {x: str(i) for i, x in enumerate(self.symbols.x)}
+        time = self.symbols.t, self.time.format(prefix)
+        block = Recurrences({**state, **self.rows}, time, self.allot, prefix, self.constants)
+        block.expect(names, rates)
+        moved = StateLoop(names, columns, rates, starts, block)
+        crossing = {str(self.n + place): block.coefficient(guard) for place, guard in enumerate(guards)}
+        moved.write_front(self.behind_guards + OTHERS, crossing)
+        return moved
 
     def _place_blocks(self, block: Recurrences) -> None:
         for i, rights in enumerate(block.blocks.values()):
             self.columns = padded(self.columns, WIDE)
             self.preamble.append(f"{block.prefix}b{i} = {self.columns}")
             self.columns += padded(len(rights))
+
+
+def _each_order(statements: Iterable[str]) -> list[str]:
+    return ["for o in range(1, order + 1):", *indented(["shrink = 1.0/o", *statements])]
