@@ -49,7 +49,9 @@ IMPORTS = (
     "    acos, acosh, asin, asinh, atan, atan2, atanh, copysign, cos, cosh, exp, expm1, fmod, hypot, inf,\n"
     "    log, log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
     ")\n"
-    "from hybrid.kernels.columns import combine, combine_tangents, convolve, spread_tangents\n"
+    "from hybrid.kernels.columns import (\n"
+    "    combine, combine_tangents, convolve, convolve_pairs, spread_tangents,\n"
+    ")\n"
     "from hybrid.kernels.lanes import load, store, store_row\n"
 )
 

@@ -342,7 +342,7 @@ class _Body:
         """
         free = self.columns
         alone = self._state("s", names, columns, starts, rates, guards)
-        self._place_blocks(alone.block)
+        self._place_pairs(alone.block)
         width, self.columns = self.columns, free
         names, rates = [*names, None], [*rates, trace]
         columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, "0.0"]
@@ -353,7 +353,7 @@ class _Body:
         vectors.expect(seeds.values(), tangents)
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
-        self._place_blocks(moved.block)
+        self._place_pairs(moved.block)
         together = [*moved.higher(), *carried.higher()]
         lines = [
             *self.preamble,
@@ -386,11 +386,11 @@ class _Body:
         moved.write_front(self.behind_guards + OTHERS, crossing)
         return moved
 
-    def _place_blocks(self, block: Recurrences) -> None:
-        for i, rights in enumerate(block.blocks.values()):
+    def _place_pairs(self, block: Recurrences) -> None:
+        for factors in ("a", "b"):
             self.columns = padded(self.columns, WIDE)
-            self.preamble.append(f"{block.prefix}b{i} = {self.columns}")
-            self.columns += padded(len(rights))
+            self.preamble.append(f"{block.prefix}{factors} = {self.columns}")
+            self.columns += padded(len(block.pairs))
 
 
 def _each_order(statements: Iterable[str]) -> list[str]:

@@ -44,12 +44,13 @@ class Recurrences:
     The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
     ``o``. Convolutions are taken in parts: the terms at their ends hold what this order and the one before
-    bring, all those between hold lower orders only and can be summed early. Those that share a factor are
-    summed together: ``blocks`` lists, by the column of that factor, what it is multiplied by, side by side
-    in columns of their own. In every sum what is known last is added last: nothing waits for it twice.
+    bring, all those between hold lower orders only and can be summed early, all side by side: ``pairs`` lists
+    the column of the first factor and the second. In every sum what is known last is added last: nothing
+    waits for it twice.
 
     With ``lanes`` a coefficient is that of four tangent vectors at once, in four columns. These have been
-    written as one and are read as one, which is quick even for the order before.
+    written as one and are read as one, which is quick even for the order before. ``blocks`` lists, by the
+    column of a factor that is one number, what it is multiplied by.
 
     Parameters
     ----------
@@ -88,6 +89,7 @@ class Recurrences:
         self.first: list[str] = []
         self.higher: list[str] = []
         self.after: dict[str, str] = {}
+        self.pairs: list[tuple[str, sympy.Expr]] = []
         self.blocks: dict[str, list[sympy.Expr]] = {}
         self.entries: dict[tuple[str, sympy.Expr], str] = {}
         self.variables: dict[sympy.Expr, str] = {}
@@ -185,19 +187,22 @@ class Recurrences:
 
     def _place(self, left: str, right: sympy.Expr) -> tuple[str, str]:
         """A convolution with the column ``left`` but for its ends, and the column for its other factor."""
-        rights = self.blocks.setdefault(left, [])
-        if right not in rights:
-            rights.append(right)
-        block, place = list(self.blocks).index(left), rights.index(right)
-        inner = f"{self.prefix}s{block}_{place}"
         if self.lanes:
-            return inner, f"{self.prefix}b{block} + {NARROW * place}"
-        column = f"{self.prefix}b{block} + {place}"
+            rights = self.blocks.setdefault(left, [])
+            if right not in rights:
+                rights.append(right)
+            block, place = list(self.blocks).index(left), rights.index(right)
+            return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {NARROW * place}"
+        if (left, right) not in self.pairs:
+            self.pairs.append((left, right))
+        place = self.pairs.index((left, right))
+        column = f"{self.prefix}b + {place}"
         # The last coefficients but one of both factors. For the first order there are none, for the second
         # both terms would be the same.
-        before, left_before = self._before(left, right), f"{self.prefix}q{block}"
+        left_before = f"{self.prefix}q{[each for each, _ in self.pairs].index(left)}"
         self.after[left_before] = f"out[o, {left}] if o > 1 else 0.0"
-        return f"({inner} + out[1, {left}]*{before} + {left_before}*out[1, {column}])", column
+        inner = f"{self.prefix}s{place} + out[1, {left}]*{self.prefix}p{place}"
+        return f"({inner} + {left_before}*out[1, {column}])", column
 
     def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
         """``_place``, and the coefficient of the other factor, which is written there."""
@@ -207,17 +212,12 @@ class Recurrences:
         return inner, column, value
 
     def _enter(self, left: str, right: sympy.Expr, column: str, value: str) -> None:
-        """Give a convolution the coefficient of its other factor. Those of one block are written together."""
-        self.entries[left, right] = value
+        """Give a convolution the coefficient of its other factor. All of them are written together."""
         if self.lanes:
             self._both(self.put("o", column, value))
         else:
-            self.after[self._before(left, right)] = value
-
-    def _before(self, left: str, right: sympy.Expr) -> str:
-        """Name of the last coefficient but one of a factor beside the column ``left``."""
-        block = list(self.blocks).index(left)
-        return f"{self.prefix}p{block}_{self.blocks[left].index(right)}"
+            self.entries[left, right] = value
+            self.after[f"{self.prefix}p{self.pairs.index((left, right))}"] = value
 
     def _slope(self, u: sympy.Expr) -> str:
         """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""

@@ -64,11 +64,7 @@ class StateLoop:
     def higher(self) -> list[str]:
         """Order ``o``, once ``shrink`` is 1/o."""
         block = self.block
-        inner = [
-            f"{block.prefix}s{i}_{place} = out[o, {block.prefix}b{i} + {place}]"
-            for i, rights in enumerate(block.blocks.values())
-            for place in range(len(rights))
-        ]
+        inner = [f"{block.prefix}s{i} = out[o, {block.prefix}b + {i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
         after = [f"{name} = {value}" for name, value in block.after.items()]
         sums = [*inner, *self._sums("o + 1")]
@@ -81,18 +77,25 @@ class StateLoop:
 
     def _rows(self) -> list[str]:
         """What stands side by side is written as one vector, so that it can be read as one soon."""
-        block, rows = self.block, [f"store_row(out, o, 0, ({', '.join(self.front)},))"]
-        for i, (left, rights) in enumerate(block.blocks.items()):
-            values = ", ".join(block.entries[left, right] for right in rights)
-            rows.append(f"store_row(out, o, {block.prefix}b{i}, ({values},))")
-        return rows
+        block, rows = self.block, [("0", self.front)]
+        if block.pairs:
+            rows.append((f"{block.prefix}b", [block.entries[pair] for pair in block.pairs]))
+        if len(self._lefts) > 1:
+            rows.append((f"{block.prefix}a", [f"out[o, {left}]" for left, _ in block.pairs]))
+        return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
+
+    @property
+    def _lefts(self) -> set[str]:
+        """Columns of the first factors: where all are the same it is read from there."""
+        return {left for left, _ in self.block.pairs}
 
     def _sums(self, order: str) -> list[str]:
-        block = self.block
-        return [
-            f"convolve(out, {order}, 2, {left}, {block.prefix}b{i}, {padded(len(rights))}, {WIDE})"
-            for i, (left, rights) in enumerate(block.blocks.items())
-        ]
+        prefix, width = self.block.prefix, padded(len(self.block.pairs))
+        if not width:
+            return []
+        if len(self._lefts) > 1:
+            return [f"convolve_pairs(out, {order}, 2, {prefix}a, {prefix}b, {width}, {WIDE})"]
+        return [f"convolve(out, {order}, 2, {self._lefts.pop()}, {prefix}b, {width}, {WIDE})"]
 
 
 class TangentLoop:

@@ -31,6 +31,14 @@ def convolve(series, order, inset, left, first, width, widest):
     series[order, first : first + width] = sums
 
 
+def convolve_pairs(series, order, inset, left, first, width, widest):
+    """As ``convolve``, but each column has a factor of its own: these begin at ``left``."""
+    sums = np.zeros(width)
+    for j in range(inset, order - inset + 1):
+        sums += series[j, left : left + width] * series[order - j, first : first + width]
+    series[order, first : first + width] = sums
+
+
 def evaluate(series, order, s, first, width):
     """Values at ``s`` of ``width`` series, a multiple of 4, from ``first`` on, into ``series[order + 1]``.
 
@@ -94,7 +102,14 @@ def gather_tangents(series, order, n, first, stride, y):
 @overload(convolve, jit_options=HERE)
 def _overload_convolve(series, order, inset, left, first, width, widest):
     return lambda series, order, inset, left, first, width, widest: _convolve_in_registers(
-        series, order, inset, left, first, width, widest
+        series, order, inset, left, first, width, widest, False
+    )
+
+
+@overload(convolve_pairs, jit_options=HERE)
+def _overload_convolve_pairs(series, order, inset, left, first, width, widest):
+    return lambda series, order, inset, left, first, width, widest: _convolve_in_registers(
+        series, order, inset, left, first, width, widest, True
     )
 
 
@@ -181,7 +196,7 @@ def _as_known(*kinds):
 
 
 @intrinsic(prefer_literal=True)
-def _convolve_in_registers(typing_context, series, order, inset, left, first, width, widest):
+def _convolve_in_registers(typing_context, series, order, inset, left, first, width, widest, pairs):
     if not (isinstance(width, types.IntegerLiteral) and isinstance(widest, types.IntegerLiteral)):
         return None
     registers = _registers(width.literal_value, widest.literal_value)
@@ -200,11 +215,14 @@ def _convolve_in_registers(typing_context, series, order, inset, left, first, wi
         ]
 
         def add_term(row_of_totals):
-            a, b = builder.load(rows.walk(factor, -1)), rows.walk(other, 1)
+            a, b = rows.walk(factor, -1), rows.walk(other, 1)
             for (place, each), total in zip(registers, row_of_totals, strict=True):
                 term = read(builder, rows.beside(b, place), each)
-                product = multiply_add(builder, everywhere(builder, a, each), term, builder.load(total))
-                builder.store(product, total)
+                if pairs.literal_value:
+                    times = read(builder, rows.beside(a, place), each)
+                else:
+                    times = everywhere(builder, builder.load(a), each)
+                builder.store(multiply_add(builder, times, term, builder.load(total)), total)
 
         terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
         terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
@@ -222,7 +240,7 @@ def _convolve_in_registers(typing_context, series, order, inset, left, first, wi
             write(builder, parts[0], rows.beside(target, place))
         return context.get_dummy_value()
 
-    known = _as_known(order, inset, left, first, width, widest)
+    known = _as_known(order, inset, left, first, width, widest, pairs)
     return types.void(series, *known), generate
 
 

@@ -10,6 +10,7 @@ from hybrid.kernels.columns import (
     combine,
     combine_tangents,
     convolve,
+    convolve_pairs,
     evaluate,
     evaluate_with_sizes,
     gather_tangents,
@@ -19,12 +20,12 @@ from hybrid.kernels.layout import MATRIX
 
 
 @cache
-def compiled_convolve(width, widest):
+def compiled_convolve(function, width, widest):
     """The width of a convolution and its registers' are known when it is compiled."""
 
     @njit(void(MATRIX, int64, int64, int64, int64))
     def compiled(series, order, inset, left, first):
-        convolve(series, order, inset, left, first, width, widest)
+        function(series, order, inset, left, first, width, widest)
 
     return compiled
 
@@ -47,11 +48,11 @@ def pair(columns=44):
 @pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 7, 28])
 @pytest.mark.parametrize("inset", [1, 2])
-@pytest.mark.parametrize("widest", [4, 8])
-def test_convolve(order, width, inset, widest):
-    series, plain = pair()
-    compiled_convolve(width, widest)(series, order, inset, 3, 7)
-    convolve(plain, order, inset, 3, 7, width, widest)
+@pytest.mark.parametrize(("widest", "function"), [(4, convolve), (8, convolve), (8, convolve_pairs)])
+def test_convolve(order, width, inset, widest, function):
+    series, plain = pair(80)
+    compiled_convolve(function, width, widest)(series, order, inset, 3, 43)
+    function(plain, order, inset, 3, 43, width, widest)
     np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
 
 
