@@ -11,7 +11,8 @@ from numba import njit
 from hybrid.load import load_kernels
 
 KERNELS = load_kernels("hybrid.kernels.series_guards")
-_judge, _to_bernstein, _leading = KERNELS.judge_leading, KERNELS.to_bernstein, KERNELS.leading_powers
+_judge, _to_bernstein, _leading = KERNELS.judge_leading, KERNELS.leading_to_bernstein, KERNELS.leading_powers
+_expanded_at, _root_between = KERNELS.expanded_at, KERNELS.root_between
 CLEAR, CROSSES, UNKNOWN = KERNELS.CLEAR, KERNELS.CROSSES, KERNELS.UNKNOWN
 ORDER = 28
 
@@ -21,8 +22,7 @@ def _judged(powers, side, band, last, size):
     series = powers.reshape((-1, 1))
     polynomial, stack = np.zeros(40), np.zeros((64, 40))
     degree, rest = _leading(series, 0, len(powers) - 1, 1.0, 0, size, polynomial, 1.0)
-    _to_bernstein(polynomial, degree)
-    stack[0, 2 : 3 + degree] = polynomial[: degree + 1]
+    _to_bernstein(polynomial, degree, stack)
     verdict, start, end, _ = _judge(degree, rest, (len(powers) - 1) * rest, side, band, last, stack)
     return verdict, start, end, degree, rest
 
@@ -90,3 +90,66 @@ def test_the_share_of_nearly_all_steps_is_decided():
         powers[0] = random.choice([-1.0, 1.0]) * random.uniform(0.2, 1.0)
         verdicts.append(judged(powers)[1])
     assert np.mean(np.array(verdicts) == UNKNOWN) < 0.1
+
+
+@njit
+def _converted(powers, degree):
+    stack = np.zeros((2, 40))
+    _to_bernstein(powers, degree, stack)
+    return stack[0, 2 : 3 + degree].copy()
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 7, 12, 15, 16, 20, 28])
+def test_bernstein_coefficients(degree):
+    """In registers up to degree 15, one by one above."""
+    powers = np.random.default_rng(degree).normal(size=40)
+    shares = [
+        sum(math.comb(i, k) / math.comb(degree, k) * powers[k] for k in range(i + 1))
+        for i in range(degree + 1)
+    ]
+    np.testing.assert_allclose(_converted(powers, degree), shares, rtol=1e-12, atol=1e-13)
+
+
+@njit
+def _expanded(powers, first, s):
+    return _expanded_at(powers.reshape((-1, 1)), 0, first, len(powers) - 1, s)
+
+
+@njit
+def _root(powers, known_roots, low, high):
+    series = powers.reshape((-1, 1))
+    left, _, _ = _expanded_at(series, 0, known_roots, len(powers) - 1, low)
+    right, _, _ = _expanded_at(series, 0, known_roots, len(powers) - 1, high)
+    return _root_between(series, 0, len(powers) - 1, known_roots, 1.0, low, high, left, right)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 8, 27, 28])
+@pytest.mark.parametrize("first", [0, 1])
+def test_value_and_derivatives(order, first):
+    powers = np.random.default_rng(order).normal(size=order + 1)
+    divided = np.polynomial.Polynomial(powers[first:])
+    exact = [divided(0.7), divided.deriv()(0.7), divided.deriv(2)(0.7) / 2]
+    np.testing.assert_allclose(_expanded(powers, first, 0.7), exact, rtol=1e-12, atol=1e-12)
+
+
+@given(
+    root=st.floats(0.05, 0.95),
+    gap=st.floats(1e-7, 0.04),
+    known_roots=st.integers(0, 2),
+    tail=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12),
+)
+def test_a_root_next_to_a_turning_point(root, gap, known_roots, tail):
+    """The bracket ends where the guard turns back: the slope vanishes at one end of it."""
+    # (s - root) (s - root - 2 gap) times what keeps away from zero.
+    rest = np.polynomial.Polynomial([1.0, *(0.3 * v / len(tail) for v in tail)])
+    pair = np.polynomial.Polynomial.fromroots([root, root + 2.0 * gap])
+    powers = np.concatenate([np.zeros(known_roots), (pair * rest).coef])
+    found = _root(powers, known_roots, 0.0 if known_roots == 0 else 1e-3, root + gap)
+    # Rounding of the terms, over the slope.
+    assert abs(found - root) <= 64 * 2.2e-16 / (2.0 * gap * root**known_roots)
+
+
+def test_a_root_to_rounding():
+    """A series as long as those of exact modes: the cosine."""
+    powers = np.array([0.0 if k % 2 else (-1.0) ** (k // 2) / math.factorial(k) for k in range(ORDER + 1)])
+    assert _root(powers, 0, 1.0, 2.0) == pytest.approx(math.pi / 2, abs=2.3e-16)
