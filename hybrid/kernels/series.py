@@ -38,9 +38,9 @@ from hybrid.kernels.powers import binary_logarithms, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.series_guards import (
     earliest_on_series,
+    expanded_at,
     powers_on_step,
     raised_to_bernstein,
-    slope_at,
     to_bernstein,
     value_at,
 )
@@ -62,6 +62,8 @@ CLOSE = 1e-8
 LONG = 100.0
 # Share of the last stay in a mode by which a step goes beyond it.
 AHEAD = 0.25
+# Share of time below which that is no step.
+NEXT_TO_NOTHING = 1e-10
 
 
 @njit(**INLINE)
@@ -159,12 +161,13 @@ def time_of(series, clock, order, h, span):
     low, high = 0.0, h
     s = h * math.sqrt(span / value_at(series, clock, order, h))
     for _ in range(100):
-        misfit = value_at(series, clock, order, s) - span
+        value, slope, _ = expanded_at(series, clock, 0, order, s)
+        misfit = value - span
         if misfit > 0.0:
             high = s
         else:
             low = s
-        newton = s - misfit / slope_at(series, clock, order, s)
+        newton = s - misfit / slope
         if not low < newton < high:
             newton = 0.5 * (low + high)
         if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
@@ -336,10 +339,13 @@ def series_step(model, method, run, record, tangents, remaining, work):
 def as_far_as_last_time(run, mode):
     """A little more than is left of a stay as long as the last one; anything if it is longer already.
 
-    The event that ends it is found on the way; a longer step would only make it harder to find.
+    The event that ends it is found on the way; a longer step would only make it harder to find. A stay that
+    was next to nothing says nothing of this one.
     """
-    left = run.stay[mode] - run.clock[SINCE_ENTRY]
-    return left + AHEAD * run.stay[mode] if left > 0.0 else math.inf
+    left, beyond = run.stay[mode] - run.clock[SINCE_ENTRY], AHEAD * run.stay[mode]
+    if left > 0.0 and beyond > NEXT_TO_NOTHING * abs(run.clock[PHASE]):
+        return left + beyond
+    return math.inf
 
 
 @njit(**KERNEL)

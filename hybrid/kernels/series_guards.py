@@ -55,15 +55,6 @@ def value_at(series, column, order, s):
 
 
 @njit(**INLINE)
-def slope_at(series, column, order, s):
-    """Derivative of one series."""
-    total = order * series[order, column]
-    for o in range(order - 1, 0, -1):
-        total = total * s + o * series[o, column]
-    return total
-
-
-@njit(**INLINE)
 def to_bernstein(coefficients, degree):
     """Turn power coefficients on ``[0, 1]`` into Bernstein coefficients, in place."""
     for k in range(1, degree + 1):

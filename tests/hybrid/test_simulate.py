@@ -83,6 +83,44 @@ class TestExactAnswers:
         assert arc.jumps[0].saltation[1, 0] == pytest.approx(BALL["saltation"][0][1][0], rel=1e-9)
 
 
+class TestStays:
+    """How long the last stay in a mode was says how far to step, not what is found."""
+
+    @staticmethod
+    def turn(lengths):
+        """A clock that stays in ``run`` for one of two lengths in turn, and for a second in ``rest``."""
+        first, second = lengths
+        return HybridSystem(
+            state=("x", "length"),
+            modes=[Mode(name, lambda t, x, p: (1.0, 0.0)) for name in ("run", "rest")],
+            transitions=[
+                Transition(
+                    "run",
+                    "rest",
+                    Guard(lambda t, x, p: x.x - x.length, direction=1),
+                    Reset(lambda t, x, p: (0.0, first + second - x.length)),
+                ),
+                Transition(
+                    "rest",
+                    "run",
+                    Guard(lambda t, x, p: x.x - 1.0, direction=1),
+                    Reset(lambda t, x, p: (0.0, x.length)),
+                ),
+            ],
+        )
+
+    @pytest.mark.parametrize("t0", [0.0, 1e6])
+    @pytest.mark.parametrize("lengths", [(1.0, 30.0), (1e-3, 1e3), (1e-9, 1.0), (1e-12, 1.0)])
+    def test_stays_of_two_lengths(self, lengths, t0):
+        arc = simulate(self.turn(lengths), (0.0, lengths[0]), (t0, t0 + 2.5 * (2 + sum(lengths))), mode="run")
+        assert arc.status.ok
+        stays = [*lengths, *lengths]
+        assert len(arc.jumps) >= 2 * len(stays)
+        exact = t0 + np.cumsum([span for stay in stays for span in (stay, 1.0)])
+        np.testing.assert_allclose(arc.jumps.t[: 2 * len(stays)], exact, rtol=1e-14, atol=1e-14)
+        assert arc.steps <= 3 * len(arc.jumps) + 2
+
+
 class TestInvariance:
     @pytest.mark.parametrize("factor", [1e-12, 1e-3, 7.0, 1e9])
     def test_scale_of_a_guard(self, factor):
