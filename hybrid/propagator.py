@@ -190,7 +190,7 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 def _write(
     field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
 ) -> tuple[tuple[str, ...], int, int, int]:
-    body = _Body(symbols, guards, {}, ONE_THEN_ZERO)
+    body = _Body(symbols, guards, (), ONE_THEN_ZERO)
     seeds = _seeds(symbols)
     tangents = [directional(rate, seeds) for rate in field]
     trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
@@ -387,7 +387,7 @@ class _Body:
         return moved
 
     def _place_pairs(self, block: Recurrences) -> None:
-        for factors in ("a", "b"):
+        for factors in "ab" if block.common_left is None else "b":
             self.columns = padded(self.columns, WIDE)
             self.preamble.append(f"{block.prefix}{factors} = {self.columns}")
             self.columns += padded(len(block.pairs))

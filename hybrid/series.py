@@ -45,8 +45,8 @@ class Recurrences:
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
     ``o``. Convolutions are taken in parts: the terms at their ends hold what this order and the one before
     bring, all those between hold lower orders only and can be summed early, all side by side: ``pairs`` lists
-    the column of the first factor and the second. In every sum what is known last is added last: nothing
-    waits for it twice.
+    the column of the first factor and the second, with the text of its coefficient. In every sum what is
+    known last is added last: nothing waits for it twice.
 
     With ``lanes`` a coefficient is that of four tangent vectors at once, in four columns. These have been
     written as one and are read as one, which is quick even for the order before. ``blocks`` lists, by the
@@ -88,10 +88,8 @@ class Recurrences:
         self.known = known
         self.first: list[str] = []
         self.higher: list[str] = []
-        self.after: dict[str, str] = {}
-        self.pairs: list[tuple[str, sympy.Expr]] = []
+        self.pairs: dict[tuple[str, sympy.Expr], str] = {}
         self.blocks: dict[str, list[sympy.Expr]] = {}
-        self.entries: dict[tuple[str, sympy.Expr], str] = {}
         self.variables: dict[sympy.Expr, str] = {}
         self.slopes: dict[sympy.Expr, str] = {}
         self.shared: Counter[sympy.Expr] = Counter()
@@ -193,16 +191,29 @@ class Recurrences:
                 rights.append(right)
             block, place = list(self.blocks).index(left), rights.index(right)
             return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {NARROW * place}"
-        if (left, right) not in self.pairs:
-            self.pairs.append((left, right))
-        place = self.pairs.index((left, right))
+        self.pairs.setdefault((left, right), "")
+        place = list(self.pairs).index((left, right))
         column = f"{self.prefix}b + {place}"
-        # The last coefficients but one of both factors. For the first order there are none, for the second
-        # both terms would be the same.
-        left_before = f"{self.prefix}q{[each for each, _ in self.pairs].index(left)}"
-        self.after[left_before] = f"out[o, {left}] if o > 1 else 0.0"
         inner = f"{self.prefix}s{place} + out[1, {left}]*{self.prefix}p{place}"
-        return f"({inner} + {left_before}*out[1, {column}])", column
+        return f"({inner} + {self._left_before(left)}*out[1, {column}])", column
+
+    def _left_before(self, left: str) -> str:
+        """Name of the last coefficient but one of a first factor."""
+        return f"{self.prefix}q{[each for each, _ in self.pairs].index(left)}"
+
+    def before(self) -> dict[str, str]:
+        """Names of the last coefficients but one of all factors, and what they are once an order is done.
+
+        For the first order there are none, for the second both terms with them would be the same.
+        """
+        lefts = {self._left_before(left): f"out[o, {left}] if o > 1 else 0.0" for left, _ in self.pairs}
+        return lefts | {f"{self.prefix}p{i}": value for i, value in enumerate(self.pairs.values())}
+
+    @property
+    def common_left(self) -> str | None:
+        """The column of the first factor of all pairs, if they have one in common."""
+        lefts = {left for left, _ in self.pairs}
+        return lefts.pop() if len(lefts) == 1 else None
 
     def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
         """``_place``, and the coefficient of the other factor, which is written there."""
@@ -216,8 +227,7 @@ class Recurrences:
         if self.lanes:
             self._both(self.put("o", column, value))
         else:
-            self.entries[left, right] = value
-            self.after[f"{self.prefix}p{self.pairs.index((left, right))}"] = value
+            self.pairs[left, right] = value
 
     def _slope(self, u: sympy.Expr) -> str:
         """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""

@@ -58,7 +58,7 @@ class StateLoop:
         begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
         # Order one is read, and multiplied by what is not there yet, before it is written.
         nothing = f"store_row(out, 1, 0, ({'0.0, ' * len(self.front)}))"
-        before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.after)]
+        before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.before())]
         return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
 
     def higher(self) -> list[str]:
@@ -66,7 +66,7 @@ class StateLoop:
         block = self.block
         inner = [f"{block.prefix}s{i} = out[o, {block.prefix}b + {i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
-        after = [f"{name} = {value}" for name, value in block.after.items()]
+        after = [f"{name} = {value}" for name, value in block.before().items()]
         sums = [*inner, *self._sums("o + 1")]
         return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
 
@@ -79,23 +79,19 @@ class StateLoop:
         """What stands side by side is written as one vector, so that it can be read as one soon."""
         block, rows = self.block, [("0", self.front)]
         if block.pairs:
-            rows.append((f"{block.prefix}b", [block.entries[pair] for pair in block.pairs]))
-        if len(self._lefts) > 1:
+            rows.append((f"{block.prefix}b", list(block.pairs.values())))
+        if block.pairs and block.common_left is None:
             rows.append((f"{block.prefix}a", [f"out[o, {left}]" for left, _ in block.pairs]))
         return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
 
-    @property
-    def _lefts(self) -> set[str]:
-        """Columns of the first factors: where all are the same it is read from there."""
-        return {left for left, _ in self.block.pairs}
-
     def _sums(self, order: str) -> list[str]:
         prefix, width = self.block.prefix, padded(len(self.block.pairs))
+        left = self.block.common_left
         if not width:
             return []
-        if len(self._lefts) > 1:
+        if left is None:
             return [f"convolve_pairs(out, {order}, 2, {prefix}a, {prefix}b, {width}, {WIDE})"]
-        return [f"convolve(out, {order}, 2, {self._lefts.pop()}, {prefix}b, {width}, {WIDE})"]
+        return [f"convolve(out, {order}, 2, {left}, {prefix}b, {width}, {WIDE})"]
 
 
 class TangentLoop:

@@ -87,6 +87,12 @@ def first_crossing(coefficients, degree, side, direction, stack):
 
 
 @njit(**INLINE)
+def crosses_towards(direction, side):
+    """Whether a transition fires on a crossing to that side."""
+    return direction == 0 or direction == side
+
+
+@njit(**INLINE)
 def halve(stack, top, degree):
     """Cut the part in a row of the stack in two: the left half, to be looked at first, goes on top."""
     row, left = stack[top], stack[top + 1]
@@ -129,7 +135,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
             side = first
         if first != side:
             side = first
-            if direction == 0 or direction == first:
+            if crosses_towards(direction, first):
                 return start, start, top, side
         if variations > 1 and end - start > CLUSTER:
             halve(stack, top, degree)
@@ -138,7 +144,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
         if last != side:
             side = last
             at_start = unknown and start == 0.0 and variations > 1
-            if not at_start and direction in (0, last):
+            if not at_start and crosses_towards(direction, last):
                 return start, start if variations > 1 else end, top, side
         top -= 1
     if coefficients[degree] == 0.0:
@@ -147,7 +153,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
         after = 1 if slope > 0.0 else (-1 if slope < 0.0 else side)
         if after != side:
             side = after
-            if direction == 0 or direction == after:
+            if crosses_towards(direction, after):
                 return 1.0, 1.0, 0, side
     return NO_ROOT, NO_ROOT, 0, side
 

@@ -89,19 +89,17 @@ def follow_mean(model, run, transition, speed, span, work):
 
 
 @njit(**INLINE)
-def change_of_limit_time(method, run, ratio, shift, span):
+def change_of_limit_time(method, run, gain, shift, span):
     """What later jumps will still change of the time to the limit, in units of the tolerances.
 
-    Judged from the change since the jump before, by ``shift``, and from its order, the second in the speed.
+    Judged from the change since the jump before, by ``shift``, of which they will still make ``gain`` times.
     """
-    gain = ratio * ratio / (1.0 - ratio * ratio)
     return gain * abs(shift) / (method.rtol * span + 8.0 * EPSILON * abs(run.clock[PHASE]))
 
 
 @njit(**KERNEL)
-def change_of_limit(model, method, run, ratio, misfit, work):
+def change_of_limit(model, method, run, gain, misfit, work):
     """The same of the limit in ``work.settled``; ``misfit`` is that of its time."""
-    gain = ratio * ratio / (1.0 - ratio * ratio)
     for i in range(model.dimension):
         limit = work.settled[i]
         scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
@@ -136,10 +134,12 @@ def accumulation(model, method, run, transition, since_last, work):
         drowned = height <= band
         shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
         shift = span - (run.trail[LIMIT, n] - since_last)
-        misfit = change_of_limit_time(method, run, ratio, shift, span)
+        # The change is of second order in the speed, which each jump multiplies by the ratio.
+        gain = ratio * ratio / (1.0 - ratio * ratio)
+        misfit = change_of_limit_time(method, run, gain, shift, span)
         if drowned or not misfit * method.rtol > FAR:
             follow_mean(model, run, transition, side * speed, span, work)
-            misfit = change_of_limit(model, method, run, ratio, misfit, work)
+            misfit = change_of_limit(model, method, run, gain, misfit, work)
         else:
             # Jumps that are driven, and no chatter yet: there is no limit to compare the next one with.
             run.trail[LIMIT, 0] = math.inf

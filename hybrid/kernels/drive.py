@@ -4,6 +4,7 @@ import math
 
 from numba import boolean, float64, int64, njit
 
+from hybrid.kernels.bernstein import crosses_towards
 from hybrid.kernels.clock import forward, time_left
 from hybrid.kernels.codes import (
     ACCUMULATION,
@@ -65,7 +66,7 @@ def arrived(model, run, work):
         if run.on_guard[transition] == 0 and abs(value) <= rounding_band(model, run, t, work.gradient):
             after = 1 if speed > 0.0 else -1
             direction = model.direction[transition]
-            crossed = speed != 0.0 and after != run.side[transition] and direction in (0, after)
+            crossed = speed != 0.0 and after != run.side[transition] and crosses_towards(direction, after)
             if found == NO_TRANSITION and crossed and allowed(model, transition, t, run.y, work.scalar):
                 found = transition
     for i in range(model.dimension):

@@ -103,10 +103,10 @@ class Run(Structure):
     (modes,)`` how long the last stay in it was; ``scale (n,)`` the size of the components over the last step,
     against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the
     tangent vectors by orthonormalisation. ``trail (3, n + 1)`` follows the jumps of one transition to their
-    limit. The last three serve the jumps
-    that one jump sets off at once: ``before (n k,)`` and ``growth_before (k,)`` are the tangent vectors and
-    their growth before it, ``instant (n (1 + n),)`` what it and they make of a tangent vector since, first
-    the derivative of their instant and then the columns of the tangent map.
+    limit. The last three serve the jumps that one jump sets off at once: ``before (n k,)`` and
+    ``growth_before (k,)`` are the tangent vectors and their growth before it, ``instant (n (1 + n),)`` what
+    it and they make of a tangent vector since, first the derivative of their instant and then the columns of
+    the tangent map.
     """
 
     count: INDICES

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from hybrid.kernels.bernstein import NO_ROOT, SETTLED, bracket_crossing, halve, stays
+from hybrid.kernels.bernstein import NO_ROOT, SETTLED, bracket_crossing, crosses_towards, halve, stays
 from hybrid.kernels.codes import (
     DESINGULARISED,
     EXACT,
@@ -284,12 +284,6 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
             return closer
         s, last = closer, change
     return s
-
-
-@njit(**INLINE)
-def crosses_towards(direction, side):
-    """Whether a transition fires on a crossing to that side."""
-    return direction == 0 or direction == side
 
 
 @njit(**KERNEL)
