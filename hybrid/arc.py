@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from math import comb
+from functools import cached_property
 from typing import Any, overload
 
 import attrs
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid.errors import ArgumentError
+from hybrid.load import entry, load_kernels
 from hybrid.status import Status
 from hybrid.system import HybridSystem
 
@@ -81,29 +82,49 @@ class Jumps(Sequence[Jump]):
 
     Attributes
     ----------
-    t, transversality
-        ``(jumps,)``.
-    transition
-        ``(jumps,)`` indices into the system's transitions.
-    kind
-        ``(jumps,)`` indices into ``KINDS``.
-    x_minus, x_plus
-        ``(jumps, n)``.
     saltation
         ``(jumps, n, n)``, as in :class:`Jump`.
     """
 
     system: HybridSystem
-    t: np.ndarray
-    transversality: np.ndarray
-    transition: np.ndarray
-    kind: np.ndarray
-    x_minus: np.ndarray
-    x_plus: np.ndarray
+    _period: float
+    _time: np.ndarray
+    _place: np.ndarray
+    _states: np.ndarray
     saltation: np.ndarray
 
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Times ``(jumps,)``."""
+        return self._place[:, 0] * self._period + self._time[:, 0]
+
+    @property
+    def transversality(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps,)``."""
+        return self._time[:, 1]
+
+    @property
+    def transition(self) -> np.ndarray:
+        """Indices ``(jumps,)`` into the system's transitions."""
+        return self._place[:, 1]
+
+    @property
+    def kind(self) -> np.ndarray:
+        """Indices ``(jumps,)`` into ``KINDS``."""
+        return self._place[:, 2]
+
+    @property
+    def x_minus(self) -> np.ndarray:
+        """States before the jumps, ``(jumps, n)``."""
+        return self._states[:, 0]
+
+    @property
+    def x_plus(self) -> np.ndarray:
+        """States after the jumps, ``(jumps, n)``."""
+        return self._states[:, 1]
+
     def __len__(self) -> int:
-        return len(self.t)
+        return len(self._place)
 
     def __repr__(self) -> str:
         return f"<{len(self)} jumps>"
@@ -142,7 +163,7 @@ class Jumps(Sequence[Jump]):
 
 @attrs.frozen(eq=False)
 class Pieces:
-    """The smooth steps of a run: ``S`` polynomials in Bernstein form.
+    """The smooth steps of a run: ``S`` polynomials, each of its place on ``[0, 1]``.
 
     Attributes
     ----------
@@ -151,8 +172,8 @@ class Pieces:
     mode, j
         Mode index and jump count of each, ``(S,)``.
     coefficients
-        ``(S, d + 1, n + 1)`` of the state and, last, of the time since the start of the step. The variable
-        of a desingularised mode is not proportional to time.
+        ``(S, d + 1, n + 1)`` of the powers ``1, theta, theta^2, ...``, of the state and, last, of the time
+        since the start of the step. The variable of a desingularised mode is not proportional to time.
     """
 
     t: np.ndarray
@@ -163,46 +184,11 @@ class Pieces:
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(len(times), n)`` and the index of the step each was taken from; at a jump, after it."""
-        index = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, None)
-        coefficients = self.coefficients[index]
-        theta = _places(coefficients[:, :, -1], times - self.t[index], self.h[index])
-        return bernstein_values(coefficients[:, :, :-1], theta), index
-
-
-def bernstein_values(coefficients: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """Values ``(N, ...)`` of polynomials ``(N, d + 1, ...)`` at one place of ``[0, 1]`` each."""
-    degree = coefficients.shape[1] - 1
-    theta = theta.reshape(-1, *[1] * (coefficients.ndim - 2))
-    total, power, rest = np.zeros_like(coefficients[:, 0]), np.ones_like(theta), 1.0 - theta
-    # Of the form of Horner's rule, with the binomials along the way; all terms of one sign stay so.
-    for j in range(degree + 1):
-        total = total * rest + comb(degree, j) * power * coefficients[:, j]
-        power = power * theta
-    return total
-
-
-def _places(clock: np.ndarray, since: np.ndarray, span: np.ndarray) -> np.ndarray:
-    """Place on ``[0, 1]`` where each clock ``(N, d + 1)`` shows the time ``since`` the start of its step."""
-    theta = np.clip(since / span, 0.0, 1.0)
-    degree = clock.shape[1] - 1
-    even = np.arange(degree + 1) / degree
-    uneven = np.flatnonzero(np.max(np.abs(clock - span[:, None] * even), axis=1) > 1e-12 * span)
-    if not uneven.size:
-        return theta
-    clock, since = clock[uneven], since[uneven]
-    low, high = np.zeros(uneven.size), np.ones(uneven.size)
-    place, slopes = theta[uneven], degree * np.diff(clock, axis=1)
-    for _ in range(60):
-        misfit = bernstein_values(clock, place) - since
-        low, high = np.where(misfit <= 0.0, place, low), np.where(misfit >= 0.0, place, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            newton = place - misfit / bernstein_values(slopes, place)
-        newton = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
-        moved, place = np.max(np.abs(newton - place)), newton
-        if moved <= 1e-16:
-            break
-    theta[uneven] = place
-    return theta
+        states = np.empty((len(times), self.coefficients.shape[2] - 1))
+        index = np.empty(len(times), dtype=np.int64)
+        kernel = entry(load_kernels("hybrid.kernels.dense").states_at)
+        kernel(np.ascontiguousarray(times), self.t, self.h, self.coefficients, states, index)
+        return states, index
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -216,8 +202,8 @@ class HybridArc:
     ----------
     system, parameters
         The model and the parameter values ``(m,)`` of the run.
-    t, j, x, mode
-        Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``, mode names ``(N,)``.
+    t, j, x
+        Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``.
     jumps
         Sequence of :class:`Jump`.
     grazings
@@ -240,7 +226,7 @@ class HybridArc:
     t: np.ndarray
     j: np.ndarray
     x: np.ndarray
-    mode: np.ndarray
+    _mode_index: np.ndarray
     jumps: Jumps
     grazings: tuple[Grazing, ...]
     status: Status
@@ -248,7 +234,12 @@ class HybridArc:
     propagators: dict[str, str]
     steps: int
     rejected: int
-    _pieces: Pieces | None = attrs.field(alias="pieces")
+    _pieces: Pieces | None
+
+    @cached_property
+    def mode(self) -> np.ndarray:
+        """Names of the modes, ``(N,)``."""
+        return np.array(self.system.mode_names)[self._mode_index]
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
@@ -276,9 +267,9 @@ class HybridArc:
         flat = times.ravel()
         if len(self._pieces.t) == 0:
             return np.broadcast_to(self.x[-1], (*times.shape, self.system.dimension)).copy()
-        states, index = self._pieces.at(flat)
-        # A step ends at its jump: what lies at or after the last of them is the end of the run.
-        states[(flat >= self.t[-1]) & (self._pieces.j[index] < self.j[-1])] = self.x[-1]
+        states, _ = self._pieces.at(flat)
+        # A step ends at its jump, but the end of the run may be after it.
+        states[flat >= self.t[-1]] = self.x[-1]
         return states.reshape(*times.shape, self.system.dimension)
 
 
@@ -287,17 +278,24 @@ def hybrid_points(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Times, jump counts, states, mode indices in order: step starts, states before jumps, the end."""
     t_end, x_end, mode_end = end
-    last = [t_end], [len(jumps)], [x_end], [mode_end]
-    starts = pieces.t, pieces.j, pieces.coefficients[:, 0, :-1], pieces.mode
-    if not len(jumps):
-        t, j, x, mode = join([starts, last])
-        return t, j, x, mode
+    count = np.arange(len(jumps))
+    # The state before a jump follows the starts of all steps with as many jumps.
+    before = np.searchsorted(pieces.j, count, side="right") + count
+    starts = np.ones(len(pieces.t) + len(jumps) + 1, dtype=bool)
+    starts[before] = starts[-1] = False
+
+    def in_order(of_steps: np.ndarray, of_jumps: np.ndarray, at_end: Any) -> np.ndarray:
+        column = np.empty((len(starts), *of_steps.shape[1:]), of_steps.dtype)
+        column[starts], column[before], column[-1] = of_steps, of_jumps, at_end
+        return column
+
     sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
-    before = jumps.t, np.arange(len(jumps)), jumps.x_minus, sources[jumps.transition]
-    t, j, x, mode = join([starts, before, last])
-    kind = np.repeat([0, 1, 1], [len(pieces.t), len(jumps), 1])
-    order = np.lexsort((kind, j))
-    return t[order], j[order], x[order], mode[order]
+    return (
+        in_order(pieces.t, jumps.t, t_end),
+        in_order(pieces.j, count, len(jumps)),
+        in_order(pieces.coefficients[:, 0, :-1], jumps.x_minus, x_end),
+        in_order(pieces.mode, sources[jumps.transition], mode_end),
+    )
 
 
 def join(chunks: list[tuple[Any, ...]]) -> tuple[np.ndarray, ...]:

@@ -41,6 +41,7 @@ def kernel_method(solver: RungeKutta) -> Any:
         second_error=tableau.second_error,
         quadrature=tableau.quadrature,
         interpolant=tableau.interpolant,
+        powers=tableau.powers,
         implicit=int(tableau.implicit),
         order=solver.order if isinstance(solver, Taylor) else 0,
         exponent=1.0 / tableau.error_order,
@@ -82,9 +83,14 @@ def solver_parts(compiled: CompiledSystem, solver: RungeKutta) -> Any:
     return driver_parts(series_only, bool(solver.tableau.implicit))
 
 
-def dense_degree(method: Any) -> int:
+def dense_degree(compiled: CompiledSystem, solver: RungeKutta) -> int:
     """Degree of the polynomials that a record of steps holds."""
-    return max(len(method.interpolant) - 1, codes.HIGHEST_ORDER if method.order else 0)
+    degrees = {codes.RUNGE_KUTTA: len(solver.tableau.interpolant) - 1}
+    if not isinstance(solver, Taylor):
+        return degrees[codes.RUNGE_KUTTA]
+    degrees[codes.EXACT] = codes.HIGHEST_ORDER
+    modes = compiled.emitted.propagators
+    return max(each.degree or degrees.get(each.kind, solver.order) for each in modes)
 
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
@@ -113,7 +119,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any
     nodes, fit = _fit_of_guards()
     # Whole vectors of columns are evaluated: there may be a few more than are in use.
     width_of_series = -(-columns // codes.WIDE) * codes.WIDE
-    width = max(dense_degree(method), FIT_DEGREE) + 4
+    width = max(degree, FIT_DEGREE, codes.HIGHEST_ORDER if method.order else 0) + 4
     shapes = {
         "stages": (stages, length + 1),
         "speeds": (stages,),
@@ -257,14 +263,23 @@ class Trajectory:
     """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed."""
 
     compiled: CompiledSystem
+    plan: Plan
     model: Any
-    method: Any
     run: Any
     work: Any
     tangents: int
-    parts: Any
     max_steps: int
     phase0: float
+
+    @property
+    def method(self) -> Any:
+        """The kernel's view of the solver."""
+        return self.plan.method
+
+    @property
+    def parts(self) -> Any:
+        """The pieces that the driver is handed."""
+        return self.plan.parts
 
     @property
     def system(self) -> HybridSystem:
@@ -298,11 +313,6 @@ class Trajectory:
         n = self.model.dimension
         return self.run.y[n:].reshape(self.tangents, n).T.copy()
 
-    def propagators(self) -> dict[str, str]:
-        """How each mode is advanced in this run."""
-        kinds = [codes.PROPAGATORS[kind] for kind in self.model.propagator.tolist()]
-        return dict(zip(self.system.mode_names, kinds, strict=True))
-
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
         from hybrid.kernels.step import flow_jacobian
@@ -335,9 +345,9 @@ class Trajectory:
         """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run."""
         return int(
             entry(load_kernels().advance)(
-                self.parts,
+                self.plan.parts,
                 self.model,
-                self.method,
+                self.plan.method,
                 self.run,
                 record,
                 self.tangents,
@@ -361,7 +371,7 @@ class Trajectory:
 
     def no_record(self) -> Any:
         """A record that keeps nothing."""
-        return empty_record(self.model.dimension, dense_degree(self.method))
+        return empty_record(self.model.dimension, self.plan.degree)
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
@@ -414,7 +424,7 @@ def start(
     run, phase0 = _fresh_run(plan.run_layout, model, state, tangent, t0)
     work = _fresh_work(plan.work_layout, plan.method)
     run.count[codes.MODE] = choose_mode(system, plan.parts, model, run, work, mode)
-    return Trajectory(compiled, model, plan.method, run, work, tangents, plan.parts, solver.max_steps, phase0)
+    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0)
 
 
 @attrs.frozen(eq=False)
@@ -422,11 +432,14 @@ class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
     ``propagator`` replaces that of the model if it is not None: only Taylor series come from the model.
+    ``propagators`` says how each mode is advanced, by its name; ``degree`` is that of a record's steps.
     """
 
     method: Any
     parts: Any
     propagator: np.ndarray | None
+    propagators: dict[str, str]
+    degree: int
     run_layout: Any
     work_layout: Any
 
@@ -438,10 +451,17 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
         system, method = compiled.system, kernel_method(solver)
         load_kernels("hybrid.kernels.first_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
+        kinds = [each.kind for each in compiled.emitted.propagators]
+        replaced = None
+        if not isinstance(solver, Taylor):
+            kinds = [codes.RUNGE_KUTTA] * modes
+            replaced = np.array(kinds, dtype=np.int64)
         plan = Plan(
             method,
             solver_parts(compiled, solver),
-            None if isinstance(solver, Taylor) else np.full(modes, codes.RUNGE_KUTTA, dtype=np.int64),
+            replaced,
+            {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
+            dense_degree(compiled, solver),
             _run_layout(n, tangents, modes, transitions),
             work_layout(method, n, tangents, compiled.series_columns(tangents)),
         )

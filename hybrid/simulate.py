@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.run import Trajectory, dense_degree, empty_record, start
+from hybrid.run import Trajectory, empty_record, start
 from hybrid.solvers import RungeKutta
 from hybrid.system import HybridSystem
 
@@ -131,66 +131,79 @@ class _Recorder:
     def __init__(self, trajectory: Trajectory, times: np.ndarray | None, t1: float) -> None:
         self.trajectory = trajectory
         self.times = times
-        n = trajectory.model.dimension
-        degree = dense_degree(trajectory.method)
         # The state at the end is at hand without any polynomial.
         only_the_end = times is not None and not (times.size and times[0] < t1)
-        self.record = empty_record(n, degree, 0 if only_the_end else STEPS_AT_ONCE, JUMPS_AT_ONCE)
+        self.steps_at_once = 0 if only_the_end else STEPS_AT_ONCE
+        self.record: Any = None
         self.steps: list[tuple[np.ndarray, ...]] = []
         self.jumps: list[tuple[np.ndarray, ...]] = []
         self.grazings: list[Grazing] = []
-        self.states = np.empty((0 if times is None else len(times), n))
-        self.places = np.empty((len(self.states), 2), dtype=np.int64)
+        self.states = np.empty((0 if times is None else len(times), trajectory.model.dimension))
+        self.places = np.empty((2, len(self.states)), dtype=np.int64)
         self.sampled = 0
 
     def run(self, t0: float, t1: float, max_jumps: int) -> HybridArc:
         trajectory, run = self.trajectory, self.trajectory.run
         code = codes.RECORD_FULL
         while code == codes.RECORD_FULL:
-            code = trajectory.advance(t1, self.record, max_jumps)
-            self._file()
-        columns = join(self.jumps) if self.jumps else _no_jumps(trajectory.model.dimension)
-        jumps = Jumps(trajectory.system, *columns)
+            record = self._record_to_fill()
+            code = trajectory.advance(t1, record, max_jumps)
+            self._file(record)
+        model, system, count = trajectory.model, trajectory.system, run.count.tolist()
+        jumps = Jumps(system, model.period, *(join(self.jumps) if self.jumps else _no_jumps(model.dimension)))
         t_end = t1 if code == codes.DONE else trajectory.t
-        end = (t_end, trajectory.x, int(run.count[codes.MODE]))
-        names = np.array(trajectory.system.mode_names)
+        end = (t_end, trajectory.x, count[codes.MODE])
         pieces = None
         if self.times is None:
             pieces = Pieces(*join(self.steps))
-            t, j, x, mode = hybrid_points(trajectory.system, pieces, jumps, end)
+            t, j, x, mode = hybrid_points(system, pieces, jumps, end)
         else:
             self._sample_end(*end)
             t, x = self.times[: self.sampled], self.states[: self.sampled]
-            mode, j = self.places[: self.sampled].T
+            mode, j = self.places[:, : self.sampled]
         return HybridArc(
-            system=trajectory.system,
-            parameters=trajectory.model.parameters.copy(),
-            t=t,
-            j=j,
-            x=x,
-            mode=names[mode],
-            jumps=jumps,
-            grazings=tuple(self.grazings),
-            status=trajectory.status(code),
-            fundamental=trajectory.tangent_matrix if trajectory.tangents else None,
-            propagators=trajectory.propagators(),
-            steps=int(run.count[codes.STEPS]),
-            rejected=int(run.count[codes.REJECTED]),
-            pieces=pieces,
+            system,
+            model.parameters.copy(),
+            t,
+            j,
+            x,
+            mode,
+            jumps,
+            tuple(self.grazings),
+            trajectory.status(code),
+            trajectory.tangent_matrix if trajectory.tangents else None,
+            trajectory.plan.propagators.copy(),
+            count[codes.STEPS],
+            count[codes.REJECTED],
+            pieces,
         )
 
-    def _file(self) -> None:
-        record, period = self.record, self.trajectory.model.period
+    def _record_to_fill(self) -> Any:
+        """The record of the burst before, or a new one if that was kept."""
+        if self.record is None:
+            n, degree = self.trajectory.model.dimension, self.trajectory.plan.degree
+            self.record = empty_record(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
+        self.record.used[:] = 0
+        return self.record
+
+    def _file(self, record: Any) -> None:
+        period = self.trajectory.model.period
         steps, jumps, grazings = record.used.tolist()
         if jumps:
-            self.jumps.append(_jump_columns(record, jumps, period))
+            self.jumps.append(_jump_columns(record, jumps))
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
-            self.steps.append(_step_columns(record, steps, period))
+            polynomials = record.step_coefficients[:steps]
+            if 2 * steps > self.steps_at_once:
+                # New memory costs more than the part of this that was not used.
+                self.record = None
+            else:
+                polynomials = polynomials.copy()
+            self.steps.append((*_places_of_steps(record, steps, period), polynomials))
         elif steps:
-            self._sample(Pieces(*_step_columns(record, steps, period)))
-        record.used[:] = 0
+            places = _places_of_steps(record, steps, period)
+            self._sample(Pieces(*places, record.step_coefficients[:steps]))
 
     def _sample(self, pieces: Pieces) -> None:
         """States at the samples that fall before the current end of the run."""
@@ -199,7 +212,7 @@ class _Recorder:
         if stop > self.sampled:
             part = slice(self.sampled, stop)
             self.states[part], index = pieces.at(self.times[part])
-            self.places[part] = np.column_stack([pieces.mode[index], pieces.j[index]])
+            self.places[:, part] = pieces.mode[index], pieces.j[index]
             self.sampled = stop
 
     def _sample_end(self, t: float, x: np.ndarray, mode: int) -> None:
@@ -207,35 +220,28 @@ class _Recorder:
         assert self.times is not None
         stop = int(self.times.searchsorted(t, side="right"))
         self.states[self.sampled : stop] = x
-        self.places[self.sampled : stop] = mode, self.trajectory.jumps
+        self.places[0, self.sampled : stop], self.places[1, self.sampled : stop] = mode, self.trajectory.jumps
         self.sampled = stop
 
 
-def _step_columns(record: Any, used: int, period: float) -> tuple[np.ndarray, ...]:
+def _places_of_steps(
+    record: Any, used: int, period: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Start, length, mode and jump count of the steps in a record."""
     cycle, mode, j = record.step_place[:used].T
     phase, h = record.step_time[:used].T
-    return cycle * period + phase, h.copy(), mode.copy(), j.copy(), record.step_coefficients[:used].copy()
+    return cycle * period + phase, h.copy(), mode.copy(), j.copy()
 
 
 @cache
 def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
     """Columns of jumps, empty, so that any number of arcs can have the same."""
-    return _jump_columns(empty_record(dimension, 0), 0, 0.0)
+    return _jump_columns(empty_record(dimension, 0), 0)
 
 
-def _jump_columns(record: Any, used: int, period: float) -> tuple[np.ndarray, ...]:
-    cycle, transition, kind = record.jump_place[:used].T
-    phase, transversality = record.jump_time[:used].T
-    states = record.jump_states[:used]
-    return (
-        cycle * period + phase,
-        transversality.copy(),
-        transition.copy(),
-        kind.copy(),
-        states[:, 0].copy(),
-        states[:, 1].copy(),
-        record.jump_saltation[:used].copy(),
-    )
+def _jump_columns(record: Any, used: int) -> tuple[np.ndarray, ...]:
+    columns = record.jump_time, record.jump_place, record.jump_states, record.jump_saltation
+    return tuple(column[:used].copy() for column in columns)
 
 
 def _grazings(system: HybridSystem, record: Any, used: int, period: float) -> list[Grazing]:

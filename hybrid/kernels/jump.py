@@ -329,12 +329,11 @@ def remember_flight(run, record, n, span, x_limit):
     """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
     if record.used[0] == record.step_time.shape[0]:
         return
-    slot = start_record(run, record, run.clock[PHASE], span)
-    degree = record.step_coefficients.shape[1] - 1
-    for j in range(degree + 1):
+    rows = record.step_coefficients[start_record(run, record, run.clock[PHASE], span)]
+    for k in range(rows.shape[0]):
         for i in range(n):
-            record.step_coefficients[slot, j, i] = run.y[i] + (x_limit[i] - run.y[i]) * j / degree
-        record.step_coefficients[slot, j, n] = span * j / degree
+            rows[k, i] = run.y[i] if k == 0 else (x_limit[i] - run.y[i] if k == 1 else 0.0)
+        rows[k, n] = span if k == 1 else 0.0
 
 
 @njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)

@@ -70,8 +70,9 @@ class Method(Structure):
     new point and rows up to ``S`` serve the interpolant alone. ``error`` and ``second_error`` ``(s + 1,)``
     weigh the stages into the error estimate, ``quadrature (s + 1,)`` into an integral over the step.
     ``interpolant (d + 1, S)`` gives the Bernstein coefficients of the step's interpolant: ``y0 + h *
-    interpolant @ stages``. With ``implicit`` 1, row 0 is the derivative at the start, rows 1 to ``s`` are
-    coupled and have the weights ``b``, and ``error[0]`` is also the coefficient of the estimate's filter.
+    interpolant @ stages``, ``powers (d + 1, S)`` those of its powers but for ``y0``. With ``implicit`` 1, row
+    0 is the derivative at the start, rows 1 to ``s`` are coupled and have the weights ``b``, and ``error[0]``
+    is also the coefficient of the estimate's filter.
     ``order`` is that of Taylor series.
     """
 
@@ -82,6 +83,7 @@ class Method(Structure):
     second_error: VECTOR
     quadrature: VECTOR
     interpolant: MATRIX
+    powers: MATRIX
     implicit: int64
     order: int64
     exponent: float64
@@ -179,7 +181,7 @@ class Record(Structure):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
     ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
-    mode, jump count)`` and the Bernstein coefficients ``(d + 1, n + 1)`` of the state and of the time since.
+    mode, jump count)`` and polynomials ``(d + 1, n + 1)`` of a place on [0, 1], the state and the time since.
     A jump: its phase and transversality, ``(cycle, transition, kind)``, the states ``(2, n)`` before and
     after, and the saltation matrix ``(n, n)``. A grazing: ``(phase, value, acceleration)`` of the guard,
     ``(cycle, transition, jump count)`` and the state.

@@ -19,17 +19,6 @@ def start_record(run, record, t, span):
 
 
 @njit(**KERNEL)
-def raise_degree(coefficients, degree, highest, columns):
-    """Write the polynomials in the first ``degree + 1`` rows as polynomials of a higher degree, in place."""
-    for d in range(degree, highest):
-        for i in range(columns):
-            coefficients[d + 1, i] = coefficients[d, i]
-            for j in range(d, 0, -1):
-                share = j / (d + 1.0)
-                coefficients[j, i] = share * coefficients[j - 1, i] + (1.0 - share) * coefficients[j, i]
-
-
-@njit(**KERNEL)
 def remember_grazing(model, run, record, time, work):
     """Keep the grazing found on a step, at ``work.state``, if its transition might have fired there."""
     transition = run.count[GRAZING_GUARD]

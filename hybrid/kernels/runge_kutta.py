@@ -25,7 +25,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.kernels.guards import NOT_THERE, earliest_crossing, land, value_on_interpolant
 from hybrid.kernels.layout import ATTEMPTS, EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RECORD, RUN, WORK
-from hybrid.kernels.record import raise_degree, remember_grazing, start_record
+from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.step import (
     attempt,
     attempt_again,
@@ -55,19 +55,22 @@ def all_affine(model, mode):
 @njit(**KERNEL)
 def remember_step(model, method, run, record, t, h, work):
     """Write the step just taken from ``run.y`` into the record; its stages are those of ``work``."""
-    n = model.dimension
+    n, count = model.dimension, method.a.shape[0]
     interpolation_stages(model, method, run.count[MODE], t, h, run.y, work)
-    interpolate(method, h, run.y, n, work)
     slot = start_record(run, record, t, h)
     rows = record.step_coefficients[slot]
     # Element by element: an array assignment brings its error message along, seconds of compilation.
-    degree = work.coefficients.shape[0] - 1
-    for i in range(degree + 1):
-        for j in range(n):
-            rows[i, j] = work.coefficients[i, j]
-    raise_degree(rows, degree, rows.shape[0] - 1, n)
-    for i in range(rows.shape[0]):
-        rows[i, n] = h * i / (rows.shape[0] - 1)
+    for i in range(n):
+        rows[0, i] = run.y[i]
+    rows[0, n] = 0.0
+    for k in range(1, rows.shape[0]):
+        for i in range(n + 1):
+            rows[k, i] = 0.0
+        for j in range(count if k < method.powers.shape[0] else 0):
+            weight = h * method.powers[k, j]
+            for i in range(n):
+                rows[k, i] += weight * work.stages[j, i]
+    rows[1, n] = h
 
 
 @njit(**KERNEL)

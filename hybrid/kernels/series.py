@@ -40,7 +40,6 @@ from hybrid.kernels.series_guards import (
     earliest_on_series,
     expanded_at,
     powers_on_step,
-    raised_to_bernstein,
     to_bernstein,
     value_at,
 )
@@ -217,30 +216,20 @@ def accept_series(model, run, tangents, order, h, work):
 
 @njit(**KERNEL)
 def remember_series(model, run, record, order, t, h, span, clock, work):
-    """Write a step along the series into the record: Bernstein coefficients of the state and of time."""
-    slot = start_record(run, record, t, span)
-    degree = record.step_coefficients.shape[1] - 1
-    n = model.dimension
-    column = work.polynomial
-    for i in range(n + 1):
-        last = order
-        if i < n or clock >= 0:
-            power = 1.0
-            for k in range(order + 1):
-                column[k] = work.series[k, i if i < n else clock] * power
-                power *= h
-        else:
-            column[0], column[1], last = 0.0, span, 1
-        while last > 0 and column[last] == 0.0:
-            last -= 1
-        if 2 * last < degree:
-            raised_to_bernstein(column, last, degree)
-        else:
-            for k in range(last + 1, degree + 1):
-                column[k] = 0.0
-            to_bernstein(column, degree)
-        for k in range(degree + 1):
-            record.step_coefficients[slot, k, i] = column[k]
+    """Write a step along the series into the record: the state and time as polynomials in a share of it."""
+    slot, n = start_record(run, record, t, span), model.dimension
+    rows, series = record.step_coefficients[slot], work.series
+    power = 1.0
+    for o in range(order + 1):
+        for i in range(n):
+            rows[o, i] = series[o, i] * power
+        rows[o, n] = series[o, clock] * power if clock >= 0 else 0.0
+        power *= h
+    if clock < 0:
+        rows[1, n] = span
+    for o in range(order + 1, rows.shape[0]):
+        for i in range(n + 1):
+            rows[o, i] = 0.0
 
 
 @njit(**KERNEL)

@@ -91,26 +91,6 @@ def leading_to_bernstein(coefficients, degree, stack):
     store(stack, 0, 2 + 3 * NARROW, d)
 
 
-@njit(**KERNEL)
-def raised_to_bernstein(coefficients, order, degree):
-    """Turn power coefficients up to ``order`` into Bernstein coefficients of a higher degree, in place.
-
-    The scaled power coefficients are the forward differences of the result at its start: as many times as
-    there are of them they are summed up.
-    """
-    for k in range(1, order + 1):
-        coefficients[k] *= SHARES[degree, k]
-    highest = coefficients[order]
-    for k in range(order, degree + 1):
-        coefficients[k] = highest
-    for level in range(order - 1, -1, -1):
-        row = coefficients[level : degree + 1]
-        total = row[0]
-        for j in range(1, degree + 1 - level):
-            total += row[j]
-            row[j] = total
-
-
 @njit(**INLINE)
 def powers_on_step(series, column, order, h, known_roots, coefficients):
     """Power coefficients on ``[0, 1]`` of a series, divided by its variable for each known root at 0.

@@ -51,6 +51,16 @@ class Tableau:
         """``(s + 1,)`` weights of all stages in an integral over the step."""
         return np.concatenate([[0.0], self.b] if self.implicit else [self.b, [0.0]])
 
+    @property
+    def powers(self) -> np.ndarray:
+        """``(d + 1, S)``: the interpolant is ``y0`` and ``h`` times these on the powers of ``theta``."""
+        degree = len(self.interpolant) - 1
+        differences = [
+            [comb(degree, k) * comb(k, j) * (-1) ** (k - j) for j in range(degree + 1)]
+            for k in range(degree + 1)
+        ]
+        return np.array(differences, dtype=float) @ self.interpolant
+
 
 def dense(rows: Sequence[Row], width: int) -> np.ndarray:
     """Rows given as ``{column: value}`` as a matrix ``(len(rows), width)``."""

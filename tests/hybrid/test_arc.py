@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import hybrid
 from hybrid import simulate
-from models import bouncing_ball, impact_oscillator
+from models import bouncing_ball, impact_oscillator, vibroimpact
 
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
 BALL, OSCILLATOR = bouncing_ball(), impact_oscillator()
@@ -117,6 +117,53 @@ class TestDense:
         arc = simulate(BALL, (0.0, -4.0), (0.0, 0.1), mode="flight")
         np.testing.assert_allclose(arc(0.0), [0.0, 3.2])
         np.testing.assert_array_equal(arc.x[0], [0.0, -4.0])
+
+
+class TestDenseOnEveryClock:
+    """Polynomials in time, series in time, series on a contact's own clock, steps of a pair, at any time."""
+
+    SYSTEM = vibroimpact()
+    PERIOD = SYSTEM.forcing_period()
+    START = (0.0, 0.001, 0.0, 0.0)
+    EXACT = hybrid.Taylor(rtol=1e-13, atol=1e-15)
+
+    @pytest.fixture(params=[EXACT, TIGHT], ids=["Taylor", "DOP853"])
+    def run(self, request):
+        return simulate(self.SYSTEM, self.START, (0.0, 3 * self.PERIOD), mode="free", solver=request.param)
+
+    def test_inside_contacts(self, run):
+        """A state on the way is the end of a run that ends there."""
+        entry, leave = run.jumps.t[:2]
+        for t in [*np.linspace(entry, leave, 12), *np.linspace(0.0, entry, 5)]:
+            end = simulate(self.SYSTEM, self.START, (0.0, t), mode="free", solver=self.EXACT).x[-1]
+            atol = 1e-13 if run.propagators["contact"].startswith("Taylor") else 5e-11
+            np.testing.assert_allclose(run(t), end, rtol=0, atol=atol)
+
+    def test_next_to_the_start_of_a_contact(self, run):
+        """Its clock starts without speed: there the place grows like the square root of the time."""
+        jump = run.jumps[0]
+        field = np.array([*jump.x_plus[2:], 0.0, 0.0])
+        for since in 10.0 ** np.arange(-13, -5):
+            moved = run(jump.t + since) - jump.x_plus
+            np.testing.assert_allclose(moved[:2], since * field[:2], atol=4e-16 + 30 * since**2)
+
+    @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=40))
+    def test_in_any_order(self, shares):
+        arc = simulate(self.SYSTEM, self.START, (0.0, 3 * self.PERIOD), mode="free")
+        times = np.array(shares) * 3 * self.PERIOD
+        one_by_one = [arc(t) for t in times]
+        np.testing.assert_array_equal(arc(times), one_by_one)
+
+    def test_of_more_steps_than_a_record_holds(self):
+        span = 400 * self.PERIOD
+        arc = simulate(self.SYSTEM, self.START, (0.0, span), mode="free")
+        assert arc.steps > 4000
+        times = np.linspace(0.0, span, 5000)
+        sampled = simulate(self.SYSTEM, self.START, (0.0, span), mode="free", samples=times)
+        np.testing.assert_array_equal(sampled.t, times)
+        np.testing.assert_array_equal(arc(times), sampled.x)
+        np.testing.assert_array_equal(arc.mode[np.searchsorted(arc.t, times, "right") - 1], sampled.mode)
+        assert np.all(np.diff(arc.t) >= 0)
 
 
 class TestSamples:
