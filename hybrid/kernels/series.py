@@ -50,6 +50,9 @@ EXACT_TOLERANCE = 1e-17
 # Share of the largest component that is an absolute tolerance for the others.
 SHARE = 1e-3
 SAFETY = 0.9
+# Share of the tolerance that a tangent vector gets: stiff contacts stretch it a thousandfold and shrink it
+# again, and what was an error of the long vector is one of the short vector then.
+TANGENT_SHARE = 0.1
 # What stands for an absolute tolerance where there is none.
 TINY = 1e-300
 # Terms at the end of a series that have to be small.
@@ -89,6 +92,8 @@ def weigh_tangents(series, n, first, rtol, exact, weights):
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
         square = component * component + square
+    if not exact:
+        rtol *= TANGENT_SHARE
     floor = (SHARE * rtol if exact else rtol) * square_root(square / n) + TINY
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
@@ -105,7 +110,7 @@ def whole_registers(width, register):
 def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights):
     """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
 
-    The tolerances are those of the Runge-Kutta methods: each tangent vector is a block by itself. The last
+    The tolerances are those of the Runge-Kutta methods, each tangent vector a block by itself. The last
     term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth may be
     there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
     exact modes fall faster than any power, and three of their terms are enough. ``weights (1, columns)`` is

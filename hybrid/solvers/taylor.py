@@ -13,6 +13,8 @@ from hybrid.solvers.runge_kutta import RungeKutta
 from hybrid.solvers.tableau import Tableau
 
 LOWEST_ORDER = 12
+# Orders beyond those of the fewest operations per unit of time: a step has costs of its own.
+BEYOND = 6
 
 
 @attrs.frozen
@@ -33,8 +35,8 @@ class Taylor(RungeKutta):
     ``print(hybrid.compile_system(system))`` says which mode got what, and why. Guards are isolated on their
     own series; in exact modes no crossing can be missed that rounding does not hide.
 
-    The recurrences follow from the traced expressions. The tolerances bound the last terms of state and
-    tangent vectors as those of :class:`DOP853` bound its error estimate.
+    The recurrences follow from the traced expressions. The tolerances bound the last terms of the state as
+    those of :class:`DOP853` bound its error estimate, and a tenth of ``rtol`` those of tangent vectors.
 
     References
     ----------
@@ -46,5 +48,9 @@ class Taylor(RungeKutta):
 
     @property
     def order(self) -> int:
-        """Order of the series in nonlinear modes: with it a step is a share 1/e of the convergence radius."""
-        return min(HIGHEST_ORDER, max(LOWEST_ORDER, ceil(-log(self.rtol))))
+        """Order of the series in nonlinear modes.
+
+        Where a step of length 1/e of the convergence radius would meet the tolerance, the series alone would
+        cost least; some orders more make it longer.
+        """
+        return min(HIGHEST_ORDER, max(LOWEST_ORDER, ceil(-log(self.rtol)) + BEYOND))
