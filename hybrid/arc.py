@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hybrid.errors import ArgumentError
 from hybrid.load import entry, load_kernels
+from hybrid.saltation import matrices_at
 from hybrid.status import Status
 from hybrid.system import HybridSystem
 
@@ -78,25 +79,19 @@ class Grazing:
 
 @attrs.frozen(eq=False, repr=False)
 class Jumps(Sequence[Jump]):
-    """The jumps of an arc in order, each made when looked at; the arrays hold all of them.
-
-    Attributes
-    ----------
-    saltation
-        ``(jumps, n, n)``, as in :class:`Jump`.
-    """
+    """The jumps of an arc in order, each made when looked at; the arrays hold all of them."""
 
     system: HybridSystem
-    _period: float
+    _model: Any
     _time: np.ndarray
     _place: np.ndarray
     _states: np.ndarray
-    saltation: np.ndarray
+    _saltation: np.ndarray
 
     @cached_property
     def t(self) -> np.ndarray:
         """Times ``(jumps,)``."""
-        return self._place[:, 0] * self._period + self._time[:, 0]
+        return self._place[:, 0] * self._model.period + self._time[:, 0]
 
     @property
     def transversality(self) -> np.ndarray:
@@ -122,6 +117,16 @@ class Jumps(Sequence[Jump]):
     def x_plus(self) -> np.ndarray:
         """States after the jumps, ``(jumps, n)``."""
         return self._states[:, 1]
+
+    @cached_property
+    def saltation(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps, n, n)``; where the run did not need them they are made now."""
+        missing = np.flatnonzero(self._place[:, 3] == 0)
+        if missing.size:
+            fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
+            states = np.ascontiguousarray(self.x_minus[missing])
+            self._saltation[missing], _ = matrices_at(self.system, self._model, fired, phases, states)
+        return self._saltation
 
     def __len__(self) -> int:
         return len(self._place)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.load import load_kernels
+from hybrid.load import entry, load_kernels
 from hybrid.run import check_state, kernel_method, split_time, workspace
 from hybrid.solvers import Tsit5
 from hybrid.system import HybridSystem, Transition, finite_number
@@ -61,15 +62,27 @@ def saltation_matrix(
     index = system.transition_index(transition)
     state = check_state(system, x)
     model = compiled.model(parameters)
-    work = workspace(kernel_method(Tsit5()), system.dimension, 0, 0)
     phase = split_time(finite_number("t", t), model.period)[1]
-    source = system.mode_index(system.transitions[index].source)
-    saltation = load_kernels("hybrid.kernels.jump").saltation
-    transversality = saltation(model, index, source, phase, state, np.empty(system.dimension), work)
-    if not np.all(np.isfinite(work.saltation)):
+    (matrix,), (transversality,) = matrices_at(system, model, [index], [phase], state[None])
+    if not np.all(np.isfinite(matrix)):
         raise ArgumentError(
             f"Transition {system.transitions[index].name!r}: the saltation matrix does not exist at t = {t}, "
             f"x = {tuple(float(v) for v in state)}; the transversality is {transversality}. "
             "A grazing crossing has no linear tangent map."
         )
-    return work.saltation.copy()
+    return np.array(matrix)
+
+
+def matrices_at(
+    system: HybridSystem, model: Any, transitions: list[int], phases: list[float], states: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Saltation matrices ``(J, n, n)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
+    n = system.dimension
+    matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
+    sources = [system.mode_index(transition.source) for transition in system.transitions]
+    kernel = entry(load_kernels("hybrid.kernels.jump").saltation)
+    work, x_plus = workspace(kernel_method(Tsit5()), n, 0, 0), np.empty(n)
+    for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
+        transversalities[i] = kernel(model, fired, sources[fired], phase, state, x_plus, work)
+        matrices[i] = work.saltation
+    return matrices, transversalities

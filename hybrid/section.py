@@ -223,7 +223,7 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
         limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
         code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
         used = record.used[1]
-        cycle, transition, _ = record.jump_place[:used].T
+        cycle, transition = record.jump_place[:used, :2].T
         marked = transition < markers
         counts = jumps + np.cumsum(~marked)
         rows.append(

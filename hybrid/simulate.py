@@ -150,7 +150,7 @@ class _Recorder:
             code = trajectory.advance(t1, record, max_jumps)
             self._file(record)
         model, system, count = trajectory.model, trajectory.system, run.count.tolist()
-        jumps = Jumps(system, model.period, *(join(self.jumps) if self.jumps else _no_jumps(model.dimension)))
+        jumps = Jumps(system, model, *(join(self.jumps) if self.jumps else _no_jumps(model.dimension)))
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, count[codes.MODE])
         pieces = None

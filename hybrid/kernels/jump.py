@@ -32,6 +32,7 @@ from hybrid.kernels.codes import (
     LIMIT_OF_CHATTER,
     LOCKED,
     LOG_DETERMINANT,
+    MAP_IS_KNOWN,
     MODE,
     NO_MODE,
     NO_TRANSITION,
@@ -39,6 +40,7 @@ from hybrid.kernels.codes import (
     PHASE_OF_RUN,
     PREVIOUS_MODE,
     RESTING,
+    RESTITUTION,
     RESUMING,
     SINCE_ENTRY,
     SINGULAR_JUMPS,
@@ -59,7 +61,16 @@ from hybrid.kernels.guards import (
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
-from hybrid.kernels.locked import begin_instant, follow, map_of_instant, restore_tangents
+from hybrid.kernels.locked import (
+    begin_at_start,
+    begin_instant,
+    change_of_instant,
+    follow,
+    keep_map,
+    map_of_instant,
+    postpone_map,
+    restore_tangents,
+)
 from hybrid.kernels.record import start_record
 from hybrid.kernels.tangent import COLLAPSED, STRAINED, log_abs_determinant, multiply, orthonormalise, strain
 
@@ -177,18 +188,21 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
 
 
 @njit(**KERNEL)
-def remember_jump(model, run, record, transition, transversality, kind, x_plus, work):
-    """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any."""
+def remember_jump(model, run, record, transition, transversality, kind, known, x_plus, work):
+    """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any.
+
+    Its matrix is ``work.saltation``, unless that is not ``known``: it follows from the rest.
+    """
     n, slot = model.dimension, record.used[1]
     if slot == record.jump_time.shape[0]:
         return
     record.jump_time[slot, 0], record.jump_time[slot, 1] = run.clock[PHASE], transversality
     record.jump_place[slot, 0], record.jump_place[slot, 1] = run.count[CYCLE], transition
-    record.jump_place[slot, 2] = kind
+    record.jump_place[slot, 2], record.jump_place[slot, 3] = kind, 1 if known else 0
     for i in range(n):
         record.jump_states[slot, 0, i] = run.y[i]
         record.jump_states[slot, 1, i] = x_plus[i]
-        for j in range(n):
+        for j in range(n if known else 0):
             record.jump_saltation[slot, i, j] = work.saltation[i, j]
     record.used[1] = slot + 1
 
@@ -277,45 +291,77 @@ def leave(model, run, transition, transversality, work):
     move(model, run, transition, mode if target == NO_MODE else target, work.new)
 
 
+@njit(**KERNEL)
+def cross_without_map(model, run, transition, mode, work):
+    """``cross`` where nobody asks for a saltation matrix: the state after the jump, and no derivatives."""
+    t, target = run.clock[PHASE], model.target[transition]
+    model.flow(mode, t, run.y, model.parameters, work.field)
+    transversality = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+    model.reset(transition, t, run.y, model.parameters, work.new)
+    if mode == target and model.direction[transition] != 0:
+        model.flow(mode, t, work.new, model.parameters, work.field_after)
+    postpone_map(run, model.dimension)
+    return transversality
+
+
+@njit(**KERNEL)
+def cross_with_map(model, run, transition, mode, tangents, work):
+    """Cross a guard that says when, and begin an instant; returns the transversality."""
+    n = model.dimension
+    transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+    change_of_instant(run, n, transversality, work)
+    begin_instant(run, n, tangents, work)
+    return transversality
+
+
+@njit(**KERNEL)
+def recall_map(model, run, tangents, work):
+    """Make up for the tangent map of the jump that began this instant, if nobody has asked for it."""
+    n = model.dimension
+    if run.count[LAST_FIRED] == NO_TRANSITION:
+        begin_at_start(run, n, tangents)
+    if run.count[MAP_IS_KNOWN] == 1:
+        return
+    fired, mode, x_minus = run.count[LAST_FIRED], run.count[PREVIOUS_MODE], run.instant[:n]
+    transversality = saltation(model, fired, mode, run.clock[PHASE], x_minus, work.new, work)
+    change_of_instant(run, n, transversality, work)
+    keep_map(run, n, work)
+
+
 @njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **PART)
 def jump(model, method, run, record, transition, tangents, orthonormal, work):
-    """Make a jump at the current point of the run: state, tangent vectors, counters, record."""
-    n, mode, target = model.dimension, run.count[MODE], model.target[transition]
-    locked = run.count[LOCKED] == 1
+    """Make a jump at the current point of the run: state, tangent vectors, counters, record.
+
+    Without tangent vectors a saltation matrix is only made where it does not follow from the states at the
+    jump, of those that are locked to another.
+    """
+    n, mode = model.dimension, run.count[MODE]
+    asked = tangents > 0 or record.jump_time.shape[0] > 0
+    locked = run.count[LOCKED] == 1 and asked
+    known = tangents > 0 or locked
     run.count[LOCKED] = 0
-    if tangents == 0 and record.jump_time.shape[0] == 0:
-        # Nobody asks for a saltation matrix.
-        model.flow(mode, run.clock[PHASE], run.y, model.parameters, work.field)
-        transversality = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
-        model.reset(transition, run.clock[PHASE], run.y, model.parameters, work.new)
-        if mode == target and model.direction[transition] != 0:
-            model.flow(mode, run.clock[PHASE], work.new, model.parameters, work.field_after)
-        run.clock[LAST_TRANSVERSALITY] = transversality
-        sides_at_point(model, run, work)
-        leave(model, run, transition, transversality, work)
-        return
+    # It stands for a square root if the jump that it is locked to does.
+    kind = run.count[LAST_KIND] if locked else TRANSVERSE
     if locked:
+        recall_map(model, run, tangents, work)
         transversality = cross(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
-        follow(run, n, tangents, work)
-        # It stands for a square root if the jump that it is locked to does.
-        kind = run.count[LAST_KIND]
+        follow(run, n, work)
+    elif known:
+        transversality = cross_with_map(model, run, transition, mode, tangents, work)
     else:
-        transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
-        for j in range(n):
-            run.instant[j] = -work.gradient[j] / transversality if work.gradient[j] != 0.0 else 0.0
-        begin_instant(run, n, tangents, work)
-        kind = TRANSVERSE
-        if model.marker[transition] == 0 and is_grazing(model, method, run, transition, transversality, work):
-            kind = GRAZING
+        transversality = cross_without_map(model, run, transition, mode, work)
+    judged = asked and not locked and model.marker[transition] == 0
+    if judged and is_grazing(model, method, run, transition, transversality, work):
+        kind = GRAZING
     if kind == GRAZING:
         run.count[ILL_CONDITIONED] += 1
     run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
     sides_at_point(model, run, work)
-    remember_jump(model, run, record, transition, transversality, kind, work.new, work)
+    remember_jump(model, run, record, transition, transversality, kind, known, work.new, work)
     if locked:
         map_of_instant(run, n, work.saltation)
-    judge(run, n, work)
     if tangents > 0:
+        judge(run, n, work)
         if locked:
             restore_tangents(run, n, tangents)
         grown = carry_tangents(model, run, tangents, orthonormal, kind == GRAZING, work)
@@ -344,6 +390,8 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     """
     if run.count[MODE] != run.count[PREVIOUS_MODE] or model.direction[transition] == 0:
         return False
+    if not 0.0 < run.clock[RESTITUTION] < 1.0:
+        return False
     since_last = run.clock[PHASE] - run.clock[EARLIER_JUMP_PHASE]
     since_last += model.period * (run.count[CYCLE] - run.clock[EARLIER_JUMP_CYCLE])
     run.clock[EARLIER_JUMP_PHASE], run.clock[EARLIER_JUMP_CYCLE] = run.clock[PHASE], run.count[CYCLE]
@@ -360,7 +408,7 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
     add_change_of_duration(model, method, run, target, span, work)
     begin_instant(run, model.dimension, tangents, work)
     forward(run, model.period, span)
-    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, x_limit, work)
+    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
     if tangents > 0:
         n = model.dimension
         carry_tangents(model, run, tangents, orthonormal, False, work)
@@ -375,6 +423,7 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
 def rest(model, run, limit_mode, tangents, orthonormal, work):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     transition = run.count[LAST_FIRED]
+    recall_map(model, run, tangents, work)
     chatter_matrix(model, run, transition, work)
     multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
     if tangents > 0:

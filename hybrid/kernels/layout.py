@@ -108,7 +108,7 @@ class Run(Structure):
     limit. The last three serve the jumps that one jump sets off at once: ``before (n k,)`` and
     ``growth_before (k,)`` are the tangent vectors and their growth before it, ``instant (n (1 + n),)`` what
     it and they make of a tangent vector since, first the derivative of their instant and then the columns of
-    the tangent map.
+    the tangent map; or, where ``MAP_IS_KNOWN`` is 0, the state before it, from which these follow.
     """
 
     count: INDICES
@@ -182,9 +182,9 @@ class Record(Structure):
 
     ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
     mode, jump count)`` and polynomials ``(d + 1, n + 1)`` of a place on [0, 1], the state and the time since.
-    A jump: its phase and transversality, ``(cycle, transition, kind)``, the states ``(2, n)`` before and
-    after, and the saltation matrix ``(n, n)``. A grazing: ``(phase, value, acceleration)`` of the guard,
-    ``(cycle, transition, jump count)`` and the state.
+    A jump: its phase and transversality, ``(cycle, transition, kind, known)``, the states ``(2, n)`` before
+    and after, and the saltation matrix ``(n, n)`` if that is known. A grazing: ``(phase, value,
+    acceleration)`` of the guard, ``(cycle, transition, jump count)`` and the state.
     """
 
     used: INDICES

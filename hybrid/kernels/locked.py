@@ -16,10 +16,9 @@ from numba import njit
 from hybrid.kernels.codes import (
     ILL_CONDITIONED_GROWTH,
     ILL_CONDITIONED_GROWTH_BEFORE,
-    LAST_FIRED,
     LOG_DETERMINANT,
     LOG_DETERMINANT_BEFORE,
-    NO_TRANSITION,
+    MAP_IS_KNOWN,
 )
 from hybrid.kernels.layout import KERNEL
 from hybrid.kernels.tangent import multiply, solve
@@ -48,15 +47,37 @@ def restore_tangents(run, n, tangents):
 
 
 @njit(**KERNEL)
+def change_of_instant(run, n, transversality, work):
+    """Keep the derivative of the time at which a guard is crossed, whose gradient is ``work.gradient``."""
+    for j in range(n):
+        run.instant[j] = -work.gradient[j] / transversality if work.gradient[j] != 0.0 else 0.0
+
+
+@njit(**KERNEL)
 def begin_instant(run, n, tangents, work):
     """Keep what is there before a jump whose tangent map is ``work.saltation``.
 
-    The derivative of its instant has been left in ``run.instant``.
+    ``change_of_instant`` has been called.
     """
     keep_tangents(run, n, tangents)
+    keep_map(run, n, work)
+
+
+@njit(**KERNEL)
+def keep_map(run, n, work):
+    """Keep ``work.saltation`` as the tangent map of this instant so far."""
     for j in range(n):
         for i in range(n):
             run.instant[n + n * j + i] = work.saltation[i, j]
+    run.count[MAP_IS_KNOWN] = 1
+
+
+@njit(**KERNEL)
+def postpone_map(run, n):
+    """Keep the state before a jump instead, for the case that another jump is locked to it."""
+    for i in range(n):
+        run.instant[i] = run.y[i]
+    run.count[MAP_IS_KNOWN] = 0
 
 
 @njit(**KERNEL)
@@ -67,10 +88,11 @@ def begin_at_start(run, n, tangents):
         run.instant[i] = 0.0
     for i in range(n):
         run.instant[n + n * i + i] = 1.0
+    run.count[MAP_IS_KNOWN] = 1
 
 
 @njit(**KERNEL)
-def follow(run, n, tangents, work):
+def follow(run, n, work):
     """Take a jump set off at once into the tangent map of its instant.
 
     ``work.reset_jacobian`` and ``work.settled`` hold its ``D_x R`` and ``f_plus - D_x R f - D_t R``. Its own
@@ -78,8 +100,6 @@ def follow(run, n, tangents, work):
     before, ``a = c P``, so that the product of the matrices of an instant is its tangent map. Where ``P`` is
     singular there may be no such ``c``.
     """
-    if run.count[LAST_FIRED] == NO_TRANSITION:
-        begin_at_start(run, n, tangents)
     instant, system, later = run.instant, work.jacobian, work.error
     for j in range(n):
         for i in range(n):

@@ -157,7 +157,7 @@ class TestDenseOnEveryClock:
     def test_of_more_steps_than_a_record_holds(self):
         span = 400 * self.PERIOD
         arc = simulate(self.SYSTEM, self.START, (0.0, span), mode="free")
-        assert arc.steps > 4000
+        assert arc.steps > 3000
         times = np.linspace(0.0, span, 5000)
         sampled = simulate(self.SYSTEM, self.START, (0.0, span), mode="free", samples=times)
         np.testing.assert_array_equal(sampled.t, times)

@@ -206,3 +206,36 @@ class TestErrors:
     def test_arguments(self, t, x, text):
         with pytest.raises(hybrid.ArgumentError, match=text):
             saltation_matrix(BALL, "bounce", t, x)
+
+
+class TestOfARun:
+    """Matrices that a run without tangent vectors did not need, against those of one that carries some."""
+
+    @pytest.mark.parametrize(
+        ("name", "x0", "mode", "t_end"),
+        [
+            ("bouncing_ball", (1.0, 0.0), "flight", 2.0),
+            # Its jumps accumulate; the limit has a matrix of its own.
+            ("bouncing_table", (0.1, 0.0), "flight", 3.0),
+            ("stop_oscillator", (0.0, 0.0), "free", 40.0),
+            ("rocking_block", (0.1, 0.1), "right", 3.0),
+            ("stick_slip", (0.5, 0.2), "sliding", 60.0),
+        ],
+    )
+    def test_with_and_without_tangent_vectors(self, name, x0, mode, t_end):
+        system = getattr(models, name)()
+        plain = simulate(system, x0, (0.0, t_end), mode=mode)
+        carrying = simulate(system, x0, (0.0, t_end), mode=mode, tangent=True)
+        assert len(plain.jumps) > 2
+        np.testing.assert_array_equal(plain.jumps.kind, carrying.jumps.kind)
+        np.testing.assert_allclose(plain.jumps.t, carrying.jumps.t, rtol=1e-9)
+        np.testing.assert_allclose(plain.jumps.saltation, carrying.jumps.saltation, rtol=1e-6, atol=1e-6)
+
+    def test_of_more_jumps_than_a_record_holds(self):
+        """Each is that of its own transition, time and state."""
+        system = models.impact_oscillator()
+        jumps = simulate(system, (0.0, 0.0), (0.0, 10000.0)).jumps
+        assert len(jumps) > 1100
+        for jump in jumps[::301]:
+            expected = saltation_matrix(system, jump.transition, jump.t, jump.x_minus)
+            np.testing.assert_allclose(jump.saltation, expected, rtol=1e-9)
