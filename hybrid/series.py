@@ -194,8 +194,9 @@ class Recurrences:
         self.pairs.setdefault((left, right), "")
         place = list(self.pairs).index((left, right))
         column = f"{self.prefix}b + {place}"
-        inner = f"{self.prefix}s{place} + out[1, {left}]*{self.prefix}p{place}"
-        return f"({inner} + {self._left_before(left)}*out[1, {column}])", column
+        # The second factor is often made of the first, and known later.
+        inner = f"{self.prefix}s{place} + {self._left_before(left)}*out[1, {column}]"
+        return f"({inner} + out[1, {left}]*{self.prefix}p{place})", column
 
     def _left_before(self, left: str) -> str:
         """Name of the last coefficient but one of a first factor."""
@@ -268,27 +269,45 @@ class Recurrences:
     def _sum(self, expression: sympy.Expr) -> str:
         constant = [term for term in expression.args if self._is_constant(term)]
         moving = sorted((term for term in expression.args if term not in constant), key=self._late)
-        text = " + ".join(map(self._term, moving))
-        first = f"{text} + {self.constants.name(sympy.Add(*constant))}" if constant else text
-        return self._bind(expression, first, text)
+        first = " + ".join(map(self._term, moving))
+        if constant:
+            first = f"{first} + {self.constants.name(sympy.Add(*constant))}"
+        return self._bind(expression, first, " + ".join(self._higher_term(term) for term in moving))
 
     def _late(self, term: sympy.Expr) -> tuple[int, int]:
         """What terms of a sum are ordered by: when they are known."""
         latest = max((self.lateness.get(symbol, 0) for symbol in term.free_symbols), default=0)
         return latest, sympy.count_ops(term)
 
-    def _term(self, term: sympy.Expr) -> str:
+    def _split(self, term: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+        """The constant factors of a term, and the others."""
         factors = sympy.Mul.make_args(term)
         constant = [factor for factor in factors if self._is_constant(factor)]
-        rest = sympy.Mul(*(factor for factor in factors if factor not in constant))
-        if not constant:
-            return self.coefficient(rest)
-        return f"{self.constants.name(sympy.Mul(*constant))}*{self.coefficient(rest)}"
+        return sympy.Mul(*constant), sympy.Mul(*(factor for factor in factors if factor not in constant))
+
+    def _term(self, term: sympy.Expr) -> str:
+        return self._times(*self._split(term))
+
+    def _times(self, constant: sympy.Expr, rest: sympy.Expr) -> str:
+        text = self.coefficient(rest)
+        return text if constant == 1 else f"{self.constants.name(constant)}*{text}"
+
+    def _higher_term(self, term: sympy.Expr) -> str:
+        """Text of a term above order zero, where a sum with one moving term is a multiple of that."""
+        constant, rest = self._split(term)
+        self.coefficient(rest)
+        while rest.is_Add or rest.is_Mul:
+            moving = [each for each in sympy.Add.make_args(rest) if not self._is_constant(each)]
+            factor, inner = self._split(moving[0])
+            if len(moving) > 1 or (factor == 1 and inner == rest):
+                break
+            constant, rest = constant * factor, inner
+        return self._times(constant, rest)
 
     def _product(self, expression: sympy.Expr) -> str:
         factors = expression.args
         if any(self._is_constant(factor) for factor in factors):
-            return self._bind(expression, *2 * (self._term(expression),))
+            return self._bind(expression, self._term(expression), self._higher_term(expression))
         below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
         # A divisor that is known has its reciprocal kept, and is multiplied by.
         below = [f for f in below if self.known is None or f.free_symbols & self.own]
@@ -319,11 +338,13 @@ class Recurrences:
         divisor, value = self.row(below), self.coefficient(below)
         inner, column = self._place(divisor, expression)
         name, column = self._kept(expression, column)
-        self.first.append(f"{name}d = 1.0/{value}")
+        # Of one sign, so that nothing has to be taken from zero.
+        self.first.append(f"{name}d = -1.0/{value}")
+        inner = inner if text is None else f"({inner} - {text})"
         self._bind(
             expression,
             f"{text or '1.0'}/{value}",
-            f"({text or '0.0'} - {inner} - {value}*out[0, {column}])*{name}d",
+            f"({inner} + {value}*out[0, {column}])*{name}d",
         )
         self._enter(divisor, expression, column, name)
         return name
