@@ -58,6 +58,8 @@ TINY = 1e-300
 # Terms at the end of a series that have to be small.
 TAIL = 8
 TAIL_OF_EXACT = 3
+# How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
+FALL_OF_EXACT = 4.0
 # Share of a step by which a landing may still be corrected.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
@@ -113,13 +115,13 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     The tolerances are those of the Runge-Kutta methods, each tangent vector a block by itself. The last
     term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth may be
     there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
-    exact modes fall faster than any power, and three of their terms are enough. ``weights (1, columns)`` is
-    scratch.
+    exact modes fall faster than any power, what is behind their last term is next to nothing, and three of
+    their terms are enough. ``weights (1, columns)`` is scratch.
     """
     weigh_state(series, n, rtol, atol, exact, weights)
     for g in range(groups):
         weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
-    scale = math.log2(rtol)
+    fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
     decisive = four_times(-math.inf)
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
         # What is not a number is left out here, and met with when the series is summed.
@@ -129,8 +131,8 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
         for g in range(groups):
             for i in range(first + g * stride, first + g * stride + NARROW * n, NARROW):
                 worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
-        decisive = larger((scale + binary_logarithms(worst)) * (1.0 / o), decisive)
-    return SAFETY * power_of_two(scale / order - largest(decisive))
+        decisive = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), decisive)
+    return (1.0 if exact else SAFETY) * power_of_two(-largest(decisive))
 
 
 @njit(**KERNEL)
