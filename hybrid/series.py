@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
@@ -34,8 +35,20 @@ PAIRS = {
 OWN_SQUARE = {sympy.tanh: "-", sympy.tan: ""}
 
 
+# Longer inner sums are not taken apart: others may need them too.
+MOST_TERMS = 4
+
+
 class NoSeries(Exception):
     """An expression has no Taylor recurrence here; the text says which part."""
+
+
+class Term(NamedTuple):
+    """A term of a sum: when it is known, its text, and whether it is a product."""
+
+    ready: tuple[int, int]
+    text: str
+    is_product: bool
 
 
 class Recurrences:
@@ -267,17 +280,37 @@ class Recurrences:
         raise NoSeries(f"{type(expression).__name__} is not analytic")
 
     def _sum(self, expression: sympy.Expr) -> str:
-        constant = [term for term in expression.args if self._is_constant(term)]
-        moving = sorted((term for term in expression.args if term not in constant), key=self._late)
-        first = " + ".join(map(self._term, moving))
-        if constant:
-            first = f"{first} + {self.constants.name(sympy.Add(*constant))}"
-        return self._bind(expression, first, " + ".join(self._higher_term(term) for term in moving))
+        terms = self._terms(expression)
+        constant = sympy.Add(*(factor for factor, rest in terms if rest == 1))
+        moving = [(factor, rest) for factor, rest in terms if rest != 1]
+        first = self._added([self._times(*term) for term in moving])
+        if constant != 0:
+            first = f"{first} + {self.constants.name(constant)}"
+        return self._bind(expression, first, self._added([self._higher_times(*term) for term in moving]))
 
-    def _late(self, term: sympy.Expr) -> tuple[int, int]:
-        """What terms of a sum are ordered by: when they are known."""
-        latest = max((self.lateness.get(symbol, 0) for symbol in term.free_symbols), default=0)
-        return latest, sympy.count_ops(term)
+    def _terms(self, expression: sympy.Expr) -> list[tuple[sympy.Expr, sympy.Expr]]:
+        """The terms of a sum as constant factors and what moves; inner sums are taken apart.
+
+        Each level of a sum of sums would wait for the one before. But a difference of states, whose digits
+        may cancel, is left as it is.
+        """
+        found = []
+        for factor, rest in map(self._split, sympy.Add.make_args(expression)):
+            if self._comes_apart(rest):
+                found += [(factor * each, moving) for each, moving in self._terms(rest)]
+            else:
+                found.append((factor, rest))
+        return found
+
+    def _comes_apart(self, rest: sympy.Expr) -> bool:
+        at_hand = self._is_known(rest) or rest in self.variables or rest in self.rows
+        if not rest.is_Add or at_hand or len(rest.args) > MOST_TERMS:
+            return False
+        return not all(self._is_constant(term) or self._is_plain(*self._split(term)) for term in rest.args)
+
+    @staticmethod
+    def _is_plain(factor: sympy.Expr, rest: sympy.Expr) -> bool:
+        return rest.is_Symbol and factor in (1, -1)
 
     def _split(self, term: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
         """The constant factors of a term, and the others."""
@@ -285,16 +318,14 @@ class Recurrences:
         constant = [factor for factor in factors if self._is_constant(factor)]
         return sympy.Mul(*constant), sympy.Mul(*(factor for factor in factors if factor not in constant))
 
-    def _term(self, term: sympy.Expr) -> str:
-        return self._times(*self._split(term))
-
-    def _times(self, constant: sympy.Expr, rest: sympy.Expr) -> str:
+    def _times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
         text = self.coefficient(rest)
-        return text if constant == 1 else f"{self.constants.name(constant)}*{text}"
+        if constant != 1:
+            text = f"{self.constants.name(constant)}*{text}"
+        return Term(self._ready(rest), text, constant != 1)
 
-    def _higher_term(self, term: sympy.Expr) -> str:
-        """Text of a term above order zero, where a sum with one moving term is a multiple of that."""
-        constant, rest = self._split(term)
+    def _higher_times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
+        """The same above order zero, where a sum with one moving term is a multiple of that."""
         self.coefficient(rest)
         while rest.is_Add or rest.is_Mul:
             moving = [each for each in sympy.Add.make_args(rest) if not self._is_constant(each)]
@@ -304,10 +335,30 @@ class Recurrences:
             constant, rest = constant * factor, inner
         return self._times(constant, rest)
 
+    def _ready(self, expression: sympy.Expr) -> tuple[int, int]:
+        """When a coefficient is known: how many operations after those of the states, and theirs."""
+        if expression.is_Symbol:
+            return 1, self.lateness.get(expression, 0)
+        moving = [each for each in expression.args if not self._is_constant(each)]
+        if not moving or self._is_known(expression):
+            return 0, 0
+        depth, late = max(map(self._ready, moving))
+        return depth + (1 if expression.is_Add or expression.is_Mul else 2), late
+
+    def _added(self, terms: list[Term]) -> str:
+        """Text of a sum: what is known first is added first, and sums that do not need each other run on."""
+        while len(terms) > 1:
+            one, other, *rest = sorted(terms, key=lambda term: term.ready)
+            depth, late = max(other.ready, (one.ready[0] + one.is_product, one.ready[1]))
+            both = f"({one.text} + {other.text})" if rest else f"{one.text} + {other.text}"
+            terms = [*rest, Term((depth + 1, late), both, False)]
+        return terms[0].text
+
     def _product(self, expression: sympy.Expr) -> str:
         factors = expression.args
         if any(self._is_constant(factor) for factor in factors):
-            return self._bind(expression, self._term(expression), self._higher_term(expression))
+            term = self._split(expression)
+            return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
         below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
         # A divisor that is known has its reciprocal kept, and is multiplied by.
         below = [f for f in below if self.known is None or f.free_symbols & self.own]
