@@ -18,10 +18,10 @@ from hybrid.errors import ArgumentError
 from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
 from hybrid.load import load_kernels
+from hybrid.system import HybridSystem
 
 if TYPE_CHECKING:
     from hybrid.emitted import Emitted
-    from hybrid.system import HybridSystem
 
 ROLES = (
     "flow",
@@ -148,8 +148,6 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     ArgumentError
         If ``system`` is not a HybridSystem.
     """
-    from hybrid.system import HybridSystem
-
     if not isinstance(system, HybridSystem):
         raise ArgumentError(f"system must be a HybridSystem; got {system!r}. Call the model's factory first.")
     compiled = _COMPILED.get(system)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import attrs
 import sympy
 
+from hybrid.constants import Constants
 from hybrid.kernels.codes import NARROW
-from hybrid.series import Constants
 from hybrid.series_loops import indented, padded
 from hybrid.trace import Symbols
 

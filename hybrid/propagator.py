@@ -12,6 +12,8 @@ import attrs
 import sympy
 from sympy.core.parameters import distribute
 
+from hybrid.constants import Constants
+from hybrid.directional import directional
 from hybrid.emitted import Propagator
 from hybrid.kernels.codes import (
     DESINGULARISED,
@@ -24,7 +26,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.linear_series import LinearForm, linear_form, table_statements
 from hybrid.printer import assignments
-from hybrid.series import ONE_THEN_ZERO, PAIRS, Constants, NoSeries, Recurrences, directional
+from hybrid.series import ONE_THEN_ZERO, PAIRS, NoSeries, Recurrences
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
 from hybrid.symbolic import (
     Absolute,

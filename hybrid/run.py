@@ -161,13 +161,14 @@ def _fit_of_guards() -> tuple[np.ndarray, np.ndarray]:
 def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
     """A record with room for that many steps and jumps; none means that they are not kept."""
     # Room that is not used costs nothing, not even to be cleared: all is written before it is read.
-    record = _record_layout(dimension, degree, steps, jumps).unwritten()
+    record = record_layout(dimension, degree, steps, jumps).unwritten()
     record.used[:] = 0
     return record
 
 
 @cache
-def _record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
+def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
+    """Where the arrays of a record lie."""
     from hybrid.kernels.layout import Record
     from hybrid.kernels.structure import Layout
 
@@ -368,6 +369,11 @@ class Trajectory:
             f"matrices, with entries up to {largest:.2g}, stand for a square root.",
             "Tighten the tolerances to resolve them, or move the parameters away.",
         )
+
+    def release(self) -> None:
+        """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
+        self.plan.run_layout.take_back(self.run)
+        self.plan.work_layout.take_back(self.work)
 
     def no_record(self) -> Any:
         """A record that keeps nothing."""

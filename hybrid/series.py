@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
+from hybrid.constants import Constants
 from hybrid.kernels.codes import NARROW
-from hybrid.printer import MATH_FUNCTIONS, assignments
-from hybrid.symbolic import ZERO
+from hybrid.printer import MATH_FUNCTIONS
+from hybrid.series_sums import Term, added
 
 # Functions whose derivative is again made of what has a recurrence.
 BY_DERIVATIVE = (
@@ -41,14 +41,6 @@ MOST_TERMS = 4
 
 class NoSeries(Exception):
     """An expression has no Taylor recurrence here; the text says which part."""
-
-
-class Term(NamedTuple):
-    """A term of a sum: when it is known, its text, and whether it is a product."""
-
-    ready: tuple[int, int]
-    text: str
-    is_product: bool
 
 
 class Recurrences:
@@ -283,10 +275,10 @@ class Recurrences:
         terms = self._terms(expression)
         constant = sympy.Add(*(factor for factor, rest in terms if rest == 1))
         moving = [(factor, rest) for factor, rest in terms if rest != 1]
-        first = self._added([self._times(*term) for term in moving])
+        first = added([self._times(*term) for term in moving])
         if constant != 0:
             first = f"{first} + {self.constants.name(constant)}"
-        return self._bind(expression, first, self._added([self._higher_times(*term) for term in moving]))
+        return self._bind(expression, first, added([self._higher_times(*term) for term in moving]))
 
     def _terms(self, expression: sympy.Expr) -> list[tuple[sympy.Expr, sympy.Expr]]:
         """The terms of a sum as constant factors and what moves; inner sums are taken apart.
@@ -344,15 +336,6 @@ class Recurrences:
             return 0, 0
         depth, late = max(map(self._ready, moving))
         return depth + (1 if expression.is_Add or expression.is_Mul else 2), late
-
-    def _added(self, terms: list[Term]) -> str:
-        """Text of a sum: what is known first is added first, and sums that do not need each other run on."""
-        while len(terms) > 1:
-            one, other, *rest = sorted(terms, key=lambda term: term.ready)
-            depth, late = max(other.ready, (one.ready[0] + one.is_product, one.ready[1]))
-            both = f"({one.text} + {other.text})" if rest else f"{one.text} + {other.text}"
-            terms = [*rest, Term((depth + 1, late), both, False)]
-        return terms[0].text
 
     def _product(self, expression: sympy.Expr) -> str:
         factors = expression.args
@@ -514,55 +497,3 @@ def _power_text(base: str, exponent: sympy.Expr, name: str) -> str:
 
 
 ONE_THEN_ZERO = "(1.0 if o == 1 else 0.0)"
-
-
-class Constants:
-    """Names for expressions of the parameters alone, computed once a call."""
-
-    def __init__(self) -> None:
-        self.names: dict[sympy.Expr, str] = {}
-
-    def name(self, expression: sympy.Expr) -> str:
-        """A name, or the number itself."""
-        if expression.is_Number or expression.is_NumberSymbol:
-            text = repr(float(expression))
-            return f"({text})" if text.startswith("-") else text
-        return self.names.setdefault(expression, f"k{len(self.names)}")
-
-    def statements(self) -> list[str]:
-        """Assignments of all of them."""
-        return assignments(list(self.names.values()), list(self.names))
-
-
-def directional(expression: sympy.Expr, seeds: dict[sympy.Symbol, sympy.Symbol]) -> sympy.Expr:
-    """Derivative along the seeds, one for each symbol, in a form that keeps common factors together."""
-    if not expression.free_symbols & seeds.keys():
-        return ZERO
-    if expression.is_Symbol:
-        return seeds[expression]
-    if expression.is_Add:
-        return sympy.Add(*(directional(term, seeds) for term in expression.args))
-    if expression.is_Mul:
-        args = expression.args
-        return sympy.Add(
-            *(
-                sympy.Mul(*args[:i], directional(factor, seeds), *args[i + 1 :])
-                for i, factor in enumerate(args)
-                if factor.free_symbols & seeds.keys()
-            )
-        )
-    return sympy.Add(
-        *(
-            _outer(expression, i) * directional(argument, seeds)
-            for i, argument in enumerate(expression.args)
-            if argument.free_symbols & seeds.keys()
-        )
-    )
-
-
-def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
-    """Derivative of the outermost function in its argument of that index."""
-    if expression.is_Pow:
-        base, exponent = expression.args
-        return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
-    return expression.fdiff(index + 1)

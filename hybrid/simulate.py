@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.run import Trajectory, empty_record, start
+from hybrid.run import Trajectory, empty_record, record_layout, start
 from hybrid.solvers import RungeKutta
 from hybrid.system import HybridSystem
 
@@ -81,7 +81,9 @@ def simulate(
     if not max_jumps >= 0:
         raise ArgumentError(f"max_jumps must be at least 0; got {max_jumps!r}.")
     trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
-    return _Recorder(trajectory, times, t1).run(t0, t1, int(max_jumps))
+    arc = _Recorder(trajectory, times, t1).run(t1, int(max_jumps))
+    trajectory.release()
+    return arc
 
 
 def _time_span(t_span: Any) -> tuple[float, float]:
@@ -134,7 +136,8 @@ class _Recorder:
         # The state at the end is at hand without any polynomial.
         only_the_end = times is not None and not (times.size and times[0] < t1)
         self.steps_at_once = 0 if only_the_end else STEPS_AT_ONCE
-        self.record: Any = None
+        n, degree = trajectory.model.dimension, trajectory.plan.degree
+        self.layout = record_layout(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
         self.steps: list[tuple[np.ndarray, ...]] = []
         self.jumps: list[tuple[np.ndarray, ...]] = []
         self.grazings: list[Grazing] = []
@@ -142,11 +145,12 @@ class _Recorder:
         self.places = np.empty((2, len(self.states)), dtype=np.int64)
         self.sampled = 0
 
-    def run(self, t0: float, t1: float, max_jumps: int) -> HybridArc:
+    def run(self, t1: float, max_jumps: int) -> HybridArc:
         trajectory, run = self.trajectory, self.trajectory.run
         code = codes.RECORD_FULL
         while code == codes.RECORD_FULL:
-            record = self._record_to_fill()
+            record = self.layout.unwritten()
+            record.used[:] = 0
             code = trajectory.advance(t1, record, max_jumps)
             self._file(record)
         model, system, count = trajectory.model, trajectory.system, run.count.tolist()
@@ -178,14 +182,6 @@ class _Recorder:
             pieces,
         )
 
-    def _record_to_fill(self) -> Any:
-        """The record of the burst before, or a new one if that was kept."""
-        if self.record is None:
-            n, degree = self.trajectory.model.dimension, self.trajectory.plan.degree
-            self.record = empty_record(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
-        self.record.used[:] = 0
-        return self.record
-
     def _file(self, record: Any) -> None:
         period = self.trajectory.model.period
         steps, jumps, grazings = record.used.tolist()
@@ -194,16 +190,16 @@ class _Recorder:
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
-            polynomials = record.step_coefficients[:steps]
+            places, polynomials = _places_of_steps(record, steps, period), record.step_coefficients[:steps]
             if 2 * steps > self.steps_at_once:
-                # New memory costs more than the part of this that was not used.
-                self.record = None
-            else:
-                polynomials = polynomials.copy()
-            self.steps.append((*_places_of_steps(record, steps, period), polynomials))
+                # The arc keeps the record: new memory costs more than what of this was not used.
+                self.steps.append((*places, polynomials))
+                return
+            self.steps.append((*places, polynomials.copy()))
         elif steps:
             places = _places_of_steps(record, steps, period)
             self._sample(Pieces(*places, record.step_coefficients[:steps]))
+        self.layout.take_back(record)
 
     def _sample(self, pieces: Pieces) -> None:
         """States at the samples that fall before the current end of the run."""

@@ -31,6 +31,8 @@ from numba.np.arrayobj import populate_array
 # Bytes of a word of a table, of a number in an array, and of a cache line.
 WORD = 8
 LINE = 64
+# Structures that a layout keeps for later: a few threads at work at once.
+MOST_SPARES = 4
 
 
 class StructureType(types.Type):
@@ -133,6 +135,8 @@ class Layout:
             moving += [name in shapes] + [False] * (len(entry) - 1)
         # The table itself comes first. An offset becomes an address when the block's own is added.
         head = _whole_lines(len(table) * WORD)
+        self.spares = []
+        self.head = head
         self.moving = np.array(moving, dtype=np.int64)
         self.table = np.array(table, dtype=np.int64) + head * self.moving
         self.length = head + end
@@ -142,12 +146,27 @@ class Layout:
         }
 
     def zeros(self):
-        """A new structure whose arrays are zero."""
-        return self._structure_in(np.zeros(self.length + LINE, dtype=np.uint8))
+        """A structure whose arrays are zero."""
+        spare = self._spare()
+        if spare is None:
+            return self._structure_in(np.zeros(self.length + LINE, dtype=np.uint8))
+        spare._memory[spare._begin + self.head :] = 0
+        return spare
 
     def unwritten(self):
-        """A new structure whose arrays hold what the memory held: for those who write before they read."""
-        return self._structure_in(np.empty(self.length + LINE, dtype=np.uint8))
+        """A structure whose arrays hold what the memory held: for those who write before they read."""
+        return self._spare() or self._structure_in(np.empty(self.length + LINE, dtype=np.uint8))
+
+    def take_back(self, structure):
+        """Keep a structure of this layout that nobody else holds any more, nor any of its arrays."""
+        if len(self.spares) < MOST_SPARES:
+            self.spares.append(structure)
+
+    def _spare(self):
+        try:
+            return self.spares.pop()
+        except IndexError:
+            return None
 
     def _structure_in(self, memory):
         # Three times as fast again as the address of any array, which may be empty or read-only.

@@ -3,10 +3,14 @@
 import mpmath as mp
 import numpy as np
 import pytest
+import sympy
 
 from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid.constants import Constants
 from hybrid.emit import emit
 from hybrid.kernels.codes import DESINGULARISED, EXACT, NARROW, RUNGE_KUTTA, TAYLOR
+from hybrid.series import Recurrences
+from hybrid.series_sums import Term, added
 
 ORDER = 9
 A = 1.375
@@ -288,3 +292,36 @@ def test_a_table_and_recurrences_agree():
     np.testing.assert_allclose(vectors, others, rtol=1e-13, atol=1e-15)
     divergence = [0.0, -0.2, *[0.0] * (ORDER - 1)]
     np.testing.assert_array_equal(out[:, 4], divergence)
+
+
+class TestSums:
+    """Texts of sums, by when their terms are known."""
+
+    @pytest.mark.parametrize(
+        ("terms", "text"),
+        [
+            ([Term((3, 0), "a", False)], "a"),
+            ([Term((3, 0), "late", False), Term((1, 0), "early", False)], "early + late"),
+            # Three that are there wait for no one; what comes last is added last.
+            (
+                [Term((9, 0), "k*z", True), *(Term((1, i), each, False) for i, each in enumerate("abc"))],
+                "(c + (a + b)) + k*z",
+            ),
+            # A product takes an operation before it can be the first of a sum.
+            ([Term((1, 0), "k*x", True), Term((1, 1), "y", False)], "k*x + y"),
+        ],
+    )
+    def test_what_is_known_last_is_added_last(self, terms, text):
+        assert added(terms) == text
+
+    def test_four_at_once_are_added_in_pairs(self):
+        assert added([Term((1, i), name, False) for i, name in enumerate("abcd")]) == "(a + b) + (c + d)"
+
+    def test_an_inner_sum_comes_apart_but_no_difference_of_states(self):
+        """``K (x - y)`` keeps the digits that ``K x - K y`` would lose."""
+        x, y, k, m = sympy.symbols("x y k m")
+        recurrences = Recurrences({x: "0", y: "1"}, None, lambda: "9", "s", Constants())
+        recurrences.coefficient(k * (x - y) + m * (x * y + k * x))
+        assert x - y in recurrences.variables
+        assert x * y in recurrences.variables
+        assert x * y + k * x not in recurrences.variables

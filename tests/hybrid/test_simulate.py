@@ -1,6 +1,7 @@
 """Runs against exact answers, and what must not change a run."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import attrs
 import numpy as np
@@ -306,6 +307,33 @@ class TestRunsKnowNothingOfOneAnother:
         np.testing.assert_array_equal(again.parameters, kept[1])
         assert np.isfinite(again.fundamental).all()
         assert again.propagators
+
+    @pytest.mark.parametrize("samples", [None, [1.0, 7.0, 9.0]])
+    @pytest.mark.parametrize("t_end", [9.0, 900.0])
+    def test_later_runs_leave_an_arc_as_it_is(self, oscillator, samples, t_end):
+        """They may have the memory of this one."""
+
+        def everything(arc):
+            jumps = arc.jumps
+            columns = [arc.t, arc.j, arc.x, arc.fundamental, jumps.t, jumps.x_minus, jumps.x_plus]
+            dense = [] if samples else [arc(np.linspace(0.0, t_end, 101))]
+            return [*columns, jumps.transversality, jumps.kind, *dense]
+
+        first = simulate(oscillator, (0.1, 0.3), (0.0, t_end), tangent=True, samples=samples)
+        before = [np.array(each) for each in everything(first)]
+        for x0 in ((-1.0, 5.0), (0.0, -2.0), (0.5, 0.5)):
+            simulate(oscillator, x0, (0.0, t_end), tangent=True, samples=samples)
+        for kept, now in zip(before, everything(first), strict=True):
+            np.testing.assert_array_equal(kept, now)
+
+    def test_in_threads_at_once(self, oscillator):
+        def end(start):
+            return simulate(oscillator, (start, 0.3), (0.0, 40.0), samples=[20.0, 40.0]).x
+
+        starts = np.linspace(-1.0, 0.9, 200)
+        with ThreadPoolExecutor(8) as pool:
+            together = list(pool.map(end, starts))
+        np.testing.assert_array_equal(together, [end(start) for start in starts])
 
 
 class TestMemory:

@@ -115,6 +115,28 @@ class TestLayout:
         assert one.cube is other.cube
         assert one.vector is one.vector
 
+    def test_what_is_taken_back_serves_again(self):
+        layout = self.layout()
+        one = layout.zeros()
+        one.vector[:], one.matrix[:] = 1.0, 2.0
+        layout.take_back(one)
+        again, another = layout.zeros(), layout.zeros()
+        assert again is one
+        assert another is not one
+        assert not again.vector.any()
+        assert not again.matrix.any()
+        out = np.zeros(6)
+        again.vector[1], again.matrix[0, 2] = 5.0, 7.0
+        read(Layout(Box, {"places": (2,)}, parcel=again).zeros(), out)
+        np.testing.assert_array_equal(out, [-7.0, 0.1, 0.2, 0.0, 23.0, 233.0])
+        np.testing.assert_array_equal(again.vector, [0.0, 5.0, 7.0])
+
+    def test_no_more_is_kept_than_a_few(self):
+        layout = self.layout()
+        for structure in [layout.zeros() for _ in range(100)]:
+            layout.take_back(structure)
+        assert len(layout.spares) < 10
+
     def test_an_array_outlives_its_structure(self):
         vector = self.layout().zeros().vector
         np.testing.assert_array_equal(vector, np.zeros(3))
