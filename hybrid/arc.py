@@ -82,7 +82,8 @@ class Jumps(Sequence[Jump]):
     """The jumps of an arc in order, each made when looked at; the arrays hold all of them."""
 
     system: HybridSystem
-    _model: Any
+    _parameters: np.ndarray
+    _period: float
     _time: np.ndarray
     _place: np.ndarray
     _states: np.ndarray
@@ -91,7 +92,7 @@ class Jumps(Sequence[Jump]):
     @cached_property
     def t(self) -> np.ndarray:
         """Times ``(jumps,)``."""
-        return self._place[:, 0] * self._model.period + self._time[:, 0]
+        return self._place[:, 0] * self._period + self._time[:, 0]
 
     @property
     def transversality(self) -> np.ndarray:
@@ -124,8 +125,9 @@ class Jumps(Sequence[Jump]):
         missing = np.flatnonzero(self._place[:, 3] == 0)
         if missing.size:
             fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
+            parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
             states = np.ascontiguousarray(self.x_minus[missing])
-            self._saltation[missing], _ = matrices_at(self.system, self._model, fired, phases, states)
+            self._saltation[missing], _ = matrices_at(self.system, parameters, fired, phases, states)
         return self._saltation
 
     def __len__(self) -> int:

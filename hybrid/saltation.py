@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,9 +60,8 @@ def saltation_matrix(
     compiled = compile_system(system)
     index = system.transition_index(transition)
     state = check_state(system, x)
-    model = compiled.model(parameters)
-    phase = split_time(finite_number("t", t), model.period)[1]
-    (matrix,), (transversality,) = matrices_at(system, model, [index], [phase], state[None])
+    phase = split_time(finite_number("t", t), compiled.model(parameters).period)[1]
+    (matrix,), (transversality,) = matrices_at(system, parameters, [index], [phase], state[None])
     if not np.all(np.isfinite(matrix)):
         raise ArgumentError(
             f"Transition {system.transitions[index].name!r}: the saltation matrix does not exist at t = {t}, "
@@ -74,10 +72,14 @@ def saltation_matrix(
 
 
 def matrices_at(
-    system: HybridSystem, model: Any, transitions: list[int], phases: list[float], states: np.ndarray
+    system: HybridSystem,
+    parameters: Mapping[str, float] | None,
+    transitions: list[int],
+    phases: list[float],
+    states: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Saltation matrices ``(J, n, n)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
-    n = system.dimension
+    n, model = system.dimension, compile_system(system).model(parameters)
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
     sources = [system.mode_index(transition.source) for transition in system.transitions]
     kernel = entry(load_kernels("hybrid.kernels.jump").saltation)

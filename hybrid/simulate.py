@@ -154,7 +154,8 @@ class _Recorder:
             code = trajectory.advance(t1, record, max_jumps)
             self._file(record)
         model, system, count = trajectory.model, trajectory.system, run.count.tolist()
-        jumps = Jumps(system, model, *(join(self.jumps) if self.jumps else _no_jumps(model.dimension)))
+        columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
+        jumps = Jumps(system, model.parameters, model.period, *columns)
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, count[codes.MODE])
         pieces = None
