@@ -85,8 +85,6 @@ def main() -> None:
         spent = time.process_time() - begin
         cells = [f"{drift[np.searchsorted(counts, count, side='right') - 1]:.1e}" for count in shown]
         rows.append([f"{tolerance:.0e}", *cells, str(impacts), f"{spent:.0f} s"])
-        print(rows[-1], flush=True)
-    print()
     columns = [f"after {count}" for count in shown]
     table(["rtol = 100 atol", *columns, "impacts", "time"], rows)
 
