@@ -32,10 +32,6 @@ class Jump:
         Names of the transition and of the modes before and after; ``target`` is None where it ended the run.
     x_minus, x_plus
         States ``(n,)`` before and after.
-    saltation
-        Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order. Where a jump sets
-        off others at once, by landing beyond their guards, their time is that of its own guard: the product
-        of the matrices is then the tangent map of all of them, if those before the last can be inverted.
     transversality
         ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the
         saltation matrix grows without bound, unless the jump was set off by another.
@@ -48,9 +44,19 @@ class Jump:
     target: str | None
     x_minus: np.ndarray
     x_plus: np.ndarray
-    saltation: np.ndarray
     transversality: float
     kind: str
+    _all: Jumps = attrs.field(repr=False)
+
+    @property
+    def saltation(self) -> np.ndarray:
+        """Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
+
+        Where a jump sets off others at once, by landing beyond their guards, their time is that of its own
+        guard: the product of the matrices is then the tangent map of all of them, if those before the last
+        can be inverted.
+        """
+        return self._all.saltation[self.j]
 
 
 @attrs.frozen(eq=False)
@@ -121,7 +127,7 @@ class Jumps(Sequence[Jump]):
 
     @cached_property
     def saltation(self) -> np.ndarray:
-        """As in :class:`Jump`, ``(jumps, n, n)``; where the run did not need them they are made now."""
+        """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
         missing = np.flatnonzero(self._place[:, 3] == 0)
         if missing.size:
             fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
@@ -162,9 +168,9 @@ class Jumps(Sequence[Jump]):
             target or transition.target,
             self.x_minus[i],
             self.x_plus[i],
-            self.saltation[i],
             float(self.transversality[i]),
             kind,
+            self,
         )
 
 
