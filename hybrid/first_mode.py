@@ -28,7 +28,8 @@ def choose_mode(system: HybridSystem, parts: Any, model: Any, run: Any, work: An
     verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
     if len(modes) == 1 and codes.BEYOND not in verdicts:
         return 0
-    violated = {tr.source for tr, verdict in zip(system.transitions, verdicts, strict=True) if verdict}
+    said = zip(system.transitions, verdicts, strict=True)
+    violated = {transition.source for transition, verdict in said if verdict != codes.NO_OBJECTION}
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1:
         return modes.index(allowed[0])
@@ -59,7 +60,9 @@ def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any,
 
 def _faults(system: HybridSystem, verdicts: list[int]) -> str:
     """The guards against each mode."""
-    against = [tr for tr, verdict in zip(system.transitions, verdicts, strict=True) if verdict]
+    against = [
+        tr for tr, verdict in zip(system.transitions, verdicts, strict=True) if verdict != codes.NO_OBJECTION
+    ]
     return "; ".join(
         f"mode {name!r} is left through {', '.join(repr(tr.name) for tr in against if tr.source == name)}"
         for name in system.mode_names

@@ -110,6 +110,7 @@ def _fresh_work(layout: Any, method: Any) -> Any:
 @cache
 def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any:
     """Where the arrays of a workspace lie."""
+    from hybrid.kernels.lanes import whole_registers
     from hybrid.kernels.layout import Work
     from hybrid.kernels.structure import Layout
 
@@ -118,7 +119,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any
     coupled = len(method.b) if method.implicit else 0
     nodes, fit = _fit_of_guards()
     # Whole vectors of columns are evaluated: there may be a few more than are in use.
-    width_of_series = -(-columns // codes.WIDE) * codes.WIDE
+    width_of_series = whole_registers(columns, codes.WIDE)
     width = max(degree, FIT_DEGREE, codes.HIGHEST_ORDER if method.order else 0) + 4
     shapes = {
         "stages": (stages, length + 1),

@@ -12,7 +12,16 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
 from hybrid.kernels.codes import NARROW, WIDE
-from hybrid.kernels.lanes import HERE, built_in, everywhere, multiply_add, read, vector_of, write
+from hybrid.kernels.lanes import (
+    HERE,
+    built_in,
+    everywhere,
+    multiply_add,
+    read,
+    vector_of,
+    whole_registers,
+    write,
+)
 
 # Sums that grow side by side: each term waits for the one before it in the same sum.
 AT_ONCE = 4
@@ -84,7 +93,7 @@ def spread_tangents(y, n, series, first, stride):
     Those of four vectors begin at ``first``, those of the next four ``stride`` columns further.
     """
     count = len(y) // n - 1
-    for vector in range((count + NARROW - 1) // NARROW * NARROW):
+    for vector in range(whole_registers(count, NARROW)):
         column = first + vector // NARROW * stride + vector % NARROW
         for i in range(n):
             series[0, column + NARROW * i] = y[n * (1 + vector) + i] if vector < count else 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.extending import intrinsic, models, overload, register_jitable, register_model
 
 from hybrid.kernels.codes import NARROW, WIDE
 from hybrid.kernels.compiler import PartCompiler
@@ -77,6 +77,12 @@ def read(builder, address, width):
 def write(builder, vector, address):
     """Put a vector where it belongs."""
     builder.store(vector, builder.bitcast(address, vector.type.as_pointer()), align=8)
+
+
+@register_jitable
+def whole_registers(width, register):
+    """The least number of columns, no less than ``width``, that fill vector registers."""
+    return (width + register - 1) // register * register
 
 
 def load(matrix, row, column):

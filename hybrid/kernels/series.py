@@ -32,7 +32,16 @@ from hybrid.kernels.codes import (
 )
 from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.guards import guard_speed, guard_value
-from hybrid.kernels.lanes import four_times, larger, largest, load, magnitude, square_root, store
+from hybrid.kernels.lanes import (
+    four_times,
+    larger,
+    largest,
+    load,
+    magnitude,
+    square_root,
+    store,
+    whole_registers,
+)
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.powers import binary_logarithms, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
@@ -100,12 +109,6 @@ def weigh_tangents(series, n, first, rtol, exact, weights):
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
         store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
-
-
-@njit(**INLINE)
-def whole_registers(width, register):
-    """The least number of columns, no less than ``width``, that fill vector registers."""
-    return (width + register - 1) // register * register
 
 
 @njit(**KERNEL)
@@ -216,7 +219,7 @@ def accept_series(model, run, tangents, order, h, work):
     if tangents > 0:
         run.clock[DIVERGENCE] += series[order + 1, n + last - first + 1]
         start, stride = model.tangent_start, model.tangent_columns[mode]
-        for g in range((tangents + NARROW - 1) // NARROW):
+        for g in range(whole_registers(tangents, NARROW) // NARROW):
             evaluate(series, order, h, start + g * stride, NARROW * n)
         gather_tangents(series, order + 1, n, start, stride, run.y[: n * (1 + tangents)])
 
@@ -285,7 +288,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     h = math.inf
     if degree == 0:
         start, stride = model.tangent_start, model.tangent_columns[mode]
-        groups = (tangents + NARROW - 1) // NARROW
+        groups = whole_registers(tangents, NARROW) // NARROW
         h = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
     if not h > 0.0:
         return NON_FINITE, 0.0
