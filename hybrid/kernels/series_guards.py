@@ -22,7 +22,7 @@ from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 # The error of the last step towards a root is taken to be this many times its estimate.
 UNSEEN = 64.0
 # Share of a guard's size that the high powers of its series may reach together to be left out of a proof.
-NEGLIGIBLE = 0.01
+NEGLIGIBLE = 0.003
 
 
 # What a power of the variable is divided by in Bernstein form: ``C(degree, k)``.
