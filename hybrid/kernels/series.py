@@ -62,6 +62,8 @@ SAFETY = 0.9
 # Share of the tolerance that a tangent vector gets: stiff contacts stretch it a thousandfold and shrink it
 # again, and what was an error of the long vector is one of the short vector then.
 TANGENT_SHARE = 0.1
+# Below this it is the rounding of the state in such a contact that their error comes from.
+FINEST = 1e-12
 # What stands for an absolute tolerance where there is none.
 TINY = 1e-300
 # Terms at the end of a series that have to be small.
@@ -104,7 +106,7 @@ def weigh_tangents(series, n, first, rtol, exact, weights):
         component = load(series, 0, first + NARROW * i)
         square = component * component + square
     if not exact:
-        rtol *= TANGENT_SHARE
+        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST))
     floor = (SHARE * rtol if exact else rtol) * square_root(square / n) + TINY
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
