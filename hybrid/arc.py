@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.load import entry, load_kernels
 from hybrid.saltation import matrices_at
@@ -132,8 +133,9 @@ class Jumps(Sequence[Jump]):
         if missing.size:
             fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
             parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
+            model = compile_system(self.system).model(parameters)
             states = np.ascontiguousarray(self.x_minus[missing])
-            self._saltation[missing], _ = matrices_at(self.system, parameters, fired, phases, states)
+            self._saltation[missing], _ = matrices_at(self.system, model, fired, phases, states)
         return self._saltation
 
     def __len__(self) -> int:

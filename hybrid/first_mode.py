@@ -9,7 +9,7 @@ import numpy as np
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
 from hybrid.load import entry, load_kernels
-from hybrid.system import HybridSystem
+from hybrid.system import HybridSystem, Transition
 
 
 def choose_mode(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None) -> int:
@@ -28,8 +28,7 @@ def choose_mode(system: HybridSystem, parts: Any, model: Any, run: Any, work: An
     verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
     if len(modes) == 1 and codes.BEYOND not in verdicts:
         return 0
-    said = zip(system.transitions, verdicts, strict=True)
-    violated = {transition.source for transition, verdict in said if verdict != codes.NO_OBJECTION}
+    violated = {transition.source for transition in _against(system, verdicts)}
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1:
         return modes.index(allowed[0])
@@ -58,11 +57,15 @@ def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any,
     return verdicts.tolist()
 
 
+def _against(system: HybridSystem, verdicts: list[int]) -> list[Transition]:
+    """Transitions whose guards object to the start."""
+    said = zip(system.transitions, verdicts, strict=True)
+    return [transition for transition, verdict in said if verdict != codes.NO_OBJECTION]
+
+
 def _faults(system: HybridSystem, verdicts: list[int]) -> str:
     """The guards against each mode."""
-    against = [
-        tr for tr, verdict in zip(system.transitions, verdicts, strict=True) if verdict != codes.NO_OBJECTION
-    ]
+    against = _against(system, verdicts)
     return "; ".join(
         f"mode {name!r} is left through {', '.join(repr(tr.name) for tr in against if tr.source == name)}"
         for name in system.mode_names

@@ -76,21 +76,22 @@ def driver_parts(series_only: bool, implicit: bool) -> Any:
     )
 
 
-def solver_parts(compiled: CompiledSystem, solver: RungeKutta) -> Any:
-    """The pieces that the driver needs for a system and a solver."""
-    kinds = [each.kind for each in compiled.emitted.propagators]
-    series_only = isinstance(solver, Taylor) and codes.RUNGE_KUTTA not in kinds
-    return driver_parts(series_only, bool(solver.tableau.implicit))
-
-
-def dense_degree(compiled: CompiledSystem, solver: RungeKutta) -> int:
-    """Degree of the polynomials that a record of steps holds."""
-    degrees = {codes.RUNGE_KUTTA: len(solver.tableau.interpolant) - 1}
-    if not isinstance(solver, Taylor):
-        return degrees[codes.RUNGE_KUTTA]
-    degrees[codes.EXACT] = codes.HIGHEST_ORDER
+def propagator_kinds(compiled: CompiledSystem, solver: RungeKutta) -> list[int]:
+    """How each mode is advanced: only Taylor takes series from the model."""
     modes = compiled.emitted.propagators
-    return max(each.degree or degrees.get(each.kind, solver.order) for each in modes)
+    return [each.kind for each in modes] if isinstance(solver, Taylor) else [codes.RUNGE_KUTTA] * len(modes)
+
+
+def dense_degree(compiled: CompiledSystem, method: Any, kinds: list[int]) -> int:
+    """Degree of the polynomials that a record of steps holds, for propagators of these kinds."""
+
+    def degree_of(kind: int, of_solutions: int) -> int:
+        if kind == codes.RUNGE_KUTTA:
+            return len(method.interpolant) - 1
+        return of_solutions or (codes.HIGHEST_ORDER if kind == codes.EXACT else method.order)
+
+    modes = compiled.emitted.propagators
+    return max(degree_of(kind, each.degree) for kind, each in zip(kinds, modes, strict=True))
 
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
@@ -458,17 +459,13 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
         system, method = compiled.system, kernel_method(solver)
         load_kernels("hybrid.kernels.first_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
-        kinds = [each.kind for each in compiled.emitted.propagators]
-        replaced = None
-        if not isinstance(solver, Taylor):
-            kinds = [codes.RUNGE_KUTTA] * modes
-            replaced = np.array(kinds, dtype=np.int64)
+        kinds, is_taylor = propagator_kinds(compiled, solver), isinstance(solver, Taylor)
         plan = Plan(
             method,
-            solver_parts(compiled, solver),
-            replaced,
+            driver_parts(codes.RUNGE_KUTTA not in kinds, bool(solver.tableau.implicit)),
+            None if is_taylor else np.array(kinds, dtype=np.int64),
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
-            dense_degree(compiled, solver),
+            dense_degree(compiled, method, kinds),
             _run_layout(n, tangents, modes, transitions),
             work_layout(method, n, tangents, compiled.series_columns(tangents)),
         )

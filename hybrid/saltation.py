@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,26 +61,23 @@ def saltation_matrix(
     compiled = compile_system(system)
     index = system.transition_index(transition)
     state = check_state(system, x)
-    phase = split_time(finite_number("t", t), compiled.model(parameters).period)[1]
-    (matrix,), (transversality,) = matrices_at(system, parameters, [index], [phase], state[None])
-    if not np.all(np.isfinite(matrix)):
+    model = compiled.model(parameters)
+    phase = split_time(finite_number("t", t), model.period)[1]
+    matrices, (transversality,) = matrices_at(system, model, [index], [phase], state[None])
+    if not np.all(np.isfinite(matrices)):
         raise ArgumentError(
             f"Transition {system.transitions[index].name!r}: the saltation matrix does not exist at t = {t}, "
             f"x = {tuple(float(v) for v in state)}; the transversality is {transversality}. "
             "A grazing crossing has no linear tangent map."
         )
-    return np.array(matrix)
+    return matrices[0]
 
 
 def matrices_at(
-    system: HybridSystem,
-    parameters: Mapping[str, float] | None,
-    transitions: list[int],
-    phases: list[float],
-    states: np.ndarray,
+    system: HybridSystem, model: Any, transitions: list[int], phases: list[float], states: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Saltation matrices ``(J, n, n)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
-    n, model = system.dimension, compile_system(system).model(parameters)
+    n = system.dimension
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
     sources = [system.mode_index(transition.source) for transition in system.transitions]
     kernel = entry(load_kernels("hybrid.kernels.jump").saltation)

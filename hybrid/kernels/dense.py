@@ -2,11 +2,8 @@
 
 from numba import int64, njit, void
 
-from hybrid.kernels.layout import CUBE, ENTRY, EPSILON, INDICES, KERNEL, MATRIX, VECTOR
-from hybrid.kernels.series_guards import expanded_at, value_at
-
-# Where Newton's method moves by less than this share, its next step would be below rounding.
-SETTLED = 1e-9
+from hybrid.kernels.layout import CUBE, ENTRY, INDICES, KERNEL, MATRIX, VECTOR
+from hybrid.kernels.series_guards import time_of, value_at
 
 
 @njit(**KERNEL)
@@ -28,33 +25,6 @@ def step_at(start, time, step):
         else:
             high = middle
     return low
-
-
-@njit(**KERNEL)
-def place_at(polynomials, clock, degree, since, span):
-    """Place on ``[0, 1]`` where the polynomial of time shows ``since``; of degree 1 unless on another clock.
-
-    Time only grows along it, but may start without speed: Newton's method is kept in a bracket.
-    """
-    place = min(max(since / span, 0.0), 1.0)
-    if degree == 1:
-        return place
-    low, high = 0.0, 1.0
-    for _ in range(100):
-        value, slope, _ = expanded_at(polynomials, clock, 0, degree, place)
-        misfit = value - since
-        if misfit > 0.0:
-            high = place
-        else:
-            low = place
-        newton = place - misfit / slope if slope > 0.0 else low
-        if not low <= newton <= high or not slope > 0.0:
-            newton = 0.5 * (low + high)
-        change = abs(newton - place)
-        place = newton
-        if change <= SETTLED * place or high - low <= EPSILON:
-            break
-    return place
 
 
 @njit(**KERNEL)
@@ -86,7 +56,11 @@ def states_at(times, start, span, coefficients, states, steps):
             degree = top
             while degree > 1 and polynomials[degree, n] == 0.0:
                 degree -= 1
-        place = place_at(polynomials, n, degree, times[i] - start[step], span[step])
+        since = times[i] - start[step]
+        if degree == 1:
+            place = min(max(since / span[step], 0.0), 1.0)
+        else:
+            place = time_of(polynomials, n, degree, 1.0, since)
         for k in range(n):
             states[i, k] = value_at(polynomials, k, top, place)
         steps[i] = step

@@ -47,8 +47,8 @@ from hybrid.kernels.powers import binary_logarithms, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.series_guards import (
     earliest_on_series,
-    expanded_at,
     powers_on_step,
+    time_of,
     to_bernstein,
     value_at,
 )
@@ -164,27 +164,6 @@ def within_guards(model, mode, series, n, order, rtol, h):
                 break
             h = longest
     return h
-
-
-@njit(**KERNEL)
-def time_of(series, clock, order, h, span):
-    """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
-    low, high = 0.0, h
-    s = h * math.sqrt(span / value_at(series, clock, order, h))
-    for _ in range(100):
-        value, slope, _ = expanded_at(series, clock, 0, order, s)
-        misfit = value - span
-        if misfit > 0.0:
-            high = s
-        else:
-            low = s
-        newton = s - misfit / slope
-        if not low < newton < high:
-            newton = 0.5 * (low + high)
-        if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
-            return newton
-        s = newton
-    return s
 
 
 @njit(**KERNEL)

@@ -208,6 +208,30 @@ def expanded_at(series, column, first, order, s):
 
 
 @njit(**KERNEL)
+def time_of(series, clock, order, h, span):
+    """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
+    low, high = 0.0, h
+    # It may start without speed: the place grows like the root of the time then.
+    s = h * math.sqrt(min(max(span / value_at(series, clock, order, h), 0.0), 1.0))
+    if s == 0.0:
+        return s
+    for _ in range(100):
+        value, slope, _ = expanded_at(series, clock, 0, order, s)
+        misfit = value - span
+        if misfit > 0.0:
+            high = s
+        else:
+            low = s
+        newton = s - misfit / slope
+        if not low < newton < high:
+            newton = 0.5 * (low + high)
+        if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
+            return newton
+        s = newton
+    return s
+
+
+@njit(**KERNEL)
 def root_between(series, column, order, known_roots, h, low, high, left, right):
     """The one root of a series in an open interval of the step ``h``.
 
