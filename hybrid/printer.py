@@ -270,3 +270,11 @@ def _fraction(coefficient: sympy.Number) -> tuple[str, str | None]:
     if coefficient.is_Rational and coefficient.q & (coefficient.q - 1):
         return repr(float(coefficient.p)), repr(float(coefficient.q))
     return repr(float(coefficient)), None
+
+
+def power_text(base: str, exponent: sympy.Expr, name: str) -> str:
+    """Text of a power, half-integer ones by a square root."""
+    if not (exponent.is_Rational and exponent.q == 2):
+        return f"{base}**{name}"
+    product = "*".join([base] * (abs(exponent.p) // 2) + [f"sqrt({base})"])
+    return product if exponent.is_positive else f"1.0/({product})"

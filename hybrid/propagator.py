@@ -48,6 +48,8 @@ ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 CLOCK, DIVERGENCE, OTHERS = range(3)
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
+# Share of those sizes below which the guard and the square of a root differ by rounding.
+SAME = 1e-14
 
 
 @attrs.frozen
@@ -218,6 +220,10 @@ def _write_desingularised(
 
     All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
     with a speed of zero too it would stay there. What it is started at is below the rounding of ``z``.
+
+    A guard is a small difference of states, and its rounding is felt: by the energy, and a thousandfold by
+    the tangent vectors. The root has none of that. So a step goes on with the root that the last one ended
+    with, ``z`` is its square, and only a root that has drifted from the states is taken from them again.
     """
     harmonics = _harmonics(field, symbols)
     field = [rate.xreplace(harmonics) for rate in field]
@@ -235,7 +241,15 @@ def _write_desingularised(
     crossing = [_sign_of(guard, [z]) * ROOT or _in_roots(guard, z) for guard in guards]
     size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in symbols.x))
     columns, starts = _state(symbols)
-    body.preamble += [*assignments(["z", "size"], [z, size]), f"root = sqrt(max(z, {FLOOR}*size, 1e-300))"]
+    place = next(i for i, guard in enumerate(guards) if _sign_of(guard, [z]))
+    body.starts[z] = "root*root"
+    body.preamble += [
+        *assignments(["z", "size"], [z, size]),
+        f"last = abs(out[order + 1, {body.n + place}])",
+        # Anything as close to the root as this is one, whoever left it there.
+        f"same = abs(last*last - z) <= {SAME}*size < z",
+        f"root = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
+    ]
     turning = [ROOT * function.diff(symbols.t).xreplace(harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
@@ -316,6 +330,7 @@ class _Body:
         self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
         self.preamble: list[str] = []
+        self.starts: dict[sympy.Expr, str] = {}
 
     def column(self, place: int) -> str:
         """A column behind those of the guards."""
@@ -381,7 +396,9 @@ class _Body:
         """The loop of the state, and of what else there are ``rates`` for; local names have a prefix."""
         state = {x: str(i) for i, x in enumerate(self.symbols.x)}
         time = self.symbols.t, self.time.format(prefix)
-        block = Recurrences({**state, **self.rows}, time, self.allot, prefix, self.constants)
+        block = Recurrences(
+            {**state, **self.rows}, time, self.allot, prefix, self.constants, starts=self.starts
+        )
         block.expect(names, rates)
         moved = StateLoop(names, columns, rates, starts, block)
         crossing = {str(self.n + place): block.coefficient(guard) for place, guard in enumerate(guards)}

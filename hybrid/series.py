@@ -9,14 +9,14 @@ order, products and functions a convolution.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
 from hybrid.constants import Constants
 from hybrid.kernels.codes import NARROW
-from hybrid.printer import MATH_FUNCTIONS
+from hybrid.printer import MATH_FUNCTIONS, power_text
 from hybrid.series_sums import Term, added
 
 # Functions whose derivative is again made of what has a recurrence.
@@ -70,6 +70,8 @@ class Recurrences:
         Begins the names of local variables.
     known
         Recurrences that run before these and hold the series of all that is free of the symbols in ``rows``.
+    starts
+        Text of order zero of expressions for which there is a better one than their operations give.
     lanes
         Whether the symbols in ``rows`` stand for four numbers each.
     """
@@ -82,6 +84,7 @@ class Recurrences:
         prefix: str,
         constants: Constants,
         known: Recurrences | None = None,
+        starts: Mapping[sympy.Expr, str] | None = None,
         lanes: bool = False,
     ) -> None:
         self.rows: dict[sympy.Expr, str] = dict(rows)
@@ -91,6 +94,7 @@ class Recurrences:
         self.prefix = prefix
         self.constants = constants
         self.known = known
+        self.starts = starts or {}
         self.first: list[str] = []
         self.higher: list[str] = []
         self.pairs: dict[tuple[str, sympy.Expr], str] = {}
@@ -171,7 +175,7 @@ class Recurrences:
     def _bind(self, expression: sympy.Expr, first: str, *higher: str, name: str | None = None) -> str:
         """A variable for the expression: its value at order zero, and statements or a value above that."""
         name = name or self._name(expression)
-        self.first.append(f"{name} = {first}")
+        self.first.append(f"{name} = {self.starts.get(expression, first)}")
         value, *more = higher
         self.higher += [f"{name} = {value}", *more]
         return name
@@ -402,7 +406,7 @@ class Recurrences:
         self.first.append(f"{name}d = 1.0/{value}")
         self._bind(
             expression,
-            _power_text(value, exponent, k),
+            power_text(value, exponent, k),
             f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})*shrink*{name}d",
         )
         self._enter(u, expression, column, name)
@@ -486,14 +490,6 @@ class Recurrences:
             f"{MATH_FUNCTIONS[expression.func]}({argument})",
             f"({inner} + out[o, {rate}]*out[0, {slope}])*shrink",
         )
-
-
-def _power_text(base: str, exponent: sympy.Expr, name: str) -> str:
-    """Text of a power, half-integer ones by a square root."""
-    if not (exponent.is_Rational and exponent.q == 2):
-        return f"{base}**{name}"
-    product = "*".join([base] * (abs(exponent.p) // 2) + [f"sqrt({base})"])
-    return product if exponent.is_positive else f"1.0/({product})"
 
 
 ONE_THEN_ZERO = "(1.0 if o == 1 else 0.0)"

@@ -7,7 +7,7 @@ import numpy as np
 
 import models
 from benchmarks.long_run import CONSERVATIVE, energy, energy_drift
-from hybrid import DOP853, simulate, stroboscopic_section
+from hybrid import DOP853, Taylor, simulate, stroboscopic_section
 from hybrid.kernels import codes
 from hybrid.run import start
 from lyapunov import lyapunov_spectrum
@@ -66,6 +66,12 @@ def test_energy_drifts_by_the_tolerance_and_at_the_tightest_hardly():
     assert impacts > 300
     assert 1e-9 < loose[-1] < 1e-6
     assert tight[-1] < 1e-11
+
+
+def test_the_root_of_a_contact_keeps_the_energy_from_the_rounding_of_its_guard():
+    """Roots taken anew from the states in each step, on each of 3759 contacts, lose ten times as much."""
+    (drift,), _ = energy_drift(Taylor(rtol=1e-13, atol=1e-15), np.array([10_000]))
+    assert drift < 3e-12
 
 
 def test_the_energy_is_what_the_equations_keep():
