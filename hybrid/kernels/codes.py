@@ -85,7 +85,7 @@ LEAVES = 1
 BEYOND = 2
 
 # Highest order of a series, and the order of exact ones: what the memory for them is laid out for.
-HIGHEST_ORDER = 28
+HIGHEST_ORDER = 32
 
 # Columns of series that are worked on at once, and in the widest register.
 NARROW = 4

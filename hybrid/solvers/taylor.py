@@ -7,12 +7,13 @@ from typing import ClassVar
 
 import attrs
 
-from hybrid.kernels.codes import HIGHEST_ORDER
 from hybrid.solvers.dop853 import DOP853
 from hybrid.solvers.runge_kutta import RungeKutta
 from hybrid.solvers.tableau import Tableau
 
 LOWEST_ORDER = 12
+# What a contact loses by the longer steps of higher orders is felt by its energy first.
+HIGHEST_ORDER = 28
 # Orders beyond those of the fewest operations per unit of time: a step has costs of its own.
 BEYOND = 6
 
