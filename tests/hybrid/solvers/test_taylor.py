@@ -82,6 +82,35 @@ def test_contacts_lose_no_order(gap):
     assert steps[-1] < 1.5 * steps[0]
 
 
+@pytest.mark.parametrize("speed", [1e-3, 1.0])
+@pytest.mark.parametrize("wall", [0.0, 1.0, 1e3, 1e6])
+def test_a_contact_far_from_the_origin_gives_the_speed_back(wall, speed):
+    """The penetration is a difference of large numbers; a force that felt its rounding would lose 1e-7."""
+
+    def penetration(t, x, p):
+        return x.q - p.D
+
+    system = HybridSystem(
+        state=("q", "v"),
+        parameters={"K": 1e6, "D": wall},
+        modes=[
+            Mode("free", lambda t, x, p: (x.v, 0.0)),
+            Mode("contact", lambda t, x, p: (x.v, -p.K * np.maximum(x.q - p.D, 0.0) ** 1.5)),
+        ],
+        transitions=[
+            Transition("free", "contact", Guard(penetration, direction=+1)),
+            Transition("contact", "free", Guard(penetration, direction=-1)),
+        ],
+    )
+    start = (wall - 0.5 * speed, speed)
+    solver = Taylor(rtol=1e-13, atol=1e-15)
+    arc = simulate(system, start, (0.0, 4.0), mode="free", solver=solver, tangent=True)
+    assert [jump.target for jump in arc.jumps] == ["contact", "free"]
+    assert arc.x[-1, 1] == pytest.approx(-speed, rel=1e-14)
+    # Area is kept.
+    assert np.linalg.det(arc.fundamental) == pytest.approx(1.0, rel=1e-12)
+
+
 def test_dense_output_inside_a_contact():
     """The clock of a contact is not time; the dense output is a function of time all the same."""
     system, case = models.vibroimpact(), FOUNDING["D=0.05"]
