@@ -94,7 +94,7 @@ class Jumps(Sequence[Jump]):
     _time: np.ndarray
     _place: np.ndarray
     _states: np.ndarray
-    _saltation: np.ndarray
+    _recorded: np.ndarray
 
     @cached_property
     def t(self) -> np.ndarray:
@@ -130,13 +130,17 @@ class Jumps(Sequence[Jump]):
     def saltation(self) -> np.ndarray:
         """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
         missing = np.flatnonzero(self._place[:, 3] == 0)
-        if missing.size:
-            fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
-            parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
-            model = compile_system(self.system).model(parameters)
-            states = np.ascontiguousarray(self.x_minus[missing])
-            self._saltation[missing], _ = matrices_at(self.system, model, fired, phases, states)
-        return self._saltation
+        if not missing.size:
+            return self._recorded
+        fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
+        parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
+        model = compile_system(self.system).model(parameters)
+        matrices = np.empty((len(self), *self._recorded.shape[1:]))
+        matrices[self._place[:, 3] == 1] = self._recorded
+        matrices[missing], _ = matrices_at(
+            self.system, model, fired, phases, np.ascontiguousarray(self.x_minus[missing])
+        )
+        return matrices
 
     def __len__(self) -> int:
         return len(self._place)

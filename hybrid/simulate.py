@@ -185,9 +185,9 @@ class _Recorder:
 
     def _file(self, record: Any) -> None:
         period = self.trajectory.model.period
-        steps, jumps, grazings = record.used.tolist()
+        steps, jumps, grazings, matrices = record.used.tolist()
         if jumps:
-            self.jumps.append(_jump_columns(record, jumps))
+            self.jumps.append(_jump_columns(record, jumps, matrices))
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
@@ -233,12 +233,12 @@ def _places_of_steps(
 @cache
 def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
     """Columns of jumps, empty, so that any number of arcs can have the same."""
-    return _jump_columns(empty_record(dimension, 0), 0)
+    return _jump_columns(empty_record(dimension, 0), 0, 0)
 
 
-def _jump_columns(record: Any, used: int) -> tuple[np.ndarray, ...]:
-    columns = record.jump_time, record.jump_place, record.jump_states, record.jump_saltation
-    return tuple(column[:used].copy() for column in columns)
+def _jump_columns(record: Any, used: int, matrices: int) -> tuple[np.ndarray, ...]:
+    columns = record.jump_time, record.jump_place, record.jump_states
+    return (*(column[:used].copy() for column in columns), record.jump_saltation[:matrices].copy())
 
 
 def _grazings(system: HybridSystem, record: Any, used: int, period: float) -> list[Grazing]:

@@ -202,9 +202,13 @@ def remember_jump(model, run, record, transition, transversality, kind, known, x
     for i in range(n):
         record.jump_states[slot, 0, i] = run.y[i]
         record.jump_states[slot, 1, i] = x_plus[i]
-        for j in range(n if known else 0):
-            record.jump_saltation[slot, i, j] = work.saltation[i, j]
     record.used[1] = slot + 1
+    if known:
+        matrix = record.jump_saltation[record.used[3]]
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = work.saltation[i, j]
+        record.used[3] += 1
 
 
 @njit(**KERNEL)

@@ -180,11 +180,12 @@ WORK = Work.numba_type
 class Record(Structure):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
-    ``used (3,)`` counts the steps, jumps and grazings in it. A step: its start ``(phase, length)``, ``(cycle,
-    mode, jump count)`` and polynomials ``(d + 1, n + 1)`` of a place on [0, 1], the state and the time since.
-    A jump: its phase and transversality, ``(cycle, transition, kind, known)``, the states ``(2, n)`` before
-    and after, and the saltation matrix ``(n, n)`` if that is known. A grazing: ``(phase, value,
-    acceleration)`` of the guard, ``(cycle, transition, jump count)`` and the state.
+    ``used (4,)`` counts the steps, jumps, grazings and saltation matrices in it. A step: its start ``(phase,
+    length)``, ``(cycle, mode, jump count)`` and polynomials ``(d + 1, n + 1)`` of a place on [0, 1], the
+    state and the time since. A jump: its phase and transversality, ``(cycle, transition, kind, known)`` and
+    the states ``(2, n)`` before and after. The saltation matrices ``(n, n)`` are those of the jumps where
+    they are known, in order. A grazing: ``(phase, value, acceleration)`` of the guard, ``(cycle, transition,
+    jump count)`` and the state.
     """
 
     used: INDICES
