@@ -118,6 +118,16 @@ def beyond_known_roots(series, column, h, known_roots, size):
 
 
 @njit(**INLINE)
+def keeps_half(first, value, size):
+    """The cheap proof that a polynomial on ``[0, 1]`` keeps half of its ``first`` value, from that at 1.
+
+    With ``size`` the sum of the magnitudes of its terms, those that take it down on the way come to
+    ``(size - value) / 2``.
+    """
+    return first > size - value + 64.0 * EPSILON * size
+
+
+@njit(**INLINE)
 def leading_powers(series, column, order, power, known_roots, size, coefficients, h):
     """The first power coefficients on ``[0, 1]`` of a series, divided by its variable for each root at 0.
 
@@ -306,9 +316,8 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
         transition = model.outgoing[slot]
         on_guard, side = run.on_guard[transition], run.side[transition]
         column = model.dimension + slot - first
-        # The cheap proof: the guard cannot come back to zero within this step.
-        nearest = series[0, column] * side
-        if on_guard == 0 and nearest > 2.0 * (series[order + 2, column] - nearest):
+        value, size = series[order + 1, column] * side, series[order + 2, column]
+        if on_guard == 0 and keeps_half(series[0, column] * side, value, size):
             continue
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
         rounding = rounding_band(model, run, t, work.gradient)
@@ -318,7 +327,7 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
         # Along the root of a guard, what is small for the guard is not as small.
         if kind == DESINGULARISED:
             rounding, band = math.sqrt(rounding), math.sqrt(band)
-        size, power = beyond_known_roots(series, column, h, on_guard, series[order + 2, column])
+        size, power = beyond_known_roots(series, column, h, on_guard, size)
         if on_guard > 0:
             if size <= rounding:
                 continue

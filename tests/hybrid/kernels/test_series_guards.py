@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
+from hybrid.kernels.codes import HIGHEST_ORDER as ORDER
 from hybrid.load import load_kernels
 
 KERNELS = load_kernels("hybrid.kernels.series_guards")
 _judge, _to_bernstein, _leading = KERNELS.judge_leading, KERNELS.leading_to_bernstein, KERNELS.leading_powers
-_expanded_at, _root_between = KERNELS.expanded_at, KERNELS.root_between
+_expanded_at, _root_between, _keeps_half = KERNELS.expanded_at, KERNELS.root_between, KERNELS.keeps_half
 CLEAR, CROSSES, UNKNOWN = KERNELS.CLEAR, KERNELS.CROSSES, KERNELS.UNKNOWN
-ORDER = 28
 
 
 @njit
@@ -43,6 +43,28 @@ def guards(radius):
 def on_grid(powers):
     places = np.linspace(0.0, 1.0, 2001)
     return places, np.polynomial.polynomial.polyval(places, powers)
+
+
+@njit
+def _half(first, value, size):
+    return _keeps_half(first, value, size)
+
+
+@given(st.sampled_from([1.5, 2.5, 4.0, 8.0]).flatmap(guards))
+def test_what_keeps_half_does(powers):
+    side = 1 if powers[0] > 0.0 else -1
+    _, values = on_grid(powers)
+    if _half(abs(powers[0]), side * float(np.sum(powers)), float(np.abs(powers).sum())):
+        assert np.all(side * values >= 0.5 * abs(powers[0]))
+
+
+@pytest.mark.parametrize(
+    ("powers", "keeps"),
+    [((1.0, -0.4), True), ((1.0, -0.6), False), ((1.0, 1e3, -0.4), True), ((1e-9, 1.0, -1e-10), True),
+     ((1e-17, 1.0, -1e-18), False), ((0.0,), False), ((1.0, math.nan), False)],
+)  # fmt: skip
+def test_what_keeps_half(powers, keeps):
+    assert _half(powers[0], sum(powers), sum(map(abs, powers))) == keeps
 
 
 @given(st.sampled_from([1.5, 2.5, 4.0, 8.0]).flatmap(guards), st.sampled_from([0.0, 1e-3]))
