@@ -121,6 +121,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder of the pictures")
     arguments = parser.parse_args()
     heading("Error against processor time: this library and its peers, one thread each.")
+    arguments.out.mkdir(parents=True, exist_ok=True)
     found = list(peers(arguments.peers))
     print(f"Load at the start: {os.getloadavg()[0]:.1f}\n")
     results: dict[str, dict[str, WorkPrecision]] = {}
