@@ -68,10 +68,10 @@ def test_energy_drifts_by_the_tolerance_and_at_the_tightest_hardly():
     assert tight[-1] < 1e-11
 
 
-def test_the_root_of_a_contact_keeps_the_energy_from_the_rounding_of_its_guard():
-    """Roots taken anew from the states in each step, on each of 3759 contacts, lose ten times as much."""
+def test_series_keep_the_energy_to_rounding():
+    """As many periods as a hundredth of a million, and 1e-15 a period, through 3759 contacts."""
     (drift,), _ = energy_drift(Taylor(rtol=1e-13, atol=1e-15), np.array([10_000]))
-    assert drift < 3e-12
+    assert drift < 1e-11
 
 
 def test_the_energy_is_what_the_equations_keep():
