@@ -49,7 +49,7 @@ CLOCK, DIVERGENCE, OTHERS = range(3)
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
 # Share of those sizes below which the guard and the square of a root differ by rounding.
-SAME = 1e-14
+SAME = 1e-13
 
 
 @attrs.frozen

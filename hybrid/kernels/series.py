@@ -62,8 +62,8 @@ SAFETY = 0.9
 # Share of the tolerance that a tangent vector gets: stiff contacts stretch it a thousandfold and shrink it
 # again, and what was an error of the long vector is one of the short vector then.
 TANGENT_SHARE = 0.1
-# Below this it is the rounding of the state in such a contact that their error comes from.
-FINEST = 1e-12
+# Below this their error is rounding.
+FINEST = 1e-14
 # What stands for an absolute tolerance where there is none.
 TINY = 1e-300
 # Terms at the end of a series that have to be small.

@@ -37,8 +37,7 @@ class Taylor(RungeKutta):
     own series; in exact modes no crossing can be missed that rounding does not hide.
 
     The recurrences follow from the traced expressions. The tolerances bound the last terms of the state as
-    those of :class:`DOP853` bound its error estimate, and a tenth of ``rtol``, down to 1e-12, those of the
-    tangent vectors.
+    those of :class:`DOP853` bound its error estimate, and a tenth of ``rtol`` those of the tangent vectors.
 
     References
     ----------
