@@ -69,7 +69,7 @@ def exact_exponent(beyond: float, impacts: np.ndarray) -> float:
     return next((math.log(value) / (n * PERIOD) for value in largest if value < 1), math.nan)
 
 
-def point(beyond: float, transient: int = 800, intervals: int = 1000, shown: int = 150) -> Point:
+def point(beyond: float, transient: int = 20_000, intervals: int = 1000, shown: int = 150) -> Point:
     run: dict[str, Any] = {"parameters": parameters(beyond)}
     # Settled without tangent vectors, which are not needed yet.
     settled = stroboscopic_section(SYSTEM, START, periods=shown, transient=transient, **run)

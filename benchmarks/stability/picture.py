@@ -43,7 +43,7 @@ def picture(panels: dict[str, Curves], periods: int) -> None:
     stiff, grazing, restitution, damping, split, phase = grid.ravel()
 
     draw(stiff, panels["stiffness"])
-    stiff.set(xscale="log", yscale="log", ylim=(1e-12, 1e0))
+    stiff.set(xscale="log", yscale="log", ylim=(1e-17, 1e0))
     finish(
         stiff, "a", "Stiff contact, elastic", "wall stiffness $K$ (1/s²)", "height error after 5 bounces (m)"
     )
@@ -68,7 +68,7 @@ def picture(panels: dict[str, Curves], periods: int) -> None:
     )
 
     draw(damping, panels["damping"])
-    damping.set(xscale="log", yscale="log", ylim=(1e-15, 1e0))
+    damping.set(xscale="log", yscale="log", ylim=(1e-18, 1e0))
     finish(
         damping, "d", "Damped contact, stiff", "damping of the contact $c$ (1/s)",
         "height error after 5 landings (m)",
