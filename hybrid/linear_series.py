@@ -2,7 +2,8 @@
 
 With ``y = (x, h, 1)``, ``h`` the sines, cosines and exponentials that drive it, such a mode is ``y' = M y``
 with a constant matrix, and its Taylor coefficients are ``M^o / o!`` times what a step starts from. These
-matrices are computed once a run: after that no order waits for the one before it.
+matrices are computed once a run, in two parts, so that each is right to its own rounding: after that no order
+waits for the one before it.
 """
 
 from __future__ import annotations
@@ -82,40 +83,43 @@ def table_statements(
     ``table`` and ``vectors`` are the first columns of both, ``starts`` what ``y`` starts from.
     """
     size, guards = len(form.starts), len(form.guards)
-    front = padded(n + guards + 2)
-    unknown = range(size - 1)
-    entries = [f"z{i}" for i in range(n)] + [_sum(row, constants) for row in form.guards] + ["0.0"]
-    entries += [f"{constants.name(form.trace(n))} if o == 1 and c == {size - 1} else 0.0"]
-    entries += ["0.0"] * (front - len(entries))
-    step = [f"r{i} = {_sum(form.rates[i], constants)}" for i in unknown]
+    front, one = padded(n + guards + 2), size - 1
+    begin = []
+    for i in range(size):
+        unit = ", ".join(f"1.0 if c + {lane} == {i} else 0.0" for lane in range(NARROW))
+        begin += [f"store_row(out, order + 2, table, ({unit},))", f"z{i} = load(out, order + 2, table)"]
+        begin.append(f"_, l{i} = nothing()")
+    write = [_entry(f"z{i}", i, front) for i in range(n)]
+    for i, row in enumerate(form.guards):
+        write += [*_sum("r", "m", row, constants), _entry("r + m", n + i, front)]
+    write += [_entry("four_times(0.0)", i, front) for i in range(n + guards, front)]
+    step = [line for i in range(one) for line in _sum(f"r{i}", f"m{i}", form.rates[i], constants)]
+    step += [f"z{i}, l{i} = divided(r{i}, m{i}, o + 1.0)" for i in range(one)]
+    step.append(f"z{one}, l{one} = nothing()")
     lines = [
         # What the table was made of does not change in a run.
         "if out[order + 2, table] != 1.0:",
-        f"    for c in range({size}):",
-        *indented(indented(f"z{i} = 1.0 if c == {i} else 0.0" for i in range(size))),
-        "        for o in range(order + 1):",
-        *indented(
-            indented(
-                indented(
-                    [
-                        *(f"out[o, table + c*{front} + {i}] = {entry}" for i, entry in enumerate(entries)),
-                        "later = 1.0/(o + 1)",
-                        *step,
-                        *(f"z{i} = later*r{i}" for i in unknown),
-                        f"z{size - 1} = 0.0",
-                    ]
-                )
-            )
-        ),
+        f"    for c in range(0, {size}, {NARROW}):",
+        *indented(indented([*begin, "for o in range(order + 1):", *indented([*write, *step])])),
+        f"    out[1, table + {one * front + n + guards + 1}] = {constants.name(form.trace(n))}",
         "    out[order + 2, table] = 1.0",
         f"combine(out, order, table, {front}, ({', '.join(starts)},))",
         f"spread_tangents(x, {n}, out, vectors, {NARROW * n})",
         "for g in range(groups):",
         f"    combine_tangents(out, order, table, {front}, vectors + g*{NARROW * n}, {n})",
     ]
-    return lines, size * front, NARROW * n
+    return lines, padded(size) * front, NARROW * n
 
 
-def _sum(row: Sequence[sympy.Expr], constants: Constants) -> str:
-    terms = [f"{constants.name(each)}*z{i}" for i, each in enumerate(row) if each != 0]
-    return " + ".join(terms) or "0.0"
+def _entry(value: str, place: int, front: int) -> str:
+    return f"store_down(out, o, table + c*{front} + {place}, {front}, {value})"
+
+
+def _sum(high: str, low: str, row: Sequence[sympy.Expr], constants: Constants) -> list[str]:
+    """Statements for the product of a row with ``z``, all of them in two parts."""
+    terms = [f"times({constants.name(each)}, z{i}, l{i})" for i, each in enumerate(row) if each != 0]
+    first, *others = terms or ["nothing()"]
+    return [
+        f"{high}, {low} = {first}",
+        *(f"{high}, {low} = plus({high}, {low}, *{each})" for each in others),
+    ]

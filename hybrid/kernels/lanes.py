@@ -95,6 +95,11 @@ def store(matrix, row, column, lanes):
     matrix[row, column : column + NARROW] = lanes
 
 
+def store_down(matrix, row, column, stride, lanes):
+    """Write four entries of a row that are ``stride`` columns apart."""
+    matrix[row, column : column + NARROW * stride : stride] = lanes
+
+
 def store_row(matrix, row, column, numbers):
     """Write a tuple of numbers side by side, in registers that are filled up with zeros."""
     filled = sum(_widths(len(numbers)))
@@ -136,6 +141,24 @@ def _write_register(typing_context, matrix, row, column, lanes):
         return context.get_dummy_value()
 
     return types.void(matrix, types.intp, types.intp, kind), generate
+
+
+@overload(store_down, jit_options=HERE)
+def _overload_store_down(matrix, row, column, stride, lanes):
+    return lambda matrix, row, column, stride, lanes: _write_apart(matrix, row, column, stride, lanes)
+
+
+@intrinsic
+def _write_apart(typing_context, matrix, row, column, stride, lanes):
+    def generate(context, builder, signature, arguments):
+        matrix, row, column, stride, lanes = arguments
+        address = place(context, builder, signature.args[0], matrix, row, column)
+        for lane in range(NARROW):
+            builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
+            address = builder.gep(address, [stride])
+        return context.get_dummy_value()
+
+    return types.void(matrix, types.intp, types.intp, types.intp, LANES), generate
 
 
 @overload(store_row, jit_options=HERE)

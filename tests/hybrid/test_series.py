@@ -270,10 +270,31 @@ def test_a_linear_mode_has_a_table_and_what_only_looks_linear_has_none():
     def tables(field):
         return [each.table_columns for each in emit(system_of(field)).propagators]
 
-    assert tables(lambda t, x, p: (x.y, np.cos(3 * t) - x.x)) == [4 * 5]
+    assert tables(lambda t, x, p: (x.y, np.cos(3 * t) - x.x)) == [4 * 8]
     assert tables(lambda t, x, p: (x.y, t * np.cos(3 * t) - x.x)) == [0]
     assert tables(lambda t, x, p: (x.y, np.cos(3 * t) ** 2 - x.x)) == [0]
     assert tables(lambda t, x, p: (x.y, -np.sign(x.y) - x.x)) == [0]
+
+
+def test_a_table_is_right_to_the_last_digit():
+    """The coefficients from unit vectors are ``M^o / o!``, of which recurrences would lose some digits."""
+    rates = [[0.1, 3.7, -2.3], [-11.3, 0.7, 1 / 3], [5.1, -0.9, -6.7]]
+
+    def field(t, x, p):
+        return tuple(a * x.x + b * x.y + c * x.z for a, b, c in rates)
+
+    wall = Transition("a", "a", Guard(lambda t, x, p: x.x - 0.3 * x.z, +1), name="wall")
+    system = system_of(field, wall, state=("x", "y", "z"))
+    with mp.workdps(60):
+        power, matrix = mp.eye(3), mp.matrix(rates)
+        exact = np.zeros((ORDER + 1, 4, 3))
+        for o in range(ORDER + 1):
+            guard = [power[0, i] - mp.mpf(0.3) * power[2, i] for i in range(3)]
+            exact[o] = [*([float(power[i, j]) for j in range(3)] for i in range(3)), list(map(float, guard))]
+            power = matrix * power / (o + 1)
+    for i in range(3):
+        out, _ = series_of(system, np.eye(3)[i])
+        np.testing.assert_array_equal(out[:, :4], exact[:, :, i])
 
 
 def test_a_table_and_recurrences_agree():
