@@ -84,18 +84,18 @@ def table_statements(
     """
     size, guards = len(form.starts), len(form.guards)
     front, one = padded(n + guards + 2), size - 1
-    begin = []
+    begin = ["nothing = four_times(0.0)"]
     for i in range(size):
         unit = ", ".join(f"1.0 if c + {lane} == {i} else 0.0" for lane in range(NARROW))
-        begin += [f"store_row(out, order + 2, table, ({unit},))", f"z{i} = load(out, order + 2, table)"]
-        begin.append(f"_, l{i} = nothing()")
+        begin.append(f"store_row(out, order + 2, table, ({unit},))")
+        begin.append(f"z{i}, l{i} = load(out, order + 2, table), nothing")
     write = [_entry(f"z{i}", i, front) for i in range(n)]
     for i, row in enumerate(form.guards):
-        write += [*_sum("r", "m", row, constants), _entry("r + m", n + i, front)]
-    write += [_entry("four_times(0.0)", i, front) for i in range(n + guards, front)]
-    step = [line for i in range(one) for line in _sum(f"r{i}", f"m{i}", form.rates[i], constants)]
-    step += [f"z{i}, l{i} = divided(r{i}, m{i}, o + 1.0)" for i in range(one)]
-    step.append(f"z{one}, l{one} = nothing()")
+        write += [f"g, _ = {_mean(row, '1.0', constants)}", _entry("g", n + i, front)]
+    write += [_entry("nothing", i, front) for i in range(n + guards, front)]
+    step = [f"r{i}, m{i} = {_mean(form.rates[i], 'o + 1.0', constants)}" for i in range(one)]
+    step += [f"z{i}, l{i} = r{i}, m{i}" for i in range(one)]
+    step.append(f"z{one}, l{one} = nothing, nothing")
     lines = [
         # What the table was made of does not change in a run.
         "if out[order + 2, table] != 1.0:",
@@ -115,11 +115,11 @@ def _entry(value: str, place: int, front: int) -> str:
     return f"store_down(out, o, table + c*{front} + {place}, {front}, {value})"
 
 
-def _sum(high: str, low: str, row: Sequence[sympy.Expr], constants: Constants) -> list[str]:
-    """Statements for the product of a row with ``z``, all of them in two parts."""
-    terms = [f"times({constants.name(each)}, z{i}, l{i})" for i, each in enumerate(row) if each != 0]
-    first, *others = terms or ["nothing()"]
-    return [
-        f"{high}, {low} = {first}",
-        *(f"{high}, {low} = plus({high}, {low}, *{each})" for each in others),
-    ]
+def _mean(row: Sequence[sympy.Expr], by: str, constants: Constants) -> str:
+    """Text of the product of a row with ``z``, over ``by``, in two parts."""
+    places = [i for i, each in enumerate(row) if each != 0]
+    if not places:
+        return "nothing, nothing"
+    factors = "".join(f"{constants.name(row[i])}, " for i in places)
+    highs, lows = ("".join(f"{name}{i}, " for i in places) for name in "zl")
+    return f"weighted_mean(({factors}), ({highs}), ({lows}), {by})"

@@ -4,17 +4,38 @@ What a product and a sum lose in rounding are numbers again (Dekker 1971, doi:10
 and Oishi 2005, doi:10.1137/030601818).
 """
 
+import numpy as np
 from numba import types
-from numba.extending import intrinsic, overload, register_jitable
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
 
 from hybrid.kernels.codes import NARROW
-from hybrid.kernels.lanes import HERE, LANES, built_in, everywhere, four_times, vector_of
+from hybrid.kernels.lanes import HERE, LANES, built_in, everywhere, vector_of
 
 # Times this, less the number itself, is a number with the upper half of its digits.
 UPPER_HALF = 2.0**27 + 1.0
 
 
-def lost(factor, lanes, product):
+def weighted_mean(factors, highs, lows, by):
+    """The sum of ``factors[i] (highs[i] + lows[i])`` over ``by`` in two parts, the first the whole, rounded.
+
+    The factors and ``by`` are numbers, all else is four numbers at once.
+    """
+    total, rest = np.zeros(NARROW), np.zeros(NARROW)
+    for factor, high, low in zip(factors, highs, lows, strict=True):
+        product = factor * high
+        longer = total + product
+        part = longer - total
+        rest += (total - (longer - part)) + (product - part)
+        rest += _lost(factor, high, product) + factor * low
+        total = longer
+    quotient = total / by
+    low = (rest - _lost(by, quotient, total)) / by
+    whole = quotient + low
+    return whole, low - (whole - quotient)
+
+
+def _lost(factor, lanes, product):
     """What ``factor * lanes`` is beyond ``product``, to which it was rounded."""
     (a, b), (c, d) = _halves(factor), _halves(lanes)
     return (a * c - product) + a * d + b * c + b * d
@@ -25,46 +46,40 @@ def _halves(number):
     return upper, number - upper
 
 
-@overload(lost, jit_options=HERE)
-def _overload_lost(factor, lanes, product):
-    return lambda factor, lanes, product: _multiply_and_subtract(factor, lanes, product)
+@overload(weighted_mean, jit_options=HERE)
+def _overload_weighted_mean(factors, highs, lows, by):
+    return lambda factors, highs, lows, by: _weighted_mean_in_registers(factors, highs, lows, by)
 
 
 @intrinsic
-def _multiply_and_subtract(typing_context, factor, lanes, product):
+def _weighted_mean_in_registers(typing_context, factors, highs, lows, by):
+    """Written out at once: the compiler would take as long for each operation as for all of these."""
+
     def generate(context, builder, signature, arguments):
-        factor, lanes, product = arguments
-        negative = builder.fsub(vector_of(NARROW)([-0.0] * NARROW), product)
-        return built_in(builder, "fma", NARROW, everywhere(builder, factor, NARROW), lanes, negative)
+        zero = vector_of(NARROW)([0.0] * NARROW)
+        add, subtract, divide = builder.fadd, builder.fsub, builder.fdiv
 
-    return LANES(types.float64, LANES, LANES), generate
+        def lost(factor, lanes, product):
+            negative = subtract(vector_of(NARROW)([-0.0] * NARROW), product)
+            return built_in(builder, "fma", NARROW, factor, lanes, negative)
 
+        *tuples, by = arguments
+        by = everywhere(builder, by, NARROW)
+        total, rest = zero, zero
+        for factor, high, low in zip(*(cgutils.unpack_tuple(builder, each) for each in tuples), strict=True):
+            factor = everywhere(builder, factor, NARROW)
+            product = builder.fmul(factor, high)
+            longer = add(total, product)
+            part = subtract(longer, total)
+            of_sum = add(subtract(total, subtract(longer, part)), subtract(product, part))
+            of_product = add(lost(factor, high, product), builder.fmul(factor, low))
+            total, rest = longer, add(rest, add(of_sum, of_product))
+        quotient = divide(total, by)
+        low = divide(subtract(rest, lost(by, quotient, total)), by)
+        whole = add(quotient, low)
+        parts = whole, subtract(low, subtract(whole, quotient))
+        return context.make_tuple(builder, signature.return_type, parts)
 
-@register_jitable(**HERE)
-def nothing():
-    """Zero in two parts."""
-    return four_times(0.0), four_times(0.0)
-
-
-@register_jitable(**HERE)
-def times(factor, high, low):
-    """``factor (high + low)`` in two parts."""
-    product = factor * high
-    return product, lost(factor, high, product) + factor * low
-
-
-@register_jitable(**HERE)
-def plus(total, rest, high, low):
-    """``(total + rest) + (high + low)`` in two parts."""
-    longer = total + high
-    part = longer - total
-    return longer, rest + ((total - (longer - part)) + (high - part)) + low
-
-
-@register_jitable(**HERE)
-def divided(total, rest, by):
-    """``(total + rest) / by`` in two parts, the first of them the whole, rounded."""
-    quotient = total / by
-    low = (rest - lost(by, quotient, total)) / by
-    high = quotient + low
-    return high, low - (high - quotient)
+    count = len(factors)
+    numbers, lanes = types.UniTuple(types.float64, count), types.UniTuple(LANES, count)
+    return types.UniTuple(LANES, 2)(numbers, lanes, lanes, types.float64), generate
