@@ -91,9 +91,9 @@ def table_statements(
         begin.append(f"z{i}, l{i} = load(out, order + 2, table), nothing")
     write = [_entry(f"z{i}", i, front) for i in range(n)]
     for i, row in enumerate(form.guards):
-        write += [f"g, _ = {_mean(row, '1.0', constants)}", _entry("g", n + i, front)]
+        write += [f"g, _ = {_product(row, '1.0', constants)}", _entry("g", n + i, front)]
     write += [_entry("nothing", i, front) for i in range(n + guards, front)]
-    step = [f"r{i}, m{i} = {_mean(form.rates[i], 'o + 1.0', constants)}" for i in range(one)]
+    step = [f"r{i}, m{i} = {_product(form.rates[i], 'o + 1.0', constants)}" for i in range(one)]
     step += [f"z{i}, l{i} = r{i}, m{i}" for i in range(one)]
     step.append(f"z{one}, l{one} = nothing, nothing")
     lines = [
@@ -115,11 +115,11 @@ def _entry(value: str, place: int, front: int) -> str:
     return f"store_down(out, o, table + c*{front} + {place}, {front}, {value})"
 
 
-def _mean(row: Sequence[sympy.Expr], by: str, constants: Constants) -> str:
+def _product(row: Sequence[sympy.Expr], by: str, constants: Constants) -> str:
     """Text of the product of a row with ``z``, over ``by``, in two parts."""
     places = [i for i, each in enumerate(row) if each != 0]
     if not places:
         return "nothing, nothing"
     factors = "".join(f"{constants.name(row[i])}, " for i in places)
     highs, lows = ("".join(f"{name}{i}, " for i in places) for name in "zl")
-    return f"weighted_mean(({factors}), ({highs}), ({lows}), {by})"
+    return f"divided_dot_product(({factors}), ({highs}), ({lows}), {by})"

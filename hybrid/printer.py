@@ -52,7 +52,7 @@ IMPORTS = (
     "from hybrid.kernels.columns import (\n"
     "    combine, combine_tangents, convolve, convolve_pairs, spread_tangents,\n"
     ")\n"
-    "from hybrid.kernels.doubled import weighted_mean\n"
+    "from hybrid.kernels.doubled import divided_dot_product\n"
     "from hybrid.kernels.lanes import four_times, load, store, store_down, store_row\n"
 )
 

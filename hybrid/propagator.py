@@ -242,7 +242,7 @@ def _write_desingularised(
     size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in symbols.x))
     columns, starts = _state(symbols)
     place = next(i for i, guard in enumerate(guards) if _sign_of(guard, [z]))
-    body.starts[z] = "root*root"
+    body.at_start[z] = "root*root"
     body.preamble += [
         *assignments(["z", "size"], [z, size]),
         f"last = abs(out[order + 1, {body.n + place}])",
@@ -330,7 +330,7 @@ class _Body:
         self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
         self.preamble: list[str] = []
-        self.starts: dict[sympy.Expr, str] = {}
+        self.at_start: dict[sympy.Expr, str] = {}
 
     def column(self, place: int) -> str:
         """A column behind those of the guards."""
@@ -397,7 +397,7 @@ class _Body:
         state = {x: str(i) for i, x in enumerate(self.symbols.x)}
         time = self.symbols.t, self.time.format(prefix)
         block = Recurrences(
-            {**state, **self.rows}, time, self.allot, prefix, self.constants, starts=self.starts
+            {**state, **self.rows}, time, self.allot, prefix, self.constants, at_start=self.at_start
         )
         block.expect(names, rates)
         moved = StateLoop(names, columns, rates, starts, block)

@@ -70,7 +70,7 @@ class Recurrences:
         Begins the names of local variables.
     known
         Recurrences that run before these and hold the series of all that is free of the symbols in ``rows``.
-    starts
+    at_start
         Text of order zero of expressions for which there is a better one than their operations give.
     lanes
         Whether the symbols in ``rows`` stand for four numbers each.
@@ -84,7 +84,7 @@ class Recurrences:
         prefix: str,
         constants: Constants,
         known: Recurrences | None = None,
-        starts: Mapping[sympy.Expr, str] | None = None,
+        at_start: Mapping[sympy.Expr, str] | None = None,
         lanes: bool = False,
     ) -> None:
         self.rows: dict[sympy.Expr, str] = dict(rows)
@@ -94,7 +94,7 @@ class Recurrences:
         self.prefix = prefix
         self.constants = constants
         self.known = known
-        self.starts = starts or {}
+        self.at_start = at_start or {}
         self.first: list[str] = []
         self.higher: list[str] = []
         self.pairs: dict[tuple[str, sympy.Expr], str] = {}
@@ -175,7 +175,7 @@ class Recurrences:
     def _bind(self, expression: sympy.Expr, first: str, *higher: str, name: str | None = None) -> str:
         """A variable for the expression: its value at order zero, and statements or a value above that."""
         name = name or self._name(expression)
-        self.first.append(f"{name} = {self.starts.get(expression, first)}")
+        self.first.append(f"{name} = {self.at_start.get(expression, first)}")
         value, *more = higher
         self.higher += [f"{name} = {value}", *more]
         return name

@@ -84,7 +84,7 @@ NO_OBJECTION = 0
 LEAVES = 1
 BEYOND = 2
 
-# Highest order of a series, and the order of exact ones: what the memory for them is laid out for.
+# Order of exact series, which no other exceeds: what the memory for series is laid out for.
 HIGHEST_ORDER = 32
 
 # Columns of series that are worked on at once, and in the widest register.

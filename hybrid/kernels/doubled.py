@@ -16,7 +16,7 @@ from hybrid.kernels.lanes import HERE, LANES, built_in, everywhere, vector_of
 UPPER_HALF = 2.0**27 + 1.0
 
 
-def weighted_mean(factors, highs, lows, by):
+def divided_dot_product(factors, highs, lows, by):
     """The sum of ``factors[i] (highs[i] + lows[i])`` over ``by`` in two parts, the first the whole, rounded.
 
     The factors and ``by`` are numbers, all else is four numbers at once.
@@ -46,13 +46,13 @@ def _halves(number):
     return upper, number - upper
 
 
-@overload(weighted_mean, jit_options=HERE)
-def _overload_weighted_mean(factors, highs, lows, by):
-    return lambda factors, highs, lows, by: _weighted_mean_in_registers(factors, highs, lows, by)
+@overload(divided_dot_product, jit_options=HERE)
+def _overload_divided_dot_product(factors, highs, lows, by):
+    return lambda factors, highs, lows, by: _divided_dot_product_in_registers(factors, highs, lows, by)
 
 
 @intrinsic
-def _weighted_mean_in_registers(typing_context, factors, highs, lows, by):
+def _divided_dot_product_in_registers(typing_context, factors, highs, lows, by):
     """Written out at once: the compiler would take as long for each operation as for all of these."""
 
     def generate(context, builder, signature, arguments):

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hybrid.kernels.doubled import weighted_mean
+from hybrid.kernels.doubled import divided_dot_product
 from hybrid.kernels.lanes import four_times, load, store, store_down
 
 
 def compute(matrix, a, b, by):
-    """Row 0 holds two times four numbers, row 1 a weighted mean of them, row 2 one more of all of these."""
+    """Row 0 holds two times four numbers, row 1 their dot product with a and b, row 2 one of all of these."""
     first, second, nothing = load(matrix, 0, 0), load(matrix, 0, 4), four_times(0.0)
-    high, low = weighted_mean((a, b), (first, second), (nothing, nothing), 1.0)
+    high, low = divided_dot_product((a, b), (first, second), (nothing, nothing), 1.0)
     store(matrix, 1, 0, high)
     store(matrix, 1, 4, low)
-    high, low = weighted_mean((b, a), (high, second), (low, nothing), by)
+    high, low = divided_dot_product((b, a), (high, second), (low, nothing), by)
     store(matrix, 2, 0, high)
     store(matrix, 2, 4, low)
 
