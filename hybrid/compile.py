@@ -17,7 +17,7 @@ from hybrid.cache import announced, compiled_into, source_key, write_whole
 from hybrid.errors import ArgumentError
 from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
-from hybrid.load import load_kernels
+from hybrid.load import address, load_kernels
 from hybrid.system import HybridSystem
 
 if TYPE_CHECKING:
@@ -66,11 +66,18 @@ class CompiledSystem:
         lines = [f"CompiledSystem of {system.name or 'a system'}: {system.dimension} states"]
         for name, propagator in zip(system.mode_names, self.emitted.propagators, strict=True):
             lines.append(f"  mode {name}: {propagator}")
-        for name, affine in zip(system.transition_names, self.emitted.affine_guard, strict=True):
-            lines.append(
-                f"  transition {name}: {'affine guard' if affine else 'guard fitted along each step'}"
-            )
+        for index, name in enumerate(system.transition_names):
+            lines.append(f"  transition {name}: {self._crossings_of(index)}")
         return "\n".join(lines)
+
+    def _crossings_of(self, transition: int) -> str:
+        """How the crossings of a guard are found, in words."""
+        emitted = self.emitted
+        if emitted.affine_guard[transition]:
+            return "affine guard, its crossings are isolated on each step"
+        if emitted.is_sampled(transition):
+            return "guard sampled on each step: its crossings are not proved"
+        return "guard bounded on each step, its crossings are proved"
 
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
@@ -92,7 +99,22 @@ class CompiledSystem:
         values = self.system.parameter_values(parameters)
         # Runs may share a model.
         values.flags.writeable = False
-        return self._model.replace(parameters=values, period=period_at(self.system, values) or 0.0)
+        changes: dict[str, Any] = {"parameters": values, "period": period_at(self.system, values) or 0.0}
+        if self.emitted.programs.rows:
+            changes["programs"] = self._programs.replace(parameters=values)
+        return self._model.replace(**changes)
+
+    @cached_property
+    def _programs(self) -> Any:
+        from hybrid.kernels.layout import Programs
+
+        programs = self.emitted.programs
+        return Programs(
+            rows=np.array(programs.rows, dtype=np.int64).reshape(-1, 4),
+            numbers=np.array(programs.numbers, dtype=float),
+            first=_indices(programs.first),
+            parameters=self.system.parameter_values(),
+        )
 
     @cached_property
     def _model(self) -> Any:
@@ -113,6 +135,9 @@ class CompiledSystem:
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             affine_guard=_indices(self.emitted.affine_guard),
+            guard_in_series=_indices(self.emitted.guard_in_series),
+            programs=self._programs,
+            **_program_runners(bool(self.emitted.programs.rows)),
             boundary=_indices(transition.source != transition.target for transition in transitions),
             marker=_indices(transition.is_marker for transition in transitions),
             accumulates_to=_indices(
@@ -124,6 +149,21 @@ class CompiledSystem:
             tangent_columns=_indices(propagator.tangent_columns for propagator in self.emitted.propagators),
             period=0.0,
         )
+
+
+@attrs.frozen
+class _Absent:
+    """Stands for a kernel that is never called."""
+
+    address: int = 0
+
+
+def _program_runners(needed: bool) -> dict[str, Any]:
+    """The kernels that run the programs of guards; they are not loaded where no guard has a program."""
+    if not needed:
+        return {"bound": _Absent(), "spread": _Absent()}
+    bounds = load_kernels("hybrid.kernels.bounds")
+    return {"bound": address(bounds.bound_guard), "spread": address(bounds.spread_by_rounding)}
 
 
 def _index_or_none(system: HybridSystem, mode: str | None) -> int:

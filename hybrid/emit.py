@@ -23,6 +23,7 @@ from hybrid.kernels.codes import WIDE
 from hybrid.names import PARAMETERS, STATE, plain_class
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
+from hybrid.program import programs
 from hybrid.propagator import Boundary, propagator
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
 from hybrid.series_loops import padded
@@ -62,10 +63,19 @@ def emit(system: HybridSystem) -> Emitted:
         _function("series", _placed(propagators), "index, t, x, p, order, out"),
     )
     symbols = writer.symbols
+    affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     return Emitted(
         source="\n\n".join((IMPORTS, *functions)),
         opaque=writer.opaque,
-        affine_guard=tuple(_is_affine(guard, symbols.variables) for guard in guards),
+        affine_guard=affine,
+        guard_in_series=_guards_in_series(system, propagators),
+        programs=programs(
+            [
+                None if is_affine or guard.expressions is None else guard.expressions[0]
+                for guard, is_affine in zip(guards, affine, strict=True)
+            ],
+            symbols,
+        ),
         affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
         propagators=tuple(propagators),
@@ -268,11 +278,18 @@ def _propagator(
         Boundary(
             None if written.expressions is None else written.expressions[0],
             -transition.guard.direction if _ends_mode(transition) else 0,
+            _is_affine(written, writer.symbols.variables),
         )
         for transition, written in zip(system.transitions, guards, strict=True)
         if transition.source == mode
     ]
     return propagator(field.expressions, boundaries, writer.symbols)
+
+
+def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -> tuple[bool, ...]:
+    """By transition: whether the series of its source mode hold its guard."""
+    held = {mode: iter(each.guards) for mode, each in zip(system.mode_names, propagators, strict=True)}
+    return tuple(next(held[transition.source], False) for transition in system.transitions)
 
 
 def _ends_mode(transition: Transition) -> bool:

@@ -25,6 +25,8 @@ class Propagator:
     columns, table_columns, tangent_columns
         Columns that the series need for the state and what it is made of, for a table that stays, and for
         four tangent vectors.
+    guards
+        By transition that leaves the mode: whether the series hold its guard in a column.
     """
 
     kind: int
@@ -34,9 +36,36 @@ class Propagator:
     columns: int = 0
     table_columns: int = 0
     tangent_columns: int = 0
+    guards: tuple[bool, ...] = ()
 
     def __str__(self) -> str:
         return f"{PROPAGATORS[self.kind]} ({self.reason})"
+
+
+@attrs.frozen
+class Programs:
+    """The programs of all guards of a system, one after the other.
+
+    Attributes
+    ----------
+    rows
+        Operations with their operands (see ``hybrid.kernels.operations``). Operands count from the start of
+        their own program.
+    numbers
+        The numbers that the operations refer to.
+    first
+        By transition: the first of its rows, and behind them the number of all rows. A guard without rows is
+        affine, or could not be traced.
+    """
+
+    rows: tuple[tuple[int, int, int, int], ...]
+    numbers: tuple[float, ...]
+    first: tuple[int, ...]
+
+    @property
+    def longest(self) -> int:
+        """Rows of the longest program."""
+        return max((b - a for a, b in zip(self.first, self.first[1:], strict=False)), default=0)
 
 
 @attrs.frozen
@@ -56,6 +85,10 @@ class Emitted:
     affine_guard
         By transition: whether the guard's gradient, its slope in time included, is proved to depend on
         parameters only.
+    guard_in_series
+        By transition: whether the series of its mode hold its guard in a column, which is a polynomial then.
+    programs
+        The guards that are neither affine nor opaque, as lists of operations.
     affine_mode
         By mode: whether the field's derivative in the state is proved not to depend on the state.
     autonomous
@@ -69,7 +102,14 @@ class Emitted:
     source: str
     opaque: dict[str, object]
     affine_guard: tuple[bool, ...]
+    guard_in_series: tuple[bool, ...]
+    programs: Programs
     affine_mode: tuple[bool, ...]
     autonomous: tuple[bool, ...]
     propagators: tuple[Propagator, ...]
     tangent_start: int
+
+    def is_sampled(self, transition: int) -> bool:
+        """Whether the crossings of a guard are only sampled: tracing could not follow it."""
+        first = self.programs.first
+        return not self.affine_guard[transition] and first[transition] == first[transition + 1]

@@ -19,7 +19,7 @@ import attrs
 import numpy as np
 
 from hybrid.cache import cache_directory, write_whole
-from hybrid.emitted import Emitted, Propagator
+from hybrid.emitted import Emitted, Programs, Propagator
 from hybrid.load import kernels_key
 from hybrid.roles import roles
 from hybrid.traced import TraceError, values_of
@@ -141,10 +141,12 @@ def _traced(system: HybridSystem) -> tuple[Emitted, bool]:
 def _read(path: Path) -> Emitted | None:
     try:
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        for name in ("affine_guard", "affine_mode", "autonomous"):
+        for name in ("affine_guard", "guard_in_series", "affine_mode", "autonomous"):
             kept[name] = tuple(kept[name])
+        rows, numbers, first = (kept["programs"][name] for name in ("rows", "numbers", "first"))
+        kept["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))
         for each in kept["propagators"]:
-            each["statements"] = tuple(each["statements"])
+            each["statements"], each["guards"] = tuple(each["statements"]), tuple(each["guards"])
         kept["propagators"] = tuple(Propagator(**each) for each in kept["propagators"])
         return Emitted(**kept)
     except (OSError, ValueError, LookupError, TypeError):

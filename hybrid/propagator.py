@@ -29,6 +29,7 @@ from hybrid.printer import assignments
 from hybrid.series import ONE_THEN_ZERO, PAIRS, NoSeries, Recurrences
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
 from hybrid.symbolic import (
+    ZERO,
     Absolute,
     Less,
     LessEqual,
@@ -58,6 +59,7 @@ class Boundary:
 
     guard: sympy.Expr | None
     inside: int
+    is_affine: bool = False
 
 
 def propagator(
@@ -78,33 +80,50 @@ def _series(
     field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], known: list[sympy.Expr], symbols: Symbols
 ) -> Propagator:
     field = [_simplified(entry, known) for entry in field]
-    guards = []
-    for boundary in boundaries:
-        if boundary.guard is None:
-            raise NoSeries("a guard of it is not traced")
-        guards.append(boundary.guard)
     z = _singular_base(field, known)
     if z is not None:
-        written = _write_desingularised(field, guards, z, symbols)
-        return Propagator(
-            DESINGULARISED, 0, "half-integer powers of a guard, on the clock dt = w ds", *written
-        )
+        held = [_is_held(boundary, z) for boundary in boundaries]
+        written = _write_desingularised(field, _columns(boundaries, held), z, symbols)
+        reason = "half-integer powers of a guard, on the clock dt = w ds"
+        return Propagator(DESINGULARISED, 0, reason, *written, guards=tuple(held))
+    held = [_is_held(boundary) for boundary in boundaries]
+    guards = _columns(boundaries, held)
     jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
     if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
-        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *_write(field, guards, symbols))
+        written = _write(field, guards, symbols)
+        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *written, guards=tuple(held))
     if not all(_elementary(entry, symbols) for entry in field):
         written = _write(field, guards, symbols)
-        return Propagator(TAYLOR, 0, "affine, its forcing has no short series", *written)
-    powers = [_polynomial(guard, symbols) for guard in guards] or [1]
-    degree = _degree(field, jacobian, symbols) * max(powers) * (0 not in powers)
-    if 0 < degree <= HIGHEST_ORDER:
-        written = _write(field, guards, symbols)
-        return Propagator(EXACT, degree, f"polynomials of degree {degree}", *written)
-    harmonics = _harmonics([*field, *guards], symbols)
+        reason = "affine, its forcing has no short series"
+        return Propagator(TAYLOR, 0, reason, *written, guards=tuple(held))
+    of_state = _degree(field, jacobian, symbols)
+    if 0 < of_state <= HIGHEST_ORDER:
+        # A guard that is a polynomial in the state is one in time here.
+        powers = [0 if b.guard is None else _polynomial(b.guard, symbols) for b in boundaries]
+        held = [0 < of_state * power <= HIGHEST_ORDER for power in powers]
+        degree = of_state * max([1, *(power for power in powers if of_state * power <= HIGHEST_ORDER)])
+        written = _write(field, _columns(boundaries, held), symbols)
+        return Propagator(EXACT, degree, f"polynomials of degree {degree}", *written, guards=tuple(held))
+    harmonics = _harmonics(field, symbols)
     form = linear_form(field, guards, harmonics, symbols)
     if form is None:
-        return Propagator(EXACT, 0, "affine in the state", *_write(field, guards, symbols))
-    return Propagator(EXACT, 0, "affine in the state", *_write_linear(form, harmonics, len(guards), symbols))
+        written = _write(field, guards, symbols)
+    else:
+        written = _write_linear(form, harmonics, len(guards), symbols)
+    return Propagator(EXACT, 0, "affine in the state", *written, guards=tuple(held))
+
+
+def _is_held(boundary: Boundary, z: sympy.Expr | None = None) -> bool:
+    """Whether the series of a mode hold the guard: an affine one, and ``z``, whose root is a state."""
+    if boundary.guard is None:
+        return False
+    return boundary.is_affine or (z is not None and _sign_of(boundary.guard, [z]) != 0)
+
+
+def _columns(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy.Expr]:
+    """What the columns of the guards hold; zero for a guard that is bounded by its program instead."""
+    pairs = zip(boundaries, held, strict=True)
+    return [b.guard if is_held and b.guard is not None else ZERO for b, is_held in pairs]
 
 
 def _simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import comb, floor, isfinite
+from math import floor, isfinite
 from typing import Any
 
 import attrs
@@ -19,8 +19,6 @@ from hybrid.solvers import RungeKutta, Taylor
 from hybrid.status import Status, StatusCode, run_status
 from hybrid.system import HybridSystem
 
-# Degree of the polynomials fitted to guards that are not affine.
-FIT_DEGREE = 8
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
 UNLIMITED = np.iinfo(np.int64).max
@@ -94,9 +92,9 @@ def dense_degree(compiled: CompiledSystem, method: Any, kinds: list[int]) -> int
     return max(degree_of(kind, each.degree) for kind, each in zip(kinds, modes, strict=True))
 
 
-def workspace(method: Any, dimension: int, tangents: int, columns: int) -> Any:
-    """Scratch memory for one run; ``columns`` are those of series."""
-    return _fresh_work(work_layout(method, dimension, tangents, columns), method)
+def workspace(method: Any, dimension: int, tangents: int, columns: int, rows: int = 0) -> Any:
+    """Scratch memory for one run; ``columns`` are those of series, ``rows`` those of the guards' programs."""
+    return _fresh_work(work_layout(method, dimension, tangents, columns, rows), method)
 
 
 def _fresh_work(layout: Any, method: Any) -> Any:
@@ -109,7 +107,7 @@ def _fresh_work(layout: Any, method: Any) -> Any:
 
 
 @cache
-def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any:
+def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: int) -> Any:
     """Where the arrays of a workspace lie."""
     from hybrid.kernels.lanes import whole_registers
     from hybrid.kernels.layout import Work
@@ -118,10 +116,9 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any
     n, length = dimension, dimension * (1 + tangents)
     stages, degree = len(method.a), len(method.interpolant) - 1
     coupled = len(method.b) if method.implicit else 0
-    nodes, fit = _fit_of_guards()
     # Whole vectors of columns are evaluated: there may be a few more than are in use.
     width_of_series = whole_registers(columns, codes.WIDE)
-    width = max(degree, FIT_DEGREE, codes.HIGHEST_ORDER if method.order else 0) + 4
+    width = max(degree, codes.HIGHEST_ORDER if method.order else 0) + 4
     shapes = {
         "stages": (stages, length + 1),
         "speeds": (stages,),
@@ -138,7 +135,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any
         "state": (n,),
         "settled": (n,),
         "saltation": (n, n),
-        "coefficients": (degree + 1, n),
+        "path": (degree + 1, n),
         "polynomial": (width,),
         "stack": (ISOLATION_DEPTH, width),
         "intervals": (ISOLATION_DEPTH, 2),
@@ -146,18 +143,9 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int) -> Any
         "pivots": ((coupled + 1) * n,),
         "series": (codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0),
         "weights": (1, width_of_series),
+        "registers": (rows, codes.REGISTERS),
     }
-    return Layout(Work, shapes, nodes=nodes, fit=fit)
-
-
-@cache
-def _fit_of_guards() -> tuple[np.ndarray, np.ndarray]:
-    """Nodes on [0, 1] and the matrix from values there to Bernstein coefficients."""
-    j = np.arange(FIT_DEGREE + 1)
-    nodes = 0.5 * (1 - np.cos(np.pi * j / FIT_DEGREE))
-    binomials = np.array([comb(FIT_DEGREE, k) for k in j.tolist()])
-    basis = binomials * nodes[:, None] ** j * (1 - nodes[:, None]) ** (FIT_DEGREE - j)
-    return nodes, np.linalg.inv(basis)
+    return Layout(Work, shapes)
 
 
 def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
@@ -467,7 +455,9 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),
             _run_layout(n, tangents, modes, transitions),
-            work_layout(method, n, tangents, compiled.series_columns(tangents)),
+            work_layout(
+                method, n, tangents, compiled.series_columns(tangents), compiled.emitted.programs.longest
+            ),
         )
         compiled.plans[solver, tangents] = plan
     return plan

@@ -130,7 +130,7 @@ def accumulation(model, method, run, transition, since_last, work):
         ratio = run.clock[RESTITUTION]
         # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
         height = 0.25 * speed * span * (1.0 - ratio)
-        band = rounding_band(model, run, run.clock[PHASE], work.gradient)
+        band = rounding_band(model, run, transition, run.clock[PHASE], run.y, work)
         drowned = height <= band
         shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
         shift = span - (run.trail[LIMIT, n] - since_last)

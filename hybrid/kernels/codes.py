@@ -45,7 +45,8 @@ GRAZING_GUARD = 17
 LAST_KIND = 18
 LOCKED = 19
 MAP_IS_KNOWN = 20
-COUNTERS = 21
+UNPROVED = 21
+COUNTERS = 22
 
 # Slots of Run.clock.
 PHASE = 0
@@ -97,3 +98,13 @@ TAYLOR = 1
 EXACT = 2
 DESINGULARISED = 3
 PROPAGATORS = ("Runge-Kutta pair", "Taylor series", "exact", "Taylor series, desingularised")
+
+# What is known of a row of a guard's program, in the columns of ``Work.registers``: a range, a range of the
+# slope, and a range of the value in the middle of a piece.
+LOW = 0
+HIGH = 1
+LEAST_SLOPE = 2
+MOST_SLOPE = 3
+LOW_MIDDLE = 4
+HIGH_MIDDLE = 5
+REGISTERS = 6

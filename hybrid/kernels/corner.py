@@ -37,7 +37,7 @@ def is_due(model, run, transition, mode, t, x, work):
     value = guard_value(model, transition, t, x, work.scalar)
     model.flow(mode, t, x, model.parameters, work.field)
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-    if abs(value) > rounding_band(model, run, t, work.gradient):
+    if abs(value) > rounding_band(model, run, transition, t, x, work):
         return False
     return speed * model.direction[transition] > 0.0 and allowed(model, transition, t, x, work.scalar)
 

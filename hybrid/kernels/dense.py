@@ -3,7 +3,8 @@
 from numba import int64, njit, void
 
 from hybrid.kernels.layout import CUBE, ENTRY, INDICES, KERNEL, MATRIX, VECTOR
-from hybrid.kernels.series_guards import time_of, value_at
+from hybrid.kernels.path import value_at
+from hybrid.kernels.series_guards import time_of
 
 
 @njit(**KERNEL)

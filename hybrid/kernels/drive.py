@@ -63,7 +63,8 @@ def arrived(model, run, work):
         transition = model.outgoing[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-        if run.on_guard[transition] == 0 and abs(value) <= rounding_band(model, run, t, work.gradient):
+        band = rounding_band(model, run, transition, t, run.y, work)
+        if run.on_guard[transition] == 0 and abs(value) <= band:
             after = 1 if speed > 0.0 else -1
             direction = model.direction[transition]
             crossed = speed != 0.0 and after != run.side[transition] and crosses_towards(direction, after)

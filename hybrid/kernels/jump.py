@@ -99,7 +99,7 @@ def enter(model, run, work):
         transition = model.outgoing[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-        band = rounding_band(model, run, t, work.gradient)
+        band = rounding_band(model, run, transition, t, run.y, work)
         on_guard = abs(value) <= band
         resting, order, still = False, 0, 0.0
         trend = value

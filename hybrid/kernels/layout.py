@@ -22,17 +22,41 @@ SERIES_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, int64, MAT
 MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 
 
+class Programs(Structure):
+    """The expressions of guards as operations (see ``operations``), with the parameters they refer to.
+
+    ``rows[first[i]:first[i + 1]]`` is the program of transition ``i``, empty for a guard that is affine or
+    that could not be traced; ``numbers`` are the constants in them.
+    """
+
+    rows: INDEX_MATRIX
+    numbers: VECTOR
+    first: INDICES
+    parameters: VECTOR
+
+
+PROGRAMS = Programs.numba_type
+
+# ``bounds.bound_guard`` and ``bounds.spread_by_rounding``.
+BOUND = types.FunctionType(
+    int64(PROGRAMS, int64, MATRIX, int64, int64, float64, float64, float64, float64, MATRIX)
+)
+SPREAD = types.FunctionType(float64(PROGRAMS, int64, float64, VECTOR, VECTOR, float64, MATRIX))
+
+
 class Model(Structure):
     """The roles of a compiled system, its parameters and its graph as index arrays.
 
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
     which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
     transitions that leave mode ``m``, in the order they were listed; ``target`` is -1 for one that ends the
-    run. ``boundary`` is 1 for a transition that a state on the far side of its guard
-    must take at once, 0 for one that only crossings fire; ``accumulates_to`` the mode after a complete
-    chatter, or -1. ``propagator`` says how each mode is advanced; ``degree`` is that of its solutions in time
-    where they are polynomials, else 0. ``tangent_start`` is the first column of tangent vectors in series,
-    ``tangent_columns`` how many four of them have in each mode. ``period`` is 0 without a forcing period.
+    run. ``affine_guard`` is 1 for a guard that is affine in state and time, ``guard_in_series`` for one that
+    the series of its mode hold in a column; ``bound`` and ``spread`` run the ``programs`` of the others.
+    ``boundary`` is 1 for a transition that a state on the far side of its guard must take at once, 0 for one
+    that only crossings fire; ``accumulates_to`` the mode after a complete chatter, or -1. ``propagator``
+    says how each mode is advanced; ``degree`` is that of its solutions in time where they are polynomials,
+    else 0. ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many
+    four of them have in each mode. ``period`` is 0 without a forcing period.
     """
 
     flow: VECTOR_ROLE
@@ -50,6 +74,10 @@ class Model(Structure):
     target: INDICES
     direction: INDICES
     affine_guard: INDICES
+    guard_in_series: INDICES
+    programs: PROGRAMS
+    bound: BOUND
+    spread: SPREAD
     boundary: INDICES
     marker: INDICES
     accumulates_to: INDICES
@@ -135,9 +163,8 @@ class Work(Structure):
     ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
     along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
     (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``saltation (n, n)``;
-    ``coefficients (d + 1, n)`` of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack`` and
-    ``intervals`` for its isolation; ``nodes (q + 1,)`` and ``fit (q + 1, q + 1)`` from values there to
-    Bernstein coefficients.
+    ``path (d + 1, n)``, the powers of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack``
+    and ``intervals`` for its isolation; ``registers (r, 6)``, what is known of each row of a guard's program.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -162,12 +189,11 @@ class Work(Structure):
     state: VECTOR
     settled: VECTOR
     saltation: MATRIX
-    coefficients: MATRIX
+    path: MATRIX
     polynomial: VECTOR
     stack: MATRIX
     intervals: MATRIX
-    nodes: VECTOR
-    fit: MATRIX
+    registers: MATRIX
     systems: MATRIX
     pivots: INDICES
     series: MATRIX

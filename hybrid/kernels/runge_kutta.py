@@ -23,13 +23,15 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
 )
-from hybrid.kernels.guards import NOT_THERE, earliest_crossing, land, value_on_interpolant
+from hybrid.kernels.guards import sides_at
 from hybrid.kernels.layout import ATTEMPTS, EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RECORD, RUN, WORK
+from hybrid.kernels.path import state_at
 from hybrid.kernels.record import remember_grazing, start_record
+from hybrid.kernels.runge_kutta_guards import NOT_THERE, earliest_crossing, land
 from hybrid.kernels.step import (
     attempt,
     attempt_again,
-    interpolate,
+    interpolant_path,
     interpolation_stages,
     rates,
     starting_step,
@@ -77,8 +79,8 @@ def remember_step(model, method, run, record, t, h, work):
 def remember_touch(model, method, run, record, t, h, work):
     """Remember the grazing at ``GRAZING_PLACE`` on the attempted step."""
     theta = run.clock[GRAZING_PLACE]
-    interpolate(method, h, run.y, model.dimension, work)
-    value_on_interpolant(model, run.count[GRAZING_GUARD], t, h, theta, work)
+    interpolant_path(method, h, run.y, model.dimension, work)
+    state_at(work.path, method.powers.shape[0] - 1, model.dimension, theta, work.state)
     remember_grazing(model, run, record, t + theta * h, work)
 
 
@@ -107,18 +109,22 @@ def accept(model, method, run, tangents, h, correction, work):
 def find_event(parts, model, method, run, record, tangents, h, work):
     """Shorten the attempted step to its first event, if there is one.
 
-    Returns its length, the Euler step that completes it, and the transition. A crossing that the interpolant
-    has and the solution has not is a grazing; the step is then searched again without that guard.
+    Returns its length, the Euler step that completes it, and the transition. A step whose guards
+    are proved on a part only is cut to that. A crossing that the interpolant has and the solution has not is
+    a grazing; the step is then searched again without that guard.
     """
     mode, t = run.count[MODE], run.clock[PHASE]
     ignored = NO_TRANSITION
     for _ in range(2):
         interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
-            interpolate(method, h, run.y, model.dimension, work)
-        theta, fired = earliest_crossing(model, method, run, t, h, ignored, work)
-        if run.clock[GRAZING_PLACE] < theta:
+            interpolant_path(method, h, run.y, model.dimension, work)
+        theta, fired, proved = earliest_crossing(model, method, run, t, h, ignored, work)
+        if run.clock[GRAZING_PLACE] < min(theta, proved):
             remember_touch(model, method, run, record, t, h, work)
+        if proved < min(theta, 1.0):
+            attempt_again(parts, model, method, mode, t, proved * h, run.y, tangents, work)
+            return proved * h, 0.0, NO_TRANSITION
         if fired == NO_TRANSITION:
             break
         direction = model.direction[fired]
@@ -191,7 +197,7 @@ def runge_kutta_step(parts, model, method, run, record, tangents, remaining, wor
     grow = growth_factor(method, run, h, max(ratio, 1e-16))
     run.clock[NEXT_STEP] = max(proposed, h * grow) if last else h * grow
     run.clock[LAST_STEP], run.clock[LAST_RATIO] = h, max(ratio, 1e-16)
-    fired, correction = NO_TRANSITION, 0.0
+    fired, correction, whole = NO_TRANSITION, 0.0, h
     if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
         h, correction, fired = find_event(parts, model, method, run, record, tangents, h, work)
     if fired != NO_TRANSITION:
@@ -203,5 +209,7 @@ def runge_kutta_step(parts, model, method, run, record, tangents, remaining, wor
     accept(model, method, run, tangents, h, correction, work)
     run.count[PENDING] = fired
     if fired == NO_TRANSITION:
+        if h < whole:
+            sides_at(model, run, t + h, work)
         carry_rates(method, length, work)
     return GO_ON, h + correction

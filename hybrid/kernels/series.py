@@ -31,7 +31,7 @@ from hybrid.kernels.codes import (
     WIDE,
 )
 from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents
-from hybrid.kernels.guards import guard_speed, guard_value
+from hybrid.kernels.guards import guard_speed, guard_value, sides_at
 from hybrid.kernels.lanes import (
     four_times,
     larger,
@@ -43,6 +43,7 @@ from hybrid.kernels.lanes import (
     whole_registers,
 )
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.path import state_at, time_at, value_at
 from hybrid.kernels.powers import binary_logarithms, power_of_two
 from hybrid.kernels.record import remember_grazing, start_record
 from hybrid.kernels.series_guards import (
@@ -50,7 +51,6 @@ from hybrid.kernels.series_guards import (
     powers_on_step,
     time_of,
     to_bernstein,
-    value_at,
 )
 from hybrid.kernels.step import rates
 
@@ -138,32 +138,6 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
                 worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
         decisive = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), decisive)
     return (1.0 if exact else SAFETY) * power_of_two(-largest(decisive))
-
-
-@njit(**KERNEL)
-def within_guards(model, mode, series, n, order, rtol, h):
-    """Shorten a step to where the series of guards that are not affine reach, if less far than the state's.
-
-    Their last terms are measured against what the guard changes over the step itself, so a shorter step may
-    have to be shorter still.
-    """
-    start = model.first_outgoing[mode]
-    for slot in range(start, model.first_outgoing[mode + 1]):
-        column = n + slot - start
-        for _ in range(20 if model.affine_guard[model.outgoing[slot]] == 0 else 0):
-            largest = abs(series[0, column])
-            for o in range(1, 4):
-                largest += abs(series[o, column]) * h**o
-            reach = math.inf
-            for o in range(order, order - TAIL, -1):
-                term = abs(series[o, column])
-                if term > 0.0 and largest > 0.0:
-                    reach = min(reach, math.log(largest / term) / o)
-            longest = SAFETY * math.exp(min(math.log(rtol) / order + reach, 700.0))
-            if not longest < h:
-                break
-            h = longest
-    return h
 
 
 @njit(**KERNEL)
@@ -279,8 +253,6 @@ def series_step(model, method, run, record, tangents, remaining, work):
             h = unhurried(series, n, run)
     else:
         h = min(h, 1e100)
-    if degree == 0:
-        h = within_guards(model, mode, series, n, order, rtol, h)
     evaluate_with_sizes(series, order, h, 0, front)
     total = 0.0
     for i in range(n):
@@ -290,16 +262,17 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if clock >= 0 and not series[order + 2, clock] < remaining:
         h = step_until(series, clock, order, h, remaining, work)
         evaluate_with_sizes(series, order, h, 0, front)
-    fired = NO_TRANSITION
+    fired, cut = NO_TRANSITION, False
     if guards > 0:
-        theta, fired = earliest_on_series(model, method, run, order, t, h, kind, work)
-        if run.clock[GRAZING_PLACE] < theta:
+        theta, fired, proved = earliest_on_series(model, method, run, order, t, h, clock, work)
+        if run.clock[GRAZING_PLACE] < min(theta, proved):
             s = run.clock[GRAZING_PLACE] * h
-            for i in range(n):
-                work.state[i] = value_at(series, i, order, s)
-            since = s if clock < 0 else value_at(series, clock, order, s)
-            remember_grazing(model, run, record, t + since, work)
-        if fired != NO_TRANSITION:
+            state_at(series, order, n, s, work.state)
+            remember_grazing(model, run, record, time_at(series, order, clock, t, 1.0, s), work)
+        cut = proved < min(theta, 1.0)
+        if cut:
+            theta, fired = proved, NO_TRANSITION
+        if cut or fired != NO_TRANSITION:
             h *= theta
             evaluate_with_sizes(series, order, h, 0, front)
             run.count[PENDING] = fired
@@ -309,6 +282,8 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if record.step_time.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
+    if cut:
+        sides_at(model, run, t + span, work)
     if fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
         longest = math.inf if clock >= 0 else CLOSE * span
         span += reach_guard(model, run, tangents, fired, t + span, longest, work)

@@ -15,9 +15,11 @@ from hybrid.kernels.codes import (
     NARROW,
     NO_TRANSITION,
 )
+from hybrid.kernels.crossings import crossing_on_path, leaves
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
 from hybrid.kernels.lanes import four_times, load, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.path import state_at, time_at, value_at
 
 # The error of the last step towards a root is taken to be this many times its estimate.
 UNSEEN = 64.0
@@ -43,15 +45,6 @@ POWERS = np.array(
 CLEAR, CROSSES, UNKNOWN = range(3)
 # What is not decided on a part this short is left to the whole polynomial.
 SHORTEST_PART = 0.2
-
-
-@njit(**INLINE)
-def value_at(series, column, order, s):
-    """Value of one series."""
-    total = series[order, column]
-    for o in range(order - 1, -1, -1):
-        total = total * s + series[o, column]
-    return total
 
 
 @njit(**INLINE)
@@ -301,26 +294,49 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
 
 
 @njit(**KERNEL)
-def earliest_on_series(model, method, run, order, t, h, kind, work):
+def leaves_on_path(model, run, transition, order, clock, t, h, work):
+    """``leaves`` for the end of a step along the series."""
+    state_at(work.series, order, model.dimension, h, work.state)
+    end = time_at(work.series, order, clock, t, 1.0, h)
+    return leaves(model, run, transition, end, work.state, work)
+
+
+@njit(**KERNEL)
+def earliest_on_series(model, method, run, order, t, h, clock, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
-    Returns ``(theta, transition)``, or ``(NO_ROOT, NO_TRANSITION)`` if there is none. Sides, and what is
-    held to be zero, are brought up to date as by ``guards.earliest_crossing``. The polynomials are the
-    guards themselves, up to the remainder of the series; what they are sums of stands behind the series.
+    Returns ``(theta, transition, proved)``, and brings sides up to date, as
+    ``runge_kutta_guards.earliest_crossing`` does. A guard that is a series itself is a polynomial, up to the
+    remainder of the series; what it is a sum of stands behind the series. For any other guard its own
+    expression is bounded on the series of the state.
     """
     mode, series = run.count[MODE], work.series
-    earliest, fired = NO_ROOT, NO_TRANSITION
+    kind = model.propagator[mode]
+    earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
     run.clock[GRAZING_PLACE] = NO_ROOT
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         on_guard, side = run.on_guard[transition], run.side[transition]
+        if model.guard_in_series[transition] == 0:
+            if on_guard > 0 and not leaves_on_path(model, run, transition, order, clock, t, h, work):
+                continue
+            run.on_guard[transition] = 0
+            theta, side, share = crossing_on_path(
+                model, method, run, transition, series, order, clock, t, 1.0, h, kind == EXACT, work
+            )
+            proved = min(proved, share)
+            if theta == NO_ROOT:
+                run.side[transition] = side
+            elif theta < earliest:
+                earliest, fired = theta, transition
+            continue
         column = model.dimension + slot - first
         value, size = series[order + 1, column] * side, series[order + 2, column]
         if on_guard == 0 and keeps_half(series[0, column] * side, value, size):
             continue
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        rounding = rounding_band(model, run, t, work.gradient)
+        rounding = rounding_band(model, run, transition, t, run.y, work)
         band = rounding
         if kind != EXACT:
             band = error_band(method, run, work.gradient, model.dimension)
@@ -357,9 +373,9 @@ def earliest_on_series(model, method, run, order, t, h, kind, work):
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
         if theta > 1.0 and side == run.side[transition] and on_guard == 0:
-            note_grazing(run, transition, degree, side, band, 0.0, 1.0, work)
+            note_grazing(run, transition, degree, side, band, work)
         if theta == NO_ROOT:
             run.side[transition] = side
         elif theta < earliest:
             earliest, fired = theta, transition
-    return earliest, fired
+    return earliest, fired, proved

@@ -129,10 +129,17 @@ def interpolation_stages(model, method, mode, t, h, y, work):
 
 
 @njit(**KERNEL)
-def interpolate(method, h, y, dimension, work):
-    """Bernstein coefficients of the state over the last step, into ``work.coefficients (d + 1, n)``."""
-    for i in range(work.coefficients.shape[0]):
-        combine(y, h, method.interpolant[i], work.stages, method.a.shape[0], dimension, work.coefficients[i])
+def interpolant_path(method, h, y, dimension, work):
+    """The state over the last step as powers of a place on [0, 1], into ``work.path (d + 1, n)``."""
+    count = method.a.shape[0]
+    for i in range(dimension):
+        work.path[0, i] = y[i]
+    for k in range(1, method.powers.shape[0]):
+        for i in range(dimension):
+            total = 0.0
+            for j in range(count):
+                total += method.powers[k, j] * work.stages[j, i]
+            work.path[k, i] = h * total
 
 
 @njit(**KERNEL)

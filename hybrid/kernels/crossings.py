@@ -1,0 +1,290 @@
+"""The first change of sign of a guard on a step, proved by bounds on the guard itself.
+
+The step is halved until on each piece the guard has no zero, or its slope keeps its sign, or the piece is as
+short as rounding allows. A slope that keeps its sign leaves room for one change of sign at most, which the
+signs at the ends of the piece decide. This holds for roots of any order, for kinks and for jumps: where a
+guard jumps across zero the change of sign is the jump.
+"""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.bernstein import NO_ROOT, crosses_towards
+from hybrid.kernels.codes import (
+    GRAZING_GUARD,
+    GRAZING_PLACE,
+    GRAZING_VALUE,
+    HIGH,
+    HIGH_MIDDLE,
+    LEAST_SLOPE,
+    LOW,
+    LOW_MIDDLE,
+    MOST_SLOPE,
+    UNPROVED,
+)
+from hybrid.kernels.guards import error_band, guard_value, has_program, rounding_band
+from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.path import state_at, time_at
+
+# Instead of a place on the step.
+NOWHERE = -1.0
+# After so many pieces the step is cut to what has been proved of it, if that is more than a small share. If
+# not, the signs at the ends of the pieces decide, and the run says so.
+MOST_PIECES = 3000
+SMALL_SHARE = 1e-2
+# Pieces longer than this share of the step are not asked whether they lie within the tolerances.
+SHORT_PIECE = 1e-2
+# A piece lies within rounding if nowhere on it the guard is farther from zero than this many times the
+# rounding in its middle.
+WITHIN_ROUNDING = 4.0
+MOST_ROOT_STEPS = 200
+# A guard that is zero at the start of the step is not looked at before this share of the step.
+SETTLED = 64.0 * EPSILON
+# Parts of a step at whose ends a guard that could not be traced is looked at.
+SAMPLES = 32
+
+
+@njit(**INLINE)
+def _row_at(model, transition, path, order, clock, start, pace, place, work):
+    """Row of ``work.registers`` with the bounds of a guard at one place: what rounding leaves unknown."""
+    return model.bound(
+        model.programs, transition, path, order, clock, start, pace, place, 0.0, work.registers
+    )
+
+
+@njit(**KERNEL)
+def certain_sign(model, transition, path, order, clock, start, pace, place, work):
+    """Sign of a guard at a place of the step, 0 if rounding could have made it."""
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+    return 1 if row[LOW] > 0.0 else (-1 if row[HIGH] < 0.0 else 0)
+
+
+@njit(**KERNEL)
+def root_in_bracket(model, transition, path, order, clock, start, pace, low, high, side, work):
+    """Where a guard changes its sign between two places; it is on ``side`` at ``low`` and not at ``high``.
+
+    Newton's method on the guard, kept in the bracket; halving where it does not settle. The place returned is
+    the end of the bracket beyond the change of sign, or the root.
+    """
+    place, last = 0.5 * (low + high), high - low
+    for trial in range(MOST_ROOT_STEPS):
+        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+        value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
+        slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE])
+        if value * side > 0.0:
+            low = place
+        else:
+            high = place
+        if value == 0.0 or high - low <= 2.0 * EPSILON * high:
+            break
+        closer = place - value / slope if slope != 0.0 and math.isfinite(slope) else math.nan
+        change = abs(closer - place)
+        if change <= EPSILON * high:
+            return place
+        # Newton's method halves its steps, or is replaced by halving.
+        if not low < closer < high or (trial > 2 and change > 0.5 * last):
+            closer = 0.5 * (low + high)
+            change = high - low
+        if closer == place:
+            break
+        place, last = closer, change
+    return high
+
+
+@njit(**KERNEL)
+def _turn_between(model, transition, path, order, clock, start, pace, low, high, side, work):
+    """Where a guard on ``side`` comes closest to zero between two places, or NOWHERE if that is an end."""
+    for place, towards in ((low, True), (high, False)):
+        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+        slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side
+        if not math.isfinite(slope) or (slope < 0.0) != towards:
+            return NOWHERE
+    while high - low > 2.0 * EPSILON * high:
+        place = 0.5 * (low + high)
+        if not low < place < high:
+            break
+        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+        if 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side < 0.0:
+            low = place
+        else:
+            high = place
+    return 0.5 * (low + high)
+
+
+@njit(**KERNEL)
+def _tolerated(model, method, run, transition, path, order, clock, start, pace, place, work):
+    """How far from zero the tolerances of the state can leave a guard, at a place of the step."""
+    state_at(path, order, model.dimension, place, work.state)
+    t = time_at(path, order, clock, start, pace, place)
+    model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
+    return error_band(method, run, work.gradient, model.dimension)
+
+
+@njit(**KERNEL)
+def _note_touch(run, transition, place, value, length):
+    """Keep the earliest touch of the step."""
+    if 0.0 < place < length and place / length < run.clock[GRAZING_PLACE]:
+        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = place / length, value
+        run.count[GRAZING_GUARD] = transition
+
+
+@njit(**KERNEL)
+def first_change(
+    model, method, run, transition, path, order, clock, start, pace, length, side, on_guard, exact, work
+):
+    """First change of sign of a guard in its transition's direction, for variables in ``[0, length]``.
+
+    ``side`` is the sign before; a guard that is zero at the start has the sign it takes from there. Returns
+    ``(place, side after, proved)``: ``NOWHERE`` where the guard does not change its sign before ``proved``,
+    to which the step is to be cut.
+    """
+    direction = model.direction[transition]
+    pieces, top = 0, 0
+    # The last place where the guard was on its side, beyond rounding.
+    sure = 0.0
+    touch, depth = NOWHERE, math.inf
+    stack = work.intervals
+    stack[0, 0], stack[0, 1] = SETTLED * length if on_guard > 0 else 0.0, length
+    while top >= 0:
+        low, high = stack[top, 0], stack[top, 1]
+        middle = 0.5 * (low + high)
+        # One piece more or less than the halves: their ends are the same numbers.
+        radius = max(high - middle, middle - low)
+        last = model.bound(
+            model.programs, transition, path, order, clock, start, pace, middle, radius, work.registers
+        )
+        row = work.registers[last]
+        pieces += 1
+        if row[LOW] * side > 0.0 and row[HIGH] * side > 0.0:
+            sure = high
+            top -= 1
+            continue
+        monotone = row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
+        if not monotone:
+            shallow = low < middle < high and math.isfinite(row[MOST_SLOPE] - row[LEAST_SLOPE]) and side != 0
+            if shallow:
+                farthest = max(abs(row[LOW]), abs(row[HIGH]))
+                shallow = farthest <= WITHIN_ROUNDING * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
+                if not shallow and not exact and high - low <= SHORT_PIECE * length:
+                    shallow = farthest <= _tolerated(
+                        model, method, run, transition, path, order, clock, start, pace, middle, work
+                    )
+            splits = low < middle < high and high - low > EPSILON * length and not shallow
+            if splits and pieces > MOST_PIECES:
+                if low > SMALL_SHARE * length:
+                    return NOWHERE, side, low
+                run.count[UNPROVED] += 1
+            elif splits:
+                stack[top, 0] = middle
+                top += 1
+                stack[top, 0], stack[top, 1] = low, middle
+                continue
+            turn = middle
+            if shallow:
+                turn = _turn_between(
+                    model, transition, path, order, clock, start, pace, low, high, side, work
+                )
+            if low < turn < high:
+                row = work.registers[_row_at(model, transition, path, order, clock, start, pace, turn, work)]
+                value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE]) * side
+                if shallow and row[LOW] * side < 0.0 and row[HIGH] * side < 0.0:
+                    # Down to the turn and up again: two pieces with one change of sign each.
+                    stack[top, 0], high = turn, turn
+                    top += 1
+                elif on_guard == 0 and value < depth:
+                    touch, depth = turn, value
+        top -= 1
+        after = certain_sign(model, transition, path, order, clock, start, pace, high, work)
+        if after == 0:
+            continue
+        if after != side and side != 0:
+            place = root_in_bracket(
+                model, transition, path, order, clock, start, pace, sure, high, side, work
+            )
+            touch = NOWHERE
+            side = after
+            if crosses_towards(direction, after):
+                return place, side, length
+        side, sure = after, high
+    if touch != NOWHERE:
+        _note_touch(run, transition, touch, depth * side, length)
+    return NOWHERE, side, length
+
+
+@njit(**KERNEL)
+def _sample(model, transition, path, order, clock, start, pace, place, work):
+    """Value of a guard at a place of the step, from the compiled function."""
+    state_at(path, order, model.dimension, place, work.state)
+    t = time_at(path, order, clock, start, pace, place)
+    return guard_value(model, transition, t, work.state, work.scalar)
+
+
+@njit(**KERNEL)
+def sampled_change(model, run, transition, path, order, clock, start, pace, length, side, work):
+    """As ``first_change`` for a guard that could not be traced: it is looked at in some places only."""
+    run.count[UNPROVED] += 1
+    direction, low = model.direction[transition], 0.0
+    for i in range(1, SAMPLES + 1):
+        high = length * i / SAMPLES
+        value = _sample(model, transition, path, order, clock, start, pace, high, work)
+        if value * side < 0.0:
+            left, right = low, high
+            while right - left > 2.0 * EPSILON * right:
+                middle = 0.5 * (left + right)
+                if not left < middle < right:
+                    break
+                if _sample(model, transition, path, order, clock, start, pace, middle, work) * side > 0.0:
+                    left = middle
+                else:
+                    right = middle
+            side = -side
+            if crosses_towards(direction, side):
+                return right, side, length
+        elif side == 0 and value != 0.0:
+            side = 1 if value > 0.0 else -1
+        low = high
+    return NOWHERE, side, length
+
+
+@njit(**KERNEL)
+def leaves(model, run, transition, t, x, work):
+    """Whether a guard that is zero at the start of a step is not, beyond rounding, at its end ``(t, x)``.
+
+    A guard that stays zero is one that the state rests on.
+    """
+    value = guard_value(model, transition, t, x, work.scalar)
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    return abs(value) > rounding_band(model, run, transition, t, x, work)
+
+
+@njit(**KERNEL)
+def crossing_on_path(model, method, run, transition, path, order, clock, start, pace, length, exact, work):
+    """``first_change`` from the side that the run knows, or samples where a guard has no program.
+
+    Returns the share of the step at which the guard crosses, its side after that or at the end, and the share
+    of the step that is proved.
+    """
+    side, on_guard = run.side[transition], run.on_guard[transition]
+    if not has_program(model, transition):
+        place, side, proved = sampled_change(
+            model, run, transition, path, order, clock, start, pace, length, side, work
+        )
+    else:
+        place, side, proved = first_change(
+            model,
+            method,
+            run,
+            transition,
+            path,
+            order,
+            clock,
+            start,
+            pace,
+            length,
+            side,
+            on_guard,
+            exact,
+            work,
+        )
+    return (NO_ROOT if place == NOWHERE else place / length), side, proved / length

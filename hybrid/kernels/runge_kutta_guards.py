@@ -1,0 +1,168 @@
+"""Guards along a Runge-Kutta step: the earliest crossing, and landing on it."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
+from hybrid.kernels.codes import GRAZING_PLACE, MODE, NO_TRANSITION
+from hybrid.kernels.crossings import crossing_on_path, leaves
+from hybrid.kernels.guards import error_band, guard_speed, guard_value, note_grazing, rounding_band
+from hybrid.kernels.layout import INLINE, KERNEL
+from hybrid.kernels.step import attempt_again
+
+# A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
+EULER_IS_ENOUGH = 1e-8
+# Newton's method converges to a simple root if its steps shrink faster than this.
+QUADRATIC = 0.1
+# First distance, as a share of the step, at which the other side of a guard is looked for.
+FIRST_REACH = 1e-10
+MOST_LANDINGS = 200
+NOT_THERE = -1.0
+
+
+@njit(**INLINE)
+def affine_polynomial(model, method, transition, t, h, x, value, work):
+    """Bernstein coefficients of an affine guard on the interpolant, exactly; returns their degree."""
+    n = model.dimension
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    degree, count = method.interpolant.shape[0] - 1, method.a.shape[0]
+    for j in range(count):
+        speed = 0.0
+        for i in range(n):
+            speed += work.gradient[i] * work.stages[j, i]
+        work.speeds[j] = h * speed
+    for i in range(degree + 1):
+        total = value + h * work.gradient[n] * i / degree
+        for j in range(count):
+            total += method.interpolant[i, j] * work.speeds[j]
+        work.polynomial[i] = total
+    return degree
+
+
+@njit(**KERNEL)
+def leave_guard(model, run, transition, t, work):
+    """Put a guard on the side it has at the end of the attempted step, ``work.new``, whatever came before."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    if abs(value) > rounding_band(model, run, transition, t, work.new, work):
+        run.side[transition] = 1 if value > 0.0 else -1
+        run.on_guard[transition] = 0
+
+
+@njit(**INLINE)
+def earliest_crossing(model, method, run, t, h, ignored, work):
+    """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
+
+    Returns ``(theta, transition, proved)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses before the
+    share ``proved`` of the step, to which the step is to be cut. The sides of guards without a crossing are
+    brought up to date, to the end of the step, and guards that were left are no longer held to be zero at its
+    start. ``work.path`` must hold the interpolant if any guard of the mode is not affine.
+    """
+    mode, degree_of_path = run.count[MODE], method.powers.shape[0] - 1
+    earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
+    run.clock[GRAZING_PLACE] = NO_ROOT
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        if transition == ignored:
+            leave_guard(model, run, transition, t + h, work)
+            continue
+        on_guard = run.on_guard[transition]
+        side = run.side[transition]
+        if model.affine_guard[transition] == 1:
+            start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
+            degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
+            if on_guard > 0:
+                band, farthest = rounding_band(model, run, transition, t, run.y, work), 0.0
+                for i in range(degree + 1):
+                    farthest = max(farthest, abs(work.polynomial[i]))
+                if farthest <= band:
+                    continue
+                run.on_guard[transition] = 0
+            for _ in range(on_guard):
+                degree = divide_by_theta(work.polynomial, degree)
+            band = error_band(method, run, work.gradient, model.dimension)
+            if stays(work.polynomial, degree, side, band):
+                continue
+            theta, side = first_crossing(
+                work.polynomial, degree, side, model.direction[transition], work.stack
+            )
+            if theta > 1.0 and side == run.side[transition] and on_guard == 0:
+                note_grazing(run, transition, degree, side, band, work)
+        else:
+            if on_guard > 0 and not leaves(model, run, transition, t + h, work.new, work):
+                continue
+            theta, side, share = crossing_on_path(
+                model,
+                method,
+                run,
+                transition,
+                work.path,
+                degree_of_path,
+                -1,
+                t,
+                h,
+                1.0,
+                False,
+                work,
+            )
+            run.on_guard[transition] = 0
+            proved = min(proved, share)
+        if theta == NO_ROOT:
+            run.side[transition] = side
+        elif theta < earliest:
+            earliest, fired = theta, transition
+    return earliest, fired, proved
+
+
+@njit(**KERNEL)
+def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents, work):
+    """Shorten the step so that it ends on the guard, with the end in ``work.new``.
+
+    The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
+    so that the state and the tangents at the event carry the error of the method, not that of its
+    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
+    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
+    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
+    """
+    s = method.b.shape[0]
+    low, high = 0.0, h
+    before = guard_value(model, transition, t, y, work.scalar) * side > 0.0
+    after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
+    length, last, reach = theta * h, math.inf, FIRST_REACH * h
+    # Along the step an affine guard is as smooth as the state. Another one has to show it.
+    settled = 0 if model.affine_guard[transition] == 1 else 1
+    for trial in range(MOST_LANDINGS):
+        attempt_again(parts, model, method, mode, t, length, y, tangents, work)
+        if length == 0.0:
+            return 0.0, 0.0
+        value = guard_value(model, transition, t + length, work.new, work.scalar)
+        speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
+        correction = -value / speed
+        converges = trial >= settled and abs(correction) <= QUADRATIC * last
+        if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
+            for i in range(model.dimension * (1 + tangents)):
+                work.new[i] += correction * work.stages[s, i]
+            return length, correction
+        if value * side > 0.0:
+            low, before = length, True
+        else:
+            high, after = length, True
+        if before and after and high - low <= 4e-16 * max(high, abs(t)):
+            if length != high:
+                attempt_again(parts, model, method, mode, t, high, y, tangents, work)
+            return high, 0.0
+        newton = length + correction
+        slow = trial > 2 and not abs(correction) <= 0.5 * last
+        last = abs(correction)
+        if low < newton < high and not slow:
+            length = newton
+        elif before and after:
+            length = 0.5 * (low + high)
+        else:
+            # Only one side has been seen: look for the other one, farther and farther from the root.
+            length = theta * h + (reach if before else -reach)
+            reach *= 8.0
+            if not low < length < high:
+                break
+    return NOT_THERE, 0.0
