@@ -8,7 +8,7 @@ from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, s
 from hybrid.kernels.codes import GRAZING_PLACE, MODE, NO_TRANSITION
 from hybrid.kernels.crossings import crossing_on_path, leaves
 from hybrid.kernels.guards import error_band, guard_speed, guard_value, note_grazing, rounding_band
-from hybrid.kernels.layout import INLINE, KERNEL
+from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.step import attempt_again
 
 # A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
@@ -148,15 +148,16 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
             low, before = length, True
         else:
             high, after = length, True
-        if before and after and high - low <= 4e-16 * max(high, abs(t)):
+        if before and after and high - low <= 2.0 * EPSILON * high:
             if length != high:
                 attempt_again(parts, model, method, mode, t, high, y, tangents, work)
             return high, 0.0
         newton = length + correction
         slow = trial > 2 and not abs(correction) <= 0.5 * last
-        last = abs(correction)
+        # A place that Newton's method has not led to says nothing of how fast that converges.
+        last = 0.0
         if low < newton < high and not slow:
-            length = newton
+            length, last = newton, abs(correction)
         elif before and after:
             length = 0.5 * (low + high)
         else:
