@@ -18,6 +18,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
 from hybrid.load import address, load_kernels
+from hybrid.surface import is_paired
 from hybrid.system import HybridSystem
 
 if TYPE_CHECKING:
@@ -138,7 +139,9 @@ class CompiledSystem:
             guard_in_series=_indices(self.emitted.guard_in_series),
             programs=self._programs,
             **_program_runners(bool(self.emitted.programs.rows)),
-            boundary=_indices(transition.source != transition.target for transition in transitions),
+            surface=_indices(self.emitted.surface),
+            orientation=_indices(self.emitted.orientation),
+            paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
             marker=_indices(transition.is_marker for transition in transitions),
             accumulates_to=_indices(
                 _index_or_none(system, transition.accumulates_to) for transition in transitions

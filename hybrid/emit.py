@@ -27,6 +27,7 @@ from hybrid.program import programs
 from hybrid.propagator import Boundary, propagator
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
 from hybrid.series_loops import padded
+from hybrid.surface import surfaces
 from hybrid.symbolic import JUMPING, ONE, ZERO, Select
 from hybrid.trace import Symbols, TraceError, model_symbols, trace
 
@@ -64,18 +65,17 @@ def emit(system: HybridSystem) -> Emitted:
     )
     symbols = writer.symbols
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
+    traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
+    surface, orientation = surfaces([transition.guard.function for transition in system.transitions], traced)
+    not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
     return Emitted(
         source="\n\n".join((IMPORTS, *functions)),
         opaque=writer.opaque,
         affine_guard=affine,
         guard_in_series=_guards_in_series(system, propagators),
-        programs=programs(
-            [
-                None if is_affine or guard.expressions is None else guard.expressions[0]
-                for guard, is_affine in zip(guards, affine, strict=True)
-            ],
-            symbols,
-        ),
+        programs=programs(not_affine, symbols),
+        surface=surface,
+        orientation=orientation,
         affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
         propagators=tuple(propagators),

@@ -91,6 +91,9 @@ class Emitted:
         The guards that are neither affine nor opaque, as lists of operations.
     affine_mode
         By mode: whether the field's derivative in the state is proved not to depend on the state.
+    surface, orientation
+        By transition: the number of the guard's zero set, the same for guards that differ by a constant
+        factor, and the sign of that factor.
     autonomous
         By mode: whether the field is proved not to depend on time.
     propagators
@@ -104,6 +107,8 @@ class Emitted:
     affine_guard: tuple[bool, ...]
     guard_in_series: tuple[bool, ...]
     programs: Programs
+    surface: tuple[int, ...]
+    orientation: tuple[int, ...]
     affine_mode: tuple[bool, ...]
     autonomous: tuple[bool, ...]
     propagators: tuple[Propagator, ...]

@@ -12,8 +12,12 @@ from hybrid.load import entry, load_kernels
 from hybrid.system import HybridSystem, Transition
 
 
-def choose_mode(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None) -> int:
+def choose_mode(
+    system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None
+) -> tuple[int, tuple[str, ...]]:
     """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
+
+    With it come the transitions of a named mode whose guards the state lies beyond.
 
     Raises
     ------
@@ -22,16 +26,17 @@ def choose_mode(system: HybridSystem, parts: Any, model: Any, run: Any, work: An
     """
     if mode is not None:
         index = system.mode_index(mode)
-        _verdicts(system, parts, model, run, work, range(index, index + 1))
-        return index
+        verdicts = _verdicts(system, parts, model, run, work, range(index, index + 1))
+        said = zip(system.transition_names, verdicts, strict=True)
+        return index, tuple(name for name, verdict in said if verdict == codes.BEYOND)
     modes = system.mode_names
     verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
     if len(modes) == 1 and codes.BEYOND not in verdicts:
-        return 0
+        return 0, ()
     violated = {transition.source for transition in _against(system, verdicts)}
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1:
-        return modes.index(allowed[0])
+        return modes.index(allowed[0]), ()
     if not allowed:
         raise ArgumentError(
             f"{_place(system, run)} violates every mode: {_faults(system, verdicts)}. Start on the other "

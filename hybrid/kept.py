@@ -141,7 +141,8 @@ def _traced(system: HybridSystem) -> tuple[Emitted, bool]:
 def _read(path: Path) -> Emitted | None:
     try:
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        for name in ("affine_guard", "guard_in_series", "affine_mode", "autonomous"):
+        of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
+        for name in (*of_transitions, "affine_mode", "autonomous"):
             kept[name] = tuple(kept[name])
         rows, numbers, first = (kept["programs"][name] for name in ("rows", "numbers", "first"))
         kept["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))

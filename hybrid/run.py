@@ -16,11 +16,13 @@ from hybrid.first_mode import choose_mode
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.solvers import RungeKutta, Taylor
-from hybrid.status import Status, StatusCode, run_status
+from hybrid.status import Status, StatusCode, run_status, stuck_status
 from hybrid.system import HybridSystem
 
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
+# Transitions remembered in the order in which they fired: enough to see which go round without end.
+RECENT = 64
 UNLIMITED = np.iinfo(np.int64).max
 DEFAULT_SOLVER = Taylor()
 
@@ -66,7 +68,7 @@ def driver_parts(series_only: bool, implicit: bool) -> Any:
     return Parts(
         attempts=Attempts(attempt_implicit=address(attempt)),
         runge_kutta_step=address(step),
-        enter=address(jumps.enter),
+        enter=address(corners.enter),
         jump=address(jumps.jump),
         finish_chatter=address(jumps.finish_chatter),
         rest=address(jumps.rest),
@@ -191,6 +193,9 @@ def _run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> 
         "y": (n * (1 + tangents),),
         "side": (transitions,),
         "on_guard": (transitions,),
+        "due": (transitions,),
+        "recent": (RECENT,),
+        "rehearsal": (3, transitions),
         "first_step": (modes,),
         "stay": (modes,),
         "scale": (n,),
@@ -251,7 +256,10 @@ def split_time(t: float, period: float) -> tuple[int, float]:
 
 @attrs.frozen(eq=False)
 class Trajectory:
-    """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed."""
+    """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed.
+
+    ``beyond`` names the transitions whose guards the start lies beyond.
+    """
 
     compiled: CompiledSystem
     plan: Plan
@@ -261,6 +269,7 @@ class Trajectory:
     tangents: int
     max_steps: int
     phase0: float
+    beyond: tuple[str, ...] = ()
 
     @property
     def method(self) -> Any:
@@ -371,6 +380,17 @@ class Trajectory:
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
+        status = self._status(code)
+        if not self.beyond:
+            return status
+        names = ", ".join(repr(name) for name in self.beyond)
+        return attrs.evolve(
+            status,
+            message=f"{status.message} The start lies beyond the guard of {names}, which counts as crossed: "
+            "only the next crossing fires.",
+        )
+
+    def _status(self, code: int) -> Status:
         count = self.run.count.tolist()
         singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
         grazed = count[codes.ILL_CONDITIONED] if self.tangents else 0
@@ -390,9 +410,30 @@ class Trajectory:
             )
         if code == codes.DONE and grazed:
             return self._grazed(grazed)
+        where = f"at t = {self.t:.12g} in mode {self.mode!r}"
+        if code == codes.STUCK:
+            return stuck_status(where, [self.system.transitions[i] for i in self._round()], self._faces())
         last = count[codes.LAST_FIRED]
         name = self.system.transition_names[last] if last >= 0 else None
-        return run_status(code, self.t, self.mode, name)
+        return run_status(code, where, name, at_rest=count[codes.AT_REST] == 1)
+
+    def _round(self) -> list[int]:
+        """The transitions that go round at the end of the run, in order; the last ones if they do not."""
+        jumps, recent = self.jumps, self.run.recent
+        fired = [int(recent[j % len(recent)]) for j in range(max(0, jumps - len(recent)), jumps)]
+        for length in range(1, len(fired) // 2 + 1):
+            if fired[length:] == fired[:-length]:
+                return fired[-length:]
+        return fired
+
+    def _faces(self) -> bool:
+        """Whether two modes send the state back to each other across one guard, without resets."""
+        fired, emitted = self._round(), self.compiled.emitted
+        if len(fired) != 2 or any(self.system.transitions[i].reset for i in fired):
+            return False
+        one, other = fired
+        towards = [self.system.transitions[i].guard.direction * emitted.orientation[i] for i in fired]
+        return emitted.surface[one] == emitted.surface[other] and towards[0] != towards[1]
 
 
 def start(
@@ -419,8 +460,8 @@ def start(
         model = model.replace(propagator=plan.propagator)
     run, phase0 = _fresh_run(plan.run_layout, model, state, tangent, t0)
     work = _fresh_work(plan.work_layout, plan.method)
-    run.count[codes.MODE] = choose_mode(system, plan.parts, model, run, work, mode)
-    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0)
+    run.count[codes.MODE], beyond = choose_mode(system, plan.parts, model, run, work, mode)
+    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond)
 
 
 @attrs.frozen(eq=False)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import attrs
 
 from hybrid.kernels import codes
+
+if TYPE_CHECKING:
+    from hybrid.system import Transition
 
 
 class StatusCode(IntEnum):
@@ -51,11 +56,14 @@ class Status:
 SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
 
 
-def run_status(code: int, t: float, mode: str, transition: str | None) -> Status:
-    """Status of a run that ended with a kernel code at time ``t`` in a mode, after a transition (or None)."""
+def run_status(code: int, where: str, transition: str | None, *, at_rest: bool) -> Status:
+    """Status of a run that ended with a kernel code, after a transition (or None).
+
+    ``at_rest`` tells the two ways to an accumulation apart: the state rests on the guard, or jumps were
+    followed to their limit.
+    """
     if code == StatusCode.SUCCESS:
         return SUCCESS
-    where = f"at t = {t:.12g} in mode {mode!r}"
     last = f"transition {transition!r}" if transition else "a transition"
     texts = {
         StatusCode.MAX_STEPS: (
@@ -75,13 +83,12 @@ def run_status(code: int, t: float, mode: str, transition: str | None) -> Status
             "Check the model there; a field must be defined a little beyond the guards that end its mode.",
         ),
         StatusCode.ACCUMULATION: (
-            f"Jumps of {last} accumulate {where}: infinitely many in finite time.",
-            "Add a mode for the limit (rest, stick, slide) and a transition that leads to it.",
-        ),
-        StatusCode.STUCK: (
-            f"Jumps follow one another without end {where}, last {last}: "
-            "the fields on both sides point at the guard.",
-            "Add a sliding mode, or derive one with hybrid.filippov.",
+            f"After {last} the state rests on its guard {where} and is pushed through it: jumps of "
+            "length zero accumulate."
+            if at_rest
+            else f"Jumps of {last} accumulate {where}: the flights between them shorten by a steady ratio, "
+            "and infinitely many take a finite time.",
+            "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...).",
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",
@@ -90,3 +97,25 @@ def run_status(code: int, t: float, mode: str, transition: str | None) -> Status
     }
     kind = StatusCode(code)
     return Status(kind, *texts[kind])
+
+
+def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) -> Status:
+    """Status of a run in which transitions go round at one instant, in the order in which they fire.
+
+    ``facing`` says that two modes send the state back to each other across one guard.
+    """
+    names = ", ".join(repr(transition.name) for transition in transitions)
+    message = f"Jumps follow one another without end {where}: {names}, and again from the first on."
+    if facing:
+        return Status(
+            StatusCode.STUCK,
+            f"{message} The fields of modes {transitions[0].source!r} and {transitions[1].source!r} point at "
+            "the guard between them.",
+            "Add a sliding mode, or derive one with hybrid.filippov.",
+        )
+    return Status(
+        StatusCode.STUCK,
+        f"{message} Each one takes the state beyond the guard of the next.",
+        "Change the resets so that one of them leaves the state on the near side of these guards, or give a "
+        "guard a condition (when=).",
+    )

@@ -132,9 +132,10 @@ def rescale(run, other, n, factor):
     """Multiply the distance of ``other`` from ``run`` by ``factor``, and put it in the mode of ``run``."""
     for i in range(n):
         other.y[i] = run.y[i] + factor * (other.y[i] - run.y[i])
-    # In a mode of its own it is still on the sides it was; in the other's, no side has been taken yet.
-    same = other.count[MODE] == run.count[MODE]
-    other.count[PREVIOUS_MODE] = run.count[MODE] if same else NO_TRANSITION
+    # It has been taken from the point of ``run`` to its own: what lies in between it has crossed.
+    for i in range(other.side.shape[0]):
+        other.side[i], other.on_guard[i], other.due[i] = run.side[i], run.on_guard[i], 0
+    other.count[PREVIOUS_MODE] = run.count[MODE]
     other.count[MODE] = run.count[MODE]
     other.count[PHASE_OF_RUN] = ENTERING
     other.count[LAST_FIRED] = NO_TRANSITION

@@ -232,6 +232,9 @@ def _companion(
         companion = start(*place, parameters=parameters, solver=solver)
     except ArgumentError:
         companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
+        # What lies between the two orbits, the companion has crossed.
+        companion.run.side[:] = reference.run.side
+        companion.run.count[codes.PREVIOUS_MODE] = companion.run.count[codes.MODE]
     companion.run.count[codes.CYCLE] = reference.run.count[codes.CYCLE]
     companion.run.clock[codes.PHASE] = reference.run.clock[codes.PHASE]
     return companion

@@ -13,12 +13,10 @@ TERMINAL = 8
 GO_ON = -1
 
 # What the next call of the driver has to do before it can step: nothing, evaluate the rates anew
-# (the tangent vectors were changed from outside), or take its sides at every guard, of a new mode or where a
-# crossing was refused.
+# (the tangent vectors were changed from outside), or take its sides at every guard of a mode.
 READY = 0
 STALE = 1
 ENTERING = 2
-RESUMING = 3
 NO_TRANSITION = -1
 # Instead of a transition: the state rests on the guard that has just fired.
 RESTING = -2
@@ -46,7 +44,8 @@ LAST_KIND = 18
 LOCKED = 19
 MAP_IS_KNOWN = 20
 UNPROVED = 21
-COUNTERS = 22
+AT_REST = 22
+COUNTERS = 23
 
 # Slots of Run.clock.
 PHASE = 0

@@ -1,8 +1,12 @@
-"""Guards reached together: whether the order in which they fire matters."""
+"""One instant: which transition fires next, and whether the order of those reached together matters."""
 
 from numba import int64, njit
 
 from hybrid.kernels.codes import (
+    JUMPS,
+    LAST_FIRED,
+    LAST_STEP,
+    LOCKED,
     MODE,
     NO_MODE,
     NO_TRANSITION,
@@ -10,8 +14,9 @@ from hybrid.kernels.codes import (
     PHASE,
     PHASE_OF_RUN,
     PREVIOUS_MODE,
-    RESUMING,
     SIMULTANEOUS,
+    STALE,
+    STEPS,
 )
 from hybrid.kernels.guards import (
     acceleration_rounding,
@@ -20,38 +25,36 @@ from hybrid.kernels.guards import (
     guard_speed,
     guard_value,
     keep_grazing,
-    rounding_band,
-    sides_at_point,
     speed_rounding,
+    widen_scale,
 )
-from hybrid.kernels.layout import KERNEL, MODEL, PART, RECORD, RUN, WORK
+from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
+from hybrid.kernels.sides import FLOWED, LANDED, STARTED, end_instant, take_sides
 
 MOST_JUMPS = 50
 # States that differ by less than this, relative to their sizes, came out the same.
 SAME = 1e-9
 
 
-@njit(**KERNEL)
-def is_due(model, run, transition, mode, t, x, work):
-    """Whether a guard is zero, up to rounding, and moving to where its transition fires, as it may."""
-    value = guard_value(model, transition, t, x, work.scalar)
-    model.flow(mode, t, x, model.parameters, work.field)
-    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-    if abs(value) > rounding_band(model, run, transition, t, x, work):
-        return False
-    return speed * model.direction[transition] > 0.0 and allowed(model, transition, t, x, work.scalar)
+@njit(int64(MODEL, RUN, WORK), **ENTRY)
+def enter(model, run, work):
+    """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
-
-@njit(**KERNEL)
-def companion(model, run, mode, t, x, fired, markers, work):
-    """Another transition due at the very point of ``fired``, or none; ``markers`` says whether they count."""
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        other = model.outgoing[slot]
-        if other == fired or (model.marker[other] == 1 and not markers):
-            continue
-        if is_due(model, run, other, mode, t, x, work):
-            return other
-    return NO_TRANSITION
+    One whose guard a reset has taken the state beyond is locked to this instant, not to its guard.
+    """
+    mode, t, left = run.count[MODE], run.clock[PHASE], run.count[PREVIOUS_MODE]
+    if run.count[STEPS] == 0:
+        model.flow(mode, t, run.y, model.parameters, work.field)
+        widen_scale(model, run, work)
+    came = STARTED if left == NO_MODE else LANDED
+    fired = run.count[LAST_FIRED] if run.count[JUMPS] > 0 else NO_TRANSITION
+    fires = take_sides(model, run, mode, t, run.y, came, left, fired, run.side, run.due, run.on_guard, work)
+    run.count[LOCKED] = 0
+    if fires >= 0:
+        run.count[LOCKED] = 1 if run.on_guard[fires] == 0 else 0
+    else:
+        end_instant(model, mode, run.due)
+    return fires
 
 
 @njit(**KERNEL)
@@ -59,18 +62,25 @@ def settle(model, run, first, out, work):
     """State ``(n,)`` after ``first`` and all that it sets off at the same instant; returns the mode."""
     n, t = model.dimension, run.clock[PHASE]
     mode, fired = run.count[MODE], first
+    side, due, zero = run.rehearsal[0], run.rehearsal[1], run.rehearsal[2]
+    for i in range(side.shape[0]):
+        side[i], due[i], zero[i] = run.side[i], run.due[i], run.on_guard[i]
     for i in range(n):
-        out[i] = run.y[i]
+        out[i], work.trial[i] = run.y[i], run.scale[i]
     for _ in range(MOST_JUMPS):
+        due[fired] = 0
         model.reset(fired, t, out, model.parameters, work.state)
         for i in range(n):
             out[i] = work.state[i]
-        mode = model.target[fired]
+            run.scale[i] = max(run.scale[i], abs(out[i]))
+        left, mode = mode, model.target[fired]
         if mode == NO_MODE:
             break
-        fired = companion(model, run, mode, t, out, fired, False, work)
-        if fired == NO_TRANSITION:
+        fired = take_sides(model, run, mode, t, out, LANDED, left, fired, side, due, zero, work)
+        if fired < 0:
             break
+    for i in range(n):
+        run.scale[i] = work.trial[i]
     return mode
 
 
@@ -108,30 +118,47 @@ def turns_back(model, run, transition, work):
 
 @njit(int64(MODEL, RUN, RECORD, int64, WORK), **PART)
 def first_in_order(model, run, record, fired, work):
-    """Of the transitions due where the run landed, the one listed first; notes whether order matters.
+    """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
 
-    None if ``fired`` may not fire or has only touched, and no other is due: the run then takes its sides anew
-    at this point. What comes before the guard there, and what after it, may differ by rounding alone, so its
-    side is left to the next step: the crossing is behind, and cannot be found where it was refused.
+    Notes whether order matters. None if ``fired`` may not fire or has only touched, and no other is due: the
+    run then goes on from this point. What comes before the guard there, and what after it, may differ by
+    rounding alone, so its side is left to the next step: the crossing is behind, and cannot be found where it
+    was refused.
     """
-    mode, t = run.count[MODE], run.clock[PHASE]
-    fires = allowed(model, fired, t, run.y, work.scalar)
-    if fires and turns_back(model, run, fired, work):
-        fires = False
+    mode, t, before = run.count[MODE], run.clock[PHASE], run.side[fired]
+    # Another guard has been proved to change its sign here.
+    may_touch = model.affine_guard[fired] == 1 and allowed(model, fired, t, run.y, work.scalar)
+    touched = may_touch and turns_back(model, run, fired, work)
+    take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
+    direction = model.direction[fired]
+    run.side[fired] = direction if direction != 0 else -before
+    run.on_guard[fired] = max(run.on_guard[fired], 1)
+    run.due[fired] = 0 if touched else 1
+    if touched:
         value = guard_value(model, fired, t, run.y, work.scalar)
         keep_grazing(model, run, record, fired, t, run.y, value, work)
-    if not fires:
-        other = companion(model, run, mode, t, run.y, fired, True, work)
-        if other == NO_TRANSITION:
-            sides_at_point(model, run, work)
-            run.count[PREVIOUS_MODE] = mode
-            run.side[fired] = 0
-            run.count[PHASE_OF_RUN] = RESUMING
-        return other
-    other = companion(model, run, mode, t, run.y, fired, False, work)
-    if other == NO_TRANSITION:
-        return fired
-    run.count[SIMULTANEOUS] += 1
-    if order_matters(model, run, fired, other, work):
-        run.count[ORDER_MATTERED] += 1
-    return min(fired, other)
+    chosen, first, together, matters = NO_TRANSITION, NO_TRANSITION, 0, False
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if run.due[other] == 0 or not allowed(model, other, t, run.y, work.scalar):
+            continue
+        if chosen == NO_TRANSITION:
+            chosen = other
+        if model.marker[other] == 1:
+            continue
+        together += 1
+        if together == 1:
+            first = other
+        elif not matters:
+            matters = order_matters(model, run, first, other, work)
+    run.count[SIMULTANEOUS] += 1 if together > 1 else 0
+    run.count[ORDER_MATTERED] += 1 if matters else 0
+    if touched or chosen == NO_TRANSITION:
+        run.side[fired] = 0
+    if chosen == NO_TRANSITION:
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            other = model.outgoing[slot]
+            if run.due[other] == 1:
+                run.side[other], run.due[other] = 0, 0
+        run.count[PHASE_OF_RUN], run.clock[LAST_STEP] = STALE, 0.0
+    return chosen

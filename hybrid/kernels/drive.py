@@ -8,6 +8,7 @@ from hybrid.kernels.bernstein import crosses_towards
 from hybrid.kernels.clock import forward, time_left
 from hybrid.kernels.codes import (
     ACCUMULATION,
+    AT_REST,
     CYCLE,
     DONE,
     ENTERING,
@@ -29,7 +30,6 @@ from hybrid.kernels.codes import (
     PREVIOUS_MODE,
     RECORD_FULL,
     RESTING,
-    RESUMING,
     RUNGE_KUTTA,
     SINCE_ENTRY,
     STALE,
@@ -41,8 +41,9 @@ from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_ba
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.series import series_step
 
-# More jumps than this at one instant are not going to end.
-MOST_JUMPS_AT_ONCE = 100
+# More jumps than this at one instant, in all or per transition, are not going to end.
+MOST_JUMPS_AT_ONCE = 1000
+MOST_JUMPS_EACH = 100
 
 
 @njit(**KERNEL)
@@ -117,8 +118,8 @@ def advance(
             # once.
             if 0 < record.jump_time.shape[0] <= record.used[1] + 1:
                 return RECORD_FULL
-            if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
-                return ACCUMULATION
+            if run.count[JUMPS_HERE] > max(MOST_JUMPS_AT_ONCE, MOST_JUMPS_EACH * model.target.shape[0]):
+                return STUCK
             fired = run.count[PENDING]
             run.count[PENDING] = NO_TRANSITION
             parts.jump(model, method, run, record, fired, tangents, orthonormal, work)
@@ -134,19 +135,18 @@ def advance(
                 return ACCUMULATION
             continue
         mode = run.count[MODE]
-        if run.count[PHASE_OF_RUN] in (ENTERING, RESUMING):
+        if run.count[PHASE_OF_RUN] == ENTERING:
             if not finite(run, length):
                 return NON_FINITE
             fires = parts.enter(model, run, work)
             if fires == RESTING:
                 limit_mode = model.accumulates_to[run.count[LAST_FIRED]]
                 if limit_mode == NO_MODE:
+                    run.count[AT_REST] = 1
                     return ACCUMULATION
                 parts.rest(model, run, limit_mode, tangents, orthonormal, work)
                 continue
             if fires != NO_TRANSITION:
-                if run.count[JUMPS_HERE] > MOST_JUMPS_AT_ONCE:
-                    return STUCK
                 run.count[PENDING] = fires
                 continue
             if mode != run.count[PREVIOUS_MODE]:
@@ -156,10 +156,11 @@ def advance(
             run.count[PHASE_OF_RUN] = STALE
         remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
-            run.count[PENDING] = arrived(model, run, work)
-            if run.count[PENDING] != NO_TRANSITION:
-                continue
-            return DONE
+            fired = arrived(model, run, work)
+            if fired == NO_TRANSITION:
+                return DONE
+            run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
+            continue
         if recording and record.used[0] + 1 >= record.step_time.shape[0]:
             return RECORD_FULL
         if 0 < record.grazing_time.shape[0] == record.used[2]:

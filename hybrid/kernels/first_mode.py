@@ -24,7 +24,10 @@ def try_modes(parts, model, run, work, first, stop, verdicts):
             transition = model.outgoing[slot]
             if not math.isfinite(guard_value(model, transition, t, run.y, work.scalar)):
                 return transition
-            crossed = model.direction[transition] == run.side[transition] and model.marker[transition] == 0
-            if crossed and allowed(model, transition, t, run.y, work.scalar):
-                verdicts[transition] = LEAVES if run.on_guard[transition] > 0 else BEYOND
+            beyond = model.direction[transition] == run.side[transition] and run.on_guard[transition] == 0
+            beyond = beyond and model.marker[transition] == 0 and model.paired[transition] == 0
+            if run.due[transition] == 0 and not beyond:
+                continue
+            if allowed(model, transition, t, run.y, work.scalar):
+                verdicts[transition] = LEAVES if run.due[transition] == 1 else BEYOND
     return NO_TRANSITION

@@ -11,7 +11,6 @@ from hybrid.kernels.codes import (
     GRAZINGS,
     JUMPS,
     MODE,
-    PHASE,
 )
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 
@@ -79,12 +78,6 @@ def widen_scale(model, run, work):
         size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
     for i in range(model.dimension if pace > 0.0 else 0):
         run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
-
-
-@njit(**KERNEL)
-def sides_at_point(model, run, work):
-    """Bring the sides of the mode's guards, known at the ends of a step only, to where the run has landed."""
-    sides_at(model, run, run.clock[PHASE], work)
 
 
 @njit(**KERNEL)

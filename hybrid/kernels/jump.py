@@ -1,4 +1,4 @@
-"""Entering a mode, and the jump: reset, saltation matrix, tangent vectors."""
+"""The jump: reset, saltation matrix, tangent vectors."""
 
 import math
 
@@ -35,34 +35,22 @@ from hybrid.kernels.codes import (
     MAP_IS_KNOWN,
     MODE,
     NO_MODE,
-    NO_TRANSITION,
     PHASE,
     PHASE_OF_RUN,
     PREVIOUS_MODE,
-    RESTING,
     RESTITUTION,
-    RESUMING,
     SINCE_ENTRY,
     SINGULAR_JUMPS,
-    STEPS,
     STRAIN,
     TRANSVERSE,
 )
 from hybrid.kernels.guards import (
-    acceleration_rounding,
-    allowed,
     error_band,
     guard_acceleration,
     guard_speed,
-    guard_value,
-    rounding_band,
-    sides_at_point,
-    speed_rounding,
-    widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.locked import (
-    begin_at_start,
     begin_instant,
     change_of_instant,
     follow,
@@ -73,74 +61,6 @@ from hybrid.kernels.locked import (
 )
 from hybrid.kernels.record import start_record
 from hybrid.kernels.tangent import COLLAPSED, STRAINED, log_abs_determinant, multiply, orthonormalise, strain
-
-
-@njit(int64(MODEL, RUN, WORK), **ENTRY)
-def enter(model, run, work):
-    """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
-
-    The half-open rule: a guard that is zero here, up to rounding, takes its side from its speed, from its
-    acceleration where the speed vanishes too, and where that does as well the next step shows which way it
-    leaves: until then it counts as not crossed. A guard that the state has come to lie on or beyond fires at
-    once, except one whose crossing has just been refused here, and the transition that has just fired: if the
-    state moves on through its guard the crossing is done, and if it rests there the answer is ``RESTING``:
-    the transition would fire for ever. One that fires because the state lies beyond its guard is locked to
-    this instant, not to the guard. A guard that fires both ways does so at once if it was crossed, on the
-    way, at the very instant of another's jump. A transition whose condition does not hold here does not fire:
-    its guard has then been crossed.
-    """
-    mode, t = run.count[MODE], run.clock[PHASE]
-    landed, resumed = run.count[JUMPS] > 0, run.count[PHASE_OF_RUN] == RESUMING
-    fires, locked, stuck = NO_TRANSITION, 0, False
-    model.flow(mode, t, run.y, model.parameters, work.field)
-    if run.count[STEPS] == 0:
-        widen_scale(model, run, work)
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        transition = model.outgoing[slot]
-        value = guard_value(model, transition, t, run.y, work.scalar)
-        speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-        band = rounding_band(model, run, transition, t, run.y, work)
-        on_guard = abs(value) <= band
-        resting, order, still = False, 0, 0.0
-        trend = value
-        if on_guard:
-            trend, order = speed, 1
-            still = speed_rounding(model, run, mode, t, work)
-            if abs(speed) <= still:
-                resting, order = True, 2
-                trend = guard_acceleration(model, transition, mode, t, run.y, work)
-                if abs(trend) <= acceleration_rounding(model, run, t, work):
-                    trend, order = 0.0, 3
-        direction = model.direction[transition]
-        before = run.side[transition] if run.count[PREVIOUS_MODE] == mode else 0
-        side = 1 if trend > 0.0 else (-1 if trend < 0.0 else -direction)
-        crossed = order == 3 and landed and transition == run.count[LAST_FIRED]
-        if crossed:
-            # A root of third order: what follows is beyond the guard, and has been crossed already.
-            side = direction if direction != 0 else -before
-        # A crossing that was refused at this point, or was made without speed, must not be found here again.
-        passed = on_guard and resumed and before == 0
-        passed = passed or (crossed and abs(run.clock[LAST_TRANSVERSALITY]) <= still)
-        run.side[transition] = 0 if passed else side
-        run.on_guard[transition] = order
-        if passed:
-            continue
-        inbound = side == direction or (direction == 0 and on_guard and side * before < 0)
-        if not inbound or model.marker[transition] == 1:
-            continue
-        if not allowed(model, transition, t, run.y, work.scalar):
-            continue
-        if landed and transition == run.count[LAST_FIRED]:
-            against = direction != 0 and run.clock[LAST_TRANSVERSALITY] * direction <= 0.0
-            stuck = stuck or (on_guard and (resting or against))
-        elif (
-            fires == NO_TRANSITION
-            and before != side
-            and (on_guard or landed or model.boundary[transition] == 1)
-        ):
-            fires, locked = transition, 0 if on_guard else 1
-    run.count[LOCKED] = locked
-    return RESTING if stuck else fires
 
 
 @njit(**KERNEL)
@@ -278,6 +198,7 @@ def move(model, run, transition, target, x_plus):
     run.count[JUMPS_HERE] = run.count[JUMPS_HERE] + 1 if here else 1
     run.clock[LAST_JUMP_PHASE] = run.clock[PHASE]
     run.clock[LAST_JUMP_CYCLE] = run.count[CYCLE]
+    run.recent[run.count[JUMPS] % run.recent.shape[0]] = transition
     run.count[JUMPS] += 1
     run.count[LAST_FIRED] = transition
     run.stay[run.count[MODE]], run.clock[SINCE_ENTRY] = run.clock[SINCE_ENTRY], 0.0
@@ -322,8 +243,6 @@ def cross_with_map(model, run, transition, mode, tangents, work):
 def recall_map(model, run, tangents, work):
     """Make up for the tangent map of the jump that began this instant, if nobody has asked for it."""
     n = model.dimension
-    if run.count[LAST_FIRED] == NO_TRANSITION:
-        begin_at_start(run, n, tangents)
     if run.count[MAP_IS_KNOWN] == 1:
         return
     fired, mode, x_minus = run.count[LAST_FIRED], run.count[PREVIOUS_MODE], run.instant[:n]
@@ -344,7 +263,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     locked = run.count[LOCKED] == 1 and asked
     known = tangents > 0 or locked
     run.count[LOCKED] = 0
-    # It stands for a square root if the jump that it is locked to does.
+    # A locked jump inherits the grazing flag of the jump that triggered it.
     kind = run.count[LAST_KIND] if locked else TRANSVERSE
     if locked:
         recall_map(model, run, tangents, work)
@@ -360,7 +279,7 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     if kind == GRAZING:
         run.count[ILL_CONDITIONED] += 1
     run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
-    sides_at_point(model, run, work)
+    run.due[transition] = 0
     remember_jump(model, run, record, transition, transversality, kind, known, work.new, work)
     if locked:
         map_of_instant(run, n, work.saltation)

@@ -52,11 +52,12 @@ class Model(Structure):
     transitions that leave mode ``m``, in the order they were listed; ``target`` is -1 for one that ends the
     run. ``affine_guard`` is 1 for a guard that is affine in state and time, ``guard_in_series`` for one that
     the series of its mode hold in a column; ``bound`` and ``spread`` run the ``programs`` of the others.
-    ``boundary`` is 1 for a transition that a state on the far side of its guard must take at once, 0 for one
-    that only crossings fire; ``accumulates_to`` the mode after a complete chatter, or -1. ``propagator``
-    says how each mode is advanced; ``degree`` is that of its solutions in time where they are polynomials,
-    else 0. ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many
-    four of them have in each mode. ``period`` is 0 without a forcing period.
+    Transitions with the same ``surface`` have the same guard up to a factor, its sign the product of their
+    ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
+    surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
+    is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0.
+    ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
+    them have in each mode. ``period`` is 0 without a forcing period.
     """
 
     flow: VECTOR_ROLE
@@ -78,7 +79,9 @@ class Model(Structure):
     programs: PROGRAMS
     bound: BOUND
     spread: SPREAD
-    boundary: INDICES
+    surface: INDICES
+    orientation: INDICES
+    paired: INDICES
     marker: INDICES
     accumulates_to: INDICES
     propagator: INDICES
@@ -128,9 +131,12 @@ class Run(Structure):
 
     ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
     the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
-    vanishes at the entry of the mode and has not been left since, 2 where its speed does too, 3 where its
-    acceleration does as well; ``first_step (modes,)`` remembers the step a mode began with and ``stay
-    (modes,)`` how long the last stay in it was; ``scale (n,)`` the size of the components over the last step,
+    vanishes at the last event or entry and has not been left since, 2 where its speed does too, 3 where its
+    acceleration does as well; ``due (transitions,)`` is 1 where the guard has been crossed at this instant
+    and its transition has not fired; ``recent`` are the last transitions that fired, jump ``j`` at ``j``
+    modulo its length, and ``rehearsal (3, transitions)`` is scratch for jumps that are only tried;
+    ``first_step (modes,)`` remembers the step a mode began with and ``stay (modes,)`` how long the last stay
+    in it was; ``scale (n,)`` the size of the components over the last step,
     against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the
     tangent vectors by orthonormalisation. ``trail (3, n + 1)`` follows the jumps of one transition to their
     limit. The last three serve the jumps that one jump sets off at once: ``before (n k,)`` and
@@ -144,6 +150,9 @@ class Run(Structure):
     y: VECTOR
     side: INDICES
     on_guard: INDICES
+    due: INDICES
+    recent: INDICES
+    rehearsal: INDEX_MATRIX
     first_step: VECTOR
     stay: VECTOR
     scale: VECTOR

@@ -8,7 +8,6 @@ tangent vector is
     (D_x R P + (D_x R f + D_t R - f_plus) a) v,
 
 the next ``P``, whatever the guard of that jump does: its saltation matrix would let it fire at its own time.
-At a start beyond a guard there is no first jump, ``P = I`` and ``a = 0``.
 """
 
 from numba import njit
@@ -78,17 +77,6 @@ def postpone_map(run, n):
     for i in range(n):
         run.instant[i] = run.y[i]
     run.count[MAP_IS_KNOWN] = 0
-
-
-@njit(**KERNEL)
-def begin_at_start(run, n, tangents):
-    """As ``begin_instant`` where a run starts beyond a guard."""
-    keep_tangents(run, n, tangents)
-    for i in range(n * (1 + n)):
-        run.instant[i] = 0.0
-    for i in range(n):
-        run.instant[n + n * i + i] = 1.0
-    run.count[MAP_IS_KNOWN] = 1
 
 
 @njit(**KERNEL)
