@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from math import floor, isfinite
 from typing import Any
@@ -381,14 +381,32 @@ class Trajectory:
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
         status = self._status(code)
-        if not self.beyond:
-            return status
-        names = ", ".join(repr(name) for name in self.beyond)
-        return attrs.evolve(
-            status,
-            message=f"{status.message} The start lies beyond the guard of {names}, which counts as crossed: "
-            "only the next crossing fires.",
-        )
+        notes = [*self._start_beyond(), *self._unproved()]
+        return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
+
+    def _start_beyond(self) -> Iterator[str]:
+        """What is to be said of guards that the start lies beyond."""
+        if self.beyond:
+            names = ", ".join(map(repr, self.beyond))
+            yield f"The start lies beyond the guard of {names}: only the next crossing fires."
+
+    def _unproved(self) -> Iterator[str]:
+        """What is to be said of guards whose crossings are not proved."""
+        steps = self.run.count.item(codes.UNPROVED)
+        if not steps:
+            return
+        names = self.system.transition_names
+        sampled = [repr(name) for i, name in enumerate(names) if self.compiled.emitted.is_sampled(i)]
+        if sampled:
+            yield (
+                f"The crossings of {', '.join(sampled)} are not proved: the guard could not be traced, so it "
+                "was sampled on each step. Write it with NumPy functions (np.sin, np.where)."
+            )
+        else:
+            yield (
+                f"On {steps} steps the crossings of a guard are not proved: it is too close to zero for too "
+                "long, so its signs at the ends of pieces of the step decided."
+            )
 
     def _status(self, code: int) -> Status:
         count = self.run.count.tolist()

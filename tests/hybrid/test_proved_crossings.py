@@ -1,0 +1,218 @@
+"""Guards that are not affine: each change of sign fires once, at its place, and the guard is zero there."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    StatusCode,
+    Taylor,
+    Transition,
+    Tsit5,
+    compile_system,
+    simulate,
+)
+
+SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-9, atol=1e-11), Tsit5(rtol=1e-9, atol=1e-11))
+END = 10.0
+# Guards as functions of the position ``q = 1.5 cos t``, with a sharpness and a threshold; each vanishes, or
+# jumps, where ``q`` is one of the values behind it.
+FAMILIES = {
+    "tanh": (lambda t, x, p: np.tanh(p.k * (x.q - p.c)), lambda k, c: [c]),
+    "exp": (lambda t, x, p: np.exp(p.k * (x.q - p.c)) - 1, lambda k, c: [c]),
+    "softplus": (
+        lambda t, x, p: np.log1p(np.exp(p.k * (x.q - p.c))) / p.k - 0.1,
+        lambda k, c: [c + np.log(np.expm1(0.1 * k)) / k],
+    ),
+    "spike": (
+        lambda t, x, p: np.exp(-p.k * (x.q - p.c) ** 2) - 0.5,
+        lambda k, c: [c - np.sqrt(np.log(2) / k), c + np.sqrt(np.log(2) / k)],
+    ),
+    "sign": (lambda t, x, p: np.sign(x.q - p.c), lambda k, c: [c]),
+    "where": (lambda t, x, p: np.where(x.q > p.c, 1.0, -p.k), lambda k, c: [c]),
+    "cube": (lambda t, x, p: p.k * (x.q - p.c) ** 3, lambda k, c: [c]),
+    "fifth": (lambda t, x, p: (x.q - p.c) ** 5, lambda k, c: [c]),
+    "signed square": (lambda t, x, p: (x.q - p.c) * np.abs(x.q - p.c), lambda k, c: [c]),
+    "cube root": (lambda t, x, p: np.cbrt(x.q - p.c), lambda k, c: [c]),
+    "dead zone": (lambda t, x, p: np.maximum(np.abs(x.q - p.c) - 0.3, 0) - 1e-3 * p.k / 500, None),
+    "quotient": (lambda t, x, p: (x.q - p.c) / (1 + p.k * x.q**2), lambda k, c: [c]),
+    "angle": (lambda t, x, p: np.arctan2(x.q - p.c, 2 + x.v), lambda k, c: [c]),
+    "product": (lambda t, x, p: (x.q - p.c) * (x.q + 1), lambda k, c: [c, -1.0]),
+}
+
+
+@cache
+def oscillator(family, direction):
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"k": 20.0, "c": 0.1},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[Transition("swing", "swing", Guard(FAMILIES[family][0], direction), name="mark")],
+    )
+
+
+def crossing_times(values):
+    """When ``1.5 cos t`` takes one of the values."""
+    times = [
+        sign * np.arccos(value / 1.5) + 2 * np.pi * turn
+        for value in values
+        for sign in (-1, 1)
+        for turn in range(3)
+    ]
+    return np.sort([time for time in times if 0 < time < END])
+
+
+def guard_of(family, k, c, time):
+    """The guard on the exact solution, as the model has it."""
+
+    class Names:
+        pass
+
+    x, p = Names(), Names()
+    x.q, x.v, p.k, p.c = 1.5 * np.cos(time), -1.5 * np.sin(time), k, c
+    return FAMILIES[family][0](time, x, p)
+
+
+@pytest.mark.parametrize("family", [name for name, (_, places) in FAMILIES.items() if places])
+@pytest.mark.parametrize("direction", [0, 1])
+@given(
+    k=st.floats(0.5, 4.0).map(lambda exponent: 10.0**exponent),
+    c=st.floats(-1.2, 1.2),
+    solver=st.sampled_from(SOLVERS),
+)
+def test_each_change_of_sign_fires_once(family, direction, k, c, solver):
+    places = FAMILIES[family][1](k, c)
+    if not all(abs(place) < 1.49 for place in places):
+        return
+    expected = crossing_times(places)
+    if np.any(np.diff(expected) < 1e-6):
+        return
+    if direction:
+        # The exact solution says which of them lead upwards.
+        around = [np.sign(guard_of(family, k, c, expected + shift)) for shift in (-1e-7, 1e-7)]
+        expected = expected[(around[0] < 0) & (around[1] > 0)]
+    arc = simulate(
+        oscillator(family, direction), (1.5, 0.0), (0.0, END), parameters={"k": k, "c": c}, solver=solver
+    )
+    assert arc.status.code == StatusCode.SUCCESS
+    assert len(arc.jumps) == len(expected)
+    tolerance = 1e-12 if isinstance(solver, Taylor) else 1e-6
+    np.testing.assert_allclose(arc.jumps.t, expected, rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_guard_is_zero_at_its_events(solver):
+    for family, (function, places) in FAMILIES.items():
+        if places is None or family in ("sign", "where"):
+            continue
+        system = oscillator(family, 0)
+        arc = simulate(system, (1.5, 0.0), (0.0, END), parameters={"k": 30.0, "c": 0.2}, solver=solver)
+        for jump in arc.jumps:
+
+            class X:
+                q, v = jump.x_minus
+
+            class P:
+                k, c = 30.0, 0.2
+
+            # As large as rounding of the position makes it.
+            scale = abs(function(jump.t, type("X", (), {"q": X.q + 1e-14, "v": X.v}), P)) + 1e-13
+            assert abs(function(jump.t, X, P)) <= scale
+
+
+@pytest.mark.parametrize("solver", SOLVERS[:2])
+def test_a_spike_in_time_ends_the_run(solver):
+    ramp = HybridSystem(
+        state=("q",),
+        parameters={"k": 10.0},
+        modes=[Mode("ramp", lambda t, x, p: (0.1,))],
+        transitions=[Transition("ramp", None, Guard(lambda t, x, p: np.exp(-p.k * (t - 5.2) ** 2) - 0.5, +1))],
+    )
+    for k in (10.0, 1e4, 1e8):
+        arc = simulate(ramp, (0.0,), (0.0, 10.0), parameters={"k": k}, solver=solver)
+        assert arc.status.code == StatusCode.TERMINAL
+        np.testing.assert_allclose(arc.t[-1], 5.2 - np.sqrt(np.log(2) / k), rtol=1e-14)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_bounce_on_a_sharp_guard_is_where_the_guard_is(solver):
+    wall = HybridSystem(
+        state=("q", "v"),
+        parameters={"k": 50.0},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[
+            Transition(
+                "swing",
+                "swing",
+                Guard(lambda t, x, p: np.tanh(p.k * x.q), -1),
+                Reset(lambda t, x, p: (0.0, -0.5 * x.v)),
+                name="bounce",
+            )
+        ],
+    )
+    arc = simulate(wall, (1.5, 0.0), (0.0, 9.0), solver=solver)
+    np.testing.assert_allclose(arc.jumps.t, np.pi * (np.arange(len(arc.jumps)) + 0.5), atol=1e-6)
+    np.testing.assert_allclose(arc.jumps.x_minus[:, 0], 0.0, atol=1e-14)
+    np.testing.assert_allclose(arc.jumps.x_minus[:, 1], -1.5 * 0.5 ** np.arange(len(arc.jumps)), rtol=1e-6)
+
+
+def test_a_guard_that_touches_does_not_fire():
+    """``1.5 - q`` is zero at the turning points of the oscillation, and rises again."""
+    touch = HybridSystem(
+        state=("q", "v"),
+        parameters={"depth": 0.0},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[
+            Transition("swing", "swing", Guard(lambda t, x, p: np.exp(1.5 - x.q) - 1 - p.depth), name="top")
+        ],
+    )
+    near = simulate(touch, (-1.5, 0.0), (0.0, 12.0), parameters={"depth": -1e-9})
+    assert len(near.jumps) == 0
+    over = simulate(touch, (-1.5, 0.0), (0.0, 12.0), parameters={"depth": 1e-9})
+    # In and out again, around t = pi and 3 pi; at depth d the guard is below zero for 2 sqrt(2 d / 1.5).
+    half = np.sqrt(2e-9 / 1.5)
+    np.testing.assert_allclose(
+        over.jumps.t, np.array([1 - half / np.pi, 1 + half / np.pi, 3 - half / np.pi, 3 + half / np.pi]) * np.pi,
+        atol=1e-9,
+    )  # fmt: skip
+
+
+def test_a_guard_that_cannot_be_traced_is_said_to_be_sampled():
+    def stubborn(t, x, p):
+        if x.q > 0.5:
+            return x.q - 0.7
+        return x.q - 0.7
+
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[Transition("swing", "swing", Guard(stubborn, -1), name="mark")],
+    )
+    assert "not proved" in repr(compile_system(system))
+    arc = simulate(system, (1.5, 0.0), (0.0, 5.0))
+    assert "'mark' are not proved" in arc.status.message
+    np.testing.assert_allclose(arc.jumps.t, [np.arccos(0.7 / 1.5)], rtol=1e-12)
+    assert "proved" in repr(compile_system(oscillator("tanh", 0)))
+    assert simulate(oscillator("tanh", 0), (1.5, 0.0), (0.0, 5.0)).status.message == "Reached the end."
+
+
+@pytest.mark.parametrize("solver", SOLVERS[:2])
+def test_a_moving_guard_beside_a_steep_one(solver):
+    """``x' = 0.25`` against ``1 + x - t / 2``: both move, and the surface is met at t = 4 only."""
+    system = HybridSystem(
+        state=("x",),
+        modes=[Mode("creep", lambda t, x, p: (0.25,))],
+        transitions=[Transition("creep", "creep", Guard(lambda t, x, p: 1 + x.x - 0.5 * t, -1), name="met")],
+    )
+    arc = simulate(system, (0.0,), (0.0, 10.0), solver=solver)
+    np.testing.assert_allclose(arc.jumps.t, [4.0], rtol=1e-14)
+    np.testing.assert_allclose(arc.jumps.transversality, [-0.25], rtol=1e-14)
