@@ -35,6 +35,8 @@ MOST_PIECES = 3000
 SMALL_SHARE = 1e-2
 # Pieces longer than this share of the step are not asked whether they lie within the tolerances.
 SHORT_PIECE = 1e-2
+# A guard that comes closer to zero than this share of its largest value on a piece may be a touch.
+CLOSE = 1e-4
 # A piece lies within rounding if nowhere on it the guard is farther from zero than this many times the
 # rounding in its middle.
 WITHIN_ROUNDING = 4.0
@@ -141,7 +143,7 @@ def first_change(
     """
     direction = model.direction[transition]
     pieces, top = 0, 0
-    # The last place where the guard was on its side, beyond rounding.
+    # The last place where the guard was on its side, beyond rounding, and where it came closest to zero.
     sure = 0.0
     touch, depth = NOWHERE, math.inf
     stack = work.intervals
@@ -149,60 +151,61 @@ def first_change(
     while top >= 0:
         low, high = stack[top, 0], stack[top, 1]
         middle = 0.5 * (low + high)
-        # One piece more or less than the halves: their ends are the same numbers.
         radius = max(high - middle, middle - low)
         last = model.bound(
             model.programs, transition, path, order, clock, start, pace, middle, radius, work.registers
         )
         row = work.registers[last]
         pieces += 1
-        if row[LOW] * side > 0.0 and row[HIGH] * side > 0.0:
+        clear = row[LOW] * side > 0.0 and row[HIGH] * side > 0.0
+        monotone = row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
+        nearest, farthest = min(abs(row[LOW]), abs(row[HIGH])), max(abs(row[LOW]), abs(row[HIGH]))
+        rounding = WITHIN_ROUNDING * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
+        smooth = math.isfinite(row[MOST_SLOPE] - row[LEAST_SLOPE]) and low < middle < high and side != 0
+        if clear and not (smooth and nearest <= CLOSE * farthest):
             sure = high
             top -= 1
             continue
-        monotone = row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
-        if not monotone:
-            shallow = low < middle < high and math.isfinite(row[MOST_SLOPE] - row[LEAST_SLOPE]) and side != 0
-            if shallow:
-                farthest = max(abs(row[LOW]), abs(row[HIGH]))
-                shallow = farthest <= WITHIN_ROUNDING * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
-                if not shallow and not exact and high - low <= SHORT_PIECE * length:
-                    shallow = farthest <= _tolerated(
-                        model, method, run, transition, path, order, clock, start, pace, middle, work
-                    )
-            splits = low < middle < high and high - low > EPSILON * length and not shallow
-            if splits and pieces > MOST_PIECES:
-                if low > SMALL_SHARE * length:
-                    return NOWHERE, side, low
-                run.count[UNPROVED] += 1
-            elif splits:
+        tolerated = 0.0
+        if smooth and not exact and (clear or high - low <= SHORT_PIECE * length):
+            tolerated = _tolerated(
+                model, method, run, transition, path, order, clock, start, pace, middle, work
+            )
+        shallow = smooth and not monotone and farthest <= max(rounding, tolerated)
+        splits = low < middle < high and high - low > EPSILON * length
+        if splits and not (clear or monotone or shallow):
+            if pieces <= MOST_PIECES:
                 stack[top, 0] = middle
                 top += 1
                 stack[top, 0], stack[top, 1] = low, middle
                 continue
-            turn = middle
-            if shallow:
-                turn = _turn_between(
-                    model, transition, path, order, clock, start, pace, low, high, side, work
-                )
-            if low < turn < high:
-                row = work.registers[_row_at(model, transition, path, order, clock, start, pace, turn, work)]
-                value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE]) * side
-                if shallow and row[LOW] * side < 0.0 and row[HIGH] * side < 0.0:
-                    # Down to the turn and up again: two pieces with one change of sign each.
-                    stack[top, 0], high = turn, turn
-                    top += 1
-                elif on_guard == 0 and value < depth:
-                    touch, depth = turn, value
+            if low > SMALL_SHARE * length:
+                return NOWHERE, side, low
+            run.count[UNPROVED] += 1
+        turn = high
+        if smooth and not monotone:
+            turn = _turn_between(model, transition, path, order, clock, start, pace, low, high, side, work)
+        if turn != NOWHERE and side != 0:
+            row = work.registers[_row_at(model, transition, path, order, clock, start, pace, turn, work)]
+            value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE]) * side
+            within = value <= max(tolerated, 0.5 * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]))
+            if shallow and low < turn < high and row[LOW] * side < 0.0 and row[HIGH] * side < 0.0:
+                # Down to the turn and up again: two pieces with one change of sign each.
+                stack[top, 0], high = turn, turn
+                top += 1
+            elif within and value < depth and on_guard == 0:
+                touch, depth = turn, value
         top -= 1
-        after = certain_sign(model, transition, path, order, clock, start, pace, high, work)
+        after = (
+            side if clear else certain_sign(model, transition, path, order, clock, start, pace, high, work)
+        )
         if after == 0:
             continue
         if after != side and side != 0:
             place = root_in_bracket(
                 model, transition, path, order, clock, start, pace, sure, high, side, work
             )
-            touch = NOWHERE
+            touch, depth = NOWHERE, math.inf
             side = after
             if crosses_towards(direction, after):
                 return place, side, length

@@ -32,7 +32,7 @@ def test_repr():
     assert repr(compile_system(bouncing_ball())) == (
         "CompiledSystem of bouncing ball: 2 states\n"
         "  mode flight: exact (polynomials of degree 2)\n"
-        "  transition bounce: affine guard"
+        "  transition bounce: affine guard, its crossings are isolated on each step"
     )
     nameless = HybridSystem(
         state=("x",),
@@ -42,7 +42,7 @@ def test_repr():
     assert repr(compile_system(nameless)) == (
         "CompiledSystem of a system: 1 states\n"
         "  mode a: Taylor series (smooth, nonlinear in the state)\n"
-        "  transition wave: guard fitted along each step"
+        "  transition wave: guard bounded on each step, its crossings are proved"
     )
 
 

@@ -83,7 +83,10 @@ def test_what_is_kept_is_what_was_emitted(model, emissions):
     again = traced_or_kept(model())
     assert len(emissions) == 1
     assert again == first == emit(model())
-    assert [type(each) for each in attrs.astuple(again, recurse=False)] == [str, dict, *[tuple] * 4, int]
+    assert [type(each) for each in attrs.astuple(again, recurse=False)] == [
+        type(each) for each in attrs.astuple(first, recurse=False)
+    ]
+    assert all(type(row) is tuple for row in again.programs.rows)
 
 
 def test_every_function_has_a_rule():
