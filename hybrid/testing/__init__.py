@@ -6,6 +6,7 @@
 
 from hybrid.testing.case import Case, Engine, PropertyError, Run, discard
 from hybrid.testing.check import PropertyReport, SystemReport, check_system
+from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.events import check_jumps, check_sides
 from hybrid.testing.invariance import (
@@ -36,6 +37,7 @@ __all__ = [
     "SystemReport",
     "cases",
     "check_continuity",
+    "check_crossings",
     "check_cut",
     "check_derivatives",
     "check_elastic",

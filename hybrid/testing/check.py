@@ -17,6 +17,7 @@ from hybrid.run import check_count
 from hybrid.solvers import RungeKutta
 from hybrid.system import HybridSystem
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
+from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
 from hybrid.testing.invariance import (
@@ -200,6 +201,7 @@ def check_system(
         DERIVATIVES: check_derivatives,
         JUMPS: check_jumps,
         SIDES: check_sides,
+        CROSSINGS: check_crossings,
         SALTATION: check_saltation,
         FLOW_DIRECTION: check_flow_direction,
         CONTINUITY: check_continuity,

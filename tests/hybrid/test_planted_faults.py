@@ -17,6 +17,7 @@ from hybrid.testing import (
     PropertyError,
     cases,
     check_continuity,
+    check_crossings,
     check_cut,
     check_derivatives,
     check_elastic,
@@ -225,6 +226,24 @@ class TangentsLost(Engine):
         return attrs.evolve(arc, fundamental=np.linalg.inv(arc.jumps[-1].saltation) @ arc.fundamental)
 
 
+def deaf(transition):
+    """The transition never fires."""
+    return attrs.evolve(transition, guard=attrs.evolve(transition.guard, when=lambda t, x, p: x.q < -1e9))
+
+
+class EventsTwice(Engine):
+    """Every event is found again where it has just fired."""
+
+    def simulate(self, system, x0, t_span, **options):
+        arc = hybrid.simulate(system, x0, t_span, **options)
+        jumps = arc.jumps
+        twice = {
+            name: np.repeat(getattr(jumps, f"_{name}"), 2, axis=0)
+            for name in ("time", "place", "states", "recorded")
+        }
+        return attrs.evolve(arc, jumps=attrs.evolve(jumps, **twice))
+
+
 class DerivativeOfNoughtPointNine(Engine):
     """Derivatives are nine tenths of what they should be."""
 
@@ -271,6 +290,8 @@ def test_wrong_saltation_matrices(check, system, fault, text):
         (check_order, BOX, Distorted(first_in_list_late), "first guard listed"),
         (check_sides, BALL, Distorted(lambda s: with_transitions(s, turned)), "goes below zero"),
         (check_jumps, BOX, Distorted(lambda s: with_transitions(s, turned)), "in the wrong direction"),
+        (check_crossings, BALL, Distorted(lambda s: with_transitions(s, deaf)), "and nothing fires"),
+        (check_crossings, BALL, EventsTwice(), "and again at"),
         (check_split, BALL, Displaced(), "was split at"),
         (check_samples, BALL, SampledBefore(), "wrong side of an event"),
         (check_sum_rule, BALL, TangentsLost(), "miss a jump"),
