@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from math import floor, isfinite
 from typing import Any
@@ -11,12 +11,13 @@ import attrs
 import numpy as np
 
 from hybrid.compile import CompiledSystem, compile_system
+from hybrid.ending import status_of
 from hybrid.errors import ArgumentError
 from hybrid.first_mode import choose_mode
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.solvers import RungeKutta, Taylor
-from hybrid.status import Status, StatusCode, run_status, stuck_status
+from hybrid.status import Status
 from hybrid.system import HybridSystem
 
 # Deep enough for intervals halved down to rounding.
@@ -196,6 +197,7 @@ def _run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> 
         "due": (transitions,),
         "recent": (RECENT,),
         "rehearsal": (3, transitions),
+        "visits": (RECENT, n + 2),
         "first_step": (modes,),
         "stay": (modes,),
         "scale": (n,),
@@ -360,15 +362,6 @@ class Trajectory:
             )
         )
 
-    def _grazed(self, grazed: int) -> Status:
-        largest = self.run.clock[codes.LARGEST_SALTATION]
-        return Status(
-            StatusCode.SUCCESS,
-            f"Reached the end. {grazed} of {self.jumps} jumps grazed within the tolerances: their saltation "
-            f"matrices, with entries up to {largest:.2g}, stand for a square root.",
-            "Tighten the tolerances to resolve them, or move the parameters away.",
-        )
-
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
         self.plan.run_layout.take_back(self.run)
@@ -380,78 +373,7 @@ class Trajectory:
 
     def status(self, code: int) -> Status:
         """Status of the run after ``advance`` returned ``code``."""
-        status = self._status(code)
-        notes = [*self._start_beyond(), *self._unproved()]
-        return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
-
-    def _start_beyond(self) -> Iterator[str]:
-        """What is to be said of guards that the start lies beyond."""
-        if self.beyond:
-            names = ", ".join(map(repr, self.beyond))
-            yield f"The start lies beyond the guard of {names}: only the next crossing fires."
-
-    def _unproved(self) -> Iterator[str]:
-        """What is to be said of guards whose crossings are not proved."""
-        steps = self.run.count.item(codes.UNPROVED)
-        if not steps:
-            return
-        names = self.system.transition_names
-        sampled = [repr(name) for i, name in enumerate(names) if self.compiled.emitted.is_sampled(i)]
-        if sampled:
-            yield (
-                f"The crossings of {', '.join(sampled)} are not proved: the guard could not be traced, so it "
-                "was sampled on each step. Write it with NumPy functions (np.sin, np.where)."
-            )
-        else:
-            yield (
-                f"On {steps} steps the crossings of a guard are not proved: it is too close to zero for too "
-                "long, so its signs at the ends of pieces of the step decided."
-            )
-
-    def _status(self, code: int) -> Status:
-        count = self.run.count.tolist()
-        singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
-        grazed = count[codes.ILL_CONDITIONED] if self.tangents else 0
-        if self.tangents and singular:
-            return Status(
-                StatusCode.SINGULAR_SALTATION,
-                f"{singular} of {self.jumps} jumps had no saltation matrix: they grazed exactly.",
-                "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
-            )
-        if code == codes.DONE and ambiguous:
-            also = f" Besides, {grazed} of {self.jumps} jumps grazed within the tolerances." if grazed else ""
-            return Status(
-                StatusCode.AMBIGUOUS_ORDER,
-                f"{ambiguous} times two guards were reached together and the order of their transitions "
-                f"mattered; the one listed first was fired first.{also}",
-                "Choose the order in which the transitions are listed, or add one for the corner.",
-            )
-        if code == codes.DONE and grazed:
-            return self._grazed(grazed)
-        where = f"at t = {self.t:.12g} in mode {self.mode!r}"
-        if code == codes.STUCK:
-            return stuck_status(where, [self.system.transitions[i] for i in self._round()], self._faces())
-        last = count[codes.LAST_FIRED]
-        name = self.system.transition_names[last] if last >= 0 else None
-        return run_status(code, where, name, at_rest=count[codes.AT_REST] == 1)
-
-    def _round(self) -> list[int]:
-        """The transitions that go round at the end of the run, in order; the last ones if they do not."""
-        jumps, recent = self.jumps, self.run.recent
-        fired = [int(recent[j % len(recent)]) for j in range(max(0, jumps - len(recent)), jumps)]
-        for length in range(1, len(fired) // 2 + 1):
-            if fired[length:] == fired[:-length]:
-                return fired[-length:]
-        return fired
-
-    def _faces(self) -> bool:
-        """Whether two modes send the state back to each other across one guard, without resets."""
-        fired, emitted = self._round(), self.compiled.emitted
-        if len(fired) != 2 or any(self.system.transitions[i].reset for i in fired):
-            return False
-        one, other = fired
-        towards = [self.system.transitions[i].guard.direction * emitted.orientation[i] for i in fired]
-        return emitted.surface[one] == emitted.surface[other] and towards[0] != towards[1]
+        return status_of(self, code)
 
 
 def start(

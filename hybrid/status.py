@@ -53,15 +53,14 @@ class Status:
         return f"{text} {self.remedy}" if self.remedy else text
 
 
+NAME_THE_LIMIT = (
+    "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
+)
 SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
 
 
-def run_status(code: int, where: str, transition: str | None, *, at_rest: bool) -> Status:
-    """Status of a run that ended with a kernel code, after a transition (or None).
-
-    ``at_rest`` tells the two ways to an accumulation apart: the state rests on the guard, or jumps were
-    followed to their limit.
-    """
+def run_status(code: int, where: str, transition: str | None) -> Status:
+    """Status of a run that ended with a kernel code, after a transition (or None)."""
     if code == StatusCode.SUCCESS:
         return SUCCESS
     last = f"transition {transition!r}" if transition else "a transition"
@@ -84,11 +83,8 @@ def run_status(code: int, where: str, transition: str | None, *, at_rest: bool) 
         ),
         StatusCode.ACCUMULATION: (
             f"After {last} the state rests on its guard {where} and is pushed through it: jumps of "
-            "length zero accumulate."
-            if at_rest
-            else f"Jumps of {last} accumulate {where}: the flights between them shorten by a steady ratio, "
-            "and infinitely many take a finite time.",
-            "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...).",
+            "length zero accumulate.",
+            NAME_THE_LIMIT,
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",
@@ -97,6 +93,18 @@ def run_status(code: int, where: str, transition: str | None, *, at_rest: bool) 
     }
     kind = StatusCode(code)
     return Status(kind, *texts[kind])
+
+
+def chatter_status(where: str, names: Sequence[str]) -> Status:
+    """Status of a run that ended in the limit of jumps of these transitions, in turn."""
+    told = f"transition {names[0]!r}" if len(names) == 1 else "transitions " + ", ".join(map(repr, names))
+    in_turn = "" if len(names) == 1 else " in turn"
+    return Status(
+        StatusCode.ACCUMULATION,
+        f"Jumps of {told}{in_turn} accumulate {where}: the flights between them shorten by a steady ratio, "
+        "and infinitely many take a finite time.",
+        NAME_THE_LIMIT,
+    )
 
 
 def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) -> Status:
@@ -109,8 +117,7 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
     if facing:
         return Status(
             StatusCode.STUCK,
-            f"{message} The fields of modes {transitions[0].source!r} and {transitions[1].source!r} point at "
-            "the guard between them.",
+            f"{message[:-1]}: the fields on both sides point at the guard.",
             "Add a sliding mode, or derive one with hybrid.filippov.",
         )
     return Status(

@@ -165,9 +165,9 @@ class Transition:
     reset
         What happens to the state there; ``None`` is the identity.
     accumulates_to
-        Mode in which the state rests on the guard after infinitely many jumps in finite time (chatter), if
-        this transition leads from a mode to itself and its jumps can accumulate. Without it a run ends at the
-        limit.
+        Mode in which the state goes on after infinitely many jumps in finite time (chatter), of this
+        transition alone or of several in turn. One of those in turn is enough to name the mode. Without it a
+        run ends at the limit.
     name
         Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
 
@@ -194,10 +194,10 @@ class Transition:
 
     @accumulates_to.validator
     def _check_limit(self, attribute: attrs.Attribute[str | None], value: object) -> None:
-        if value is not None and self.source != self.target:
+        if value is not None and self.target is None:
             raise ModelError(
-                f"Transition {self.source}->{self.target}: accumulates_to={value!r} is for transitions from "
-                "a mode to itself, whose jumps may accumulate. Leave it out."
+                f"Transition {self.source}->{END}: accumulates_to={value!r} is for transitions whose jumps "
+                "may accumulate, and this one ends the run. Leave it out, or name a target mode."
             )
 
     @name.default

@@ -9,12 +9,14 @@ from hybrid.kernels.codes import (
     CHATTERING,
     JUMPS,
     LAST_FIRED,
+    LAST_TRANSVERSALITY,
     MODE,
     PHASE,
     RESTITUTION,
 )
-from hybrid.kernels.guards import guard_acceleration, guard_speed, rounding_band
+from hybrid.kernels.guards import guard_acceleration, guard_speed, guard_value, rounding_band
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.rounds import fired_before
 
 # Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
 BEFORE = 0
@@ -32,6 +34,16 @@ LONG = 1.0
 ROUGH = 1e-6
 # Where its time still changes by more than this share, the limit is not looked for.
 FAR = 1e3 * ROUGH
+# Share by which a flight that drowns in rounding, and the speed after it, may differ from a steady series.
+STEADY = 0.5
+
+
+@njit(**KERNEL)
+def far_side(model, run, transition):
+    """The side of its guard on which the transition that has just fired found the state."""
+    if model.direction[transition] != 0:
+        return model.direction[transition]
+    return 1 if run.clock[LAST_TRANSVERSALITY] > 0.0 else -1
 
 
 @njit(**KERNEL)
@@ -42,7 +54,7 @@ def remaining_chatter(model, run, transition, speed, work):
     Zero if the flights do not shrink or nothing pulls the state back.
     """
     ratio = run.clock[RESTITUTION]
-    pull = model.direction[transition] * guard_acceleration(
+    pull = far_side(model, run, transition) * guard_acceleration(
         model, transition, run.count[MODE], run.clock[PHASE], run.y, work
     )
     if not (0.0 < ratio < 1.0 and pull > 0.0):
@@ -120,18 +132,27 @@ def accumulation(model, method, run, transition, since_last, work):
     n = model.dimension
     model.flow(run.count[MODE], run.clock[PHASE], run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
-    side = -model.direction[transition]
+    side = -far_side(model, run, transition)
     speed *= side
-    consecutive = run.count[CHATTER_JUMPS] + 1 == run.count[JUMPS] and run.count[CHATTERING] > 0
+    value = guard_value(model, transition, run.clock[PHASE], run.y, work.scalar)
+    band = rounding_band(model, run, transition, run.clock[PHASE], run.y, work)
     span, found = 0.0, False
-    if consecutive:
+    # A reset that leaves the guard begins no chatter.
+    if abs(value) <= band:
         span = remaining_chatter(model, run, transition, speed, work)
-    if span > 0.0:
+    if not span > 0.0:
+        run.count[CHATTERING] = 0
+        return 0.0
+    consecutive = run.count[CHATTER_JUMPS] + 1 == run.count[JUMPS] and run.count[CHATTERING] > 0
+    if consecutive and fired_before(run, 1) == transition:
         ratio = run.clock[RESTITUTION]
+        # The flight that has ended, and the speed after it, in the series with the ratio of this impact.
+        flight, slower = run.trail[LIMIT, n] * (1.0 - ratio), ratio * run.trail[BEFORE, n]
+        steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.clock[PHASE])
+        steady = steady and abs(speed - slower) <= STEADY * slower
         # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
         height = 0.25 * speed * span * (1.0 - ratio)
-        band = rounding_band(model, run, transition, run.clock[PHASE], run.y, work)
-        drowned = height <= band
+        drowned = steady and height <= band
         shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
         shift = span - (run.trail[LIMIT, n] - since_last)
         # The change is of second order in the speed, which each jump multiplies by the ratio.
@@ -148,12 +169,11 @@ def accumulation(model, method, run, transition, since_last, work):
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
         found = drowned or (shallow and (misfit <= 1.0 or floor))
         run.trail[IMPULSE, n] = misfit
-        run.trail[LIMIT, n] = span
         run.count[CHATTERING] += 1
     else:
         run.count[CHATTERING] = 1
-        run.trail[LIMIT, n], run.trail[IMPULSE, n] = math.inf, math.inf
-    run.trail[BEFORE, n] = speed
+        run.trail[LIMIT, 0], run.trail[IMPULSE, n] = math.inf, math.inf
+    run.trail[LIMIT, n], run.trail[BEFORE, n] = span, speed
     run.count[CHATTER_JUMPS] = run.count[JUMPS]
     return span if found else 0.0
 
@@ -240,7 +260,7 @@ def add_change_of_duration(model, method, run, target, span, work):
     """
     n, transition = model.dimension, run.count[LAST_FIRED]
     ratio, speed = run.clock[RESTITUTION], run.trail[BEFORE, n]
-    limit, side = run.clock[PHASE] + span, -model.direction[transition]
+    limit, side = run.clock[PHASE] + span, -far_side(model, run, transition)
     mean = work.trial
     pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
     model.flow(target, limit, work.settled, model.parameters, work.field_after)

@@ -130,7 +130,7 @@ def advance(
                 parts.finish_chatter(
                     model, method, run, record, fired, remaining, tangents, orthonormal, work
                 )
-                and model.accumulates_to[fired] == NO_MODE
+                and model.accumulates_to[run.count[LAST_FIRED]] == NO_MODE
             ):
                 return ACCUMULATION
             continue

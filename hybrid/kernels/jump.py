@@ -14,6 +14,7 @@ from hybrid.kernels.chatter import (
 )
 from hybrid.kernels.clock import forward
 from hybrid.kernels.codes import (
+    CHATTERING,
     CYCLE,
     EARLIER_JUMP_CYCLE,
     EARLIER_JUMP_PHASE,
@@ -35,10 +36,12 @@ from hybrid.kernels.codes import (
     MAP_IS_KNOWN,
     MODE,
     NO_MODE,
+    NO_TRANSITION,
     PHASE,
     PHASE_OF_RUN,
     PREVIOUS_MODE,
     RESTITUTION,
+    ROUND,
     SINCE_ENTRY,
     SINGULAR_JUMPS,
     STRAIN,
@@ -60,6 +63,7 @@ from hybrid.kernels.locked import (
     restore_tangents,
 )
 from hybrid.kernels.record import start_record
+from hybrid.kernels.rounds import limit_of_rounds, next_in_turn, remember_visit
 from hybrid.kernels.tangent import COLLAPSED, STRAINED, log_abs_determinant, multiply, orthonormalise, strain
 
 
@@ -205,13 +209,14 @@ def move(model, run, transition, target, x_plus):
     run.count[PREVIOUS_MODE] = run.count[MODE]
     run.count[MODE] = target
     run.count[PHASE_OF_RUN] = ENTERING
+    remember_visit(model, run)
 
 
 @njit(**KERNEL)
 def leave(model, run, transition, transversality, work):
     """Put the run behind a jump to ``work.new``."""
     mode, target = run.count[MODE], model.target[transition]
-    if mode == target and model.direction[transition] != 0:
+    if mode == target and model.marker[transition] == 0:
         remember_impulse(model, run, transition, transversality, work)
     move(model, run, transition, mode if target == NO_MODE else target, work.new)
 
@@ -223,7 +228,7 @@ def cross_without_map(model, run, transition, mode, work):
     model.flow(mode, t, run.y, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     model.reset(transition, t, run.y, model.parameters, work.new)
-    if mode == target and model.direction[transition] != 0:
+    if mode == target and model.marker[transition] == 0:
         model.flow(mode, t, work.new, model.parameters, work.field_after)
     postpone_map(run, model.dimension)
     return transversality
@@ -305,15 +310,13 @@ def remember_flight(run, record, n, span, x_limit):
         rows[k, n] = span if k == 1 else 0.0
 
 
-@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)
-def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
-    """After a jump: if its like accumulate before the end of the run, go to their limit; says whether it did.
-
-    The limit is a jump of its own, into the mode that the transition names for it, if it names one.
-    """
-    if run.count[MODE] != run.count[PREVIOUS_MODE] or model.direction[transition] == 0:
+@njit(**KERNEL)
+def follow_impacts(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+    """``finish_chatter`` for impacts of one transition on one guard, with the tangent map."""
+    if run.count[MODE] != run.count[PREVIOUS_MODE] or model.marker[transition] == 1:
         return False
     if not 0.0 < run.clock[RESTITUTION] < 1.0:
+        run.count[CHATTERING] = 0
         return False
     since_last = run.clock[PHASE] - run.clock[EARLIER_JUMP_PHASE]
     since_last += model.period * (run.count[CYCLE] - run.clock[EARLIER_JUMP_CYCLE])
@@ -338,8 +341,51 @@ def finish_chatter(model, method, run, record, transition, remaining, tangents, 
         model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
         drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
         drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
+    run.count[ROUND] = 1
     move(model, run, transition, target, x_limit)
     return True
+
+
+@njit(**KERNEL)
+def follow_rounds(model, method, run, record, remaining, tangents, work):
+    """``finish_chatter`` for transitions that fire in turn; the tangent map of their limit is not known."""
+    n = model.dimension
+    left, turn = limit_of_rounds(model, method, run, work)
+    if not 0.0 < left <= remaining:
+        return False
+    transition = next_in_turn(model, run, turn)
+    if transition == NO_TRANSITION:
+        return False
+    limit_mode = model.accumulates_to[transition]
+    target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
+    remember_flight(run, record, n, left, work.settled)
+    for i in range(n):
+        for j in range(n):
+            work.saltation[i, j] = math.nan
+    forward(run, model.period, left)
+    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
+    if tangents > 0:
+        run.count[SINGULAR_JUMPS] += 1
+        run.clock[LOG_DETERMINANT] = math.nan
+        for i in range(n, n * (1 + tangents)):
+            run.y[i] = math.nan
+    begin_instant(run, n, tangents, work)
+    for j in range(n):
+        run.instant[j] = math.nan
+    run.count[ROUND] = turn
+    move(model, run, transition, target, work.settled)
+    return True
+
+
+@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)
+def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+    """After a jump: if its like accumulate before the end of the run, go to their limit; says whether it did.
+
+    The limit is a jump of its own, into the mode that the transition names for it, if it names one.
+    """
+    if follow_impacts(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+        return True
+    return follow_rounds(model, method, run, record, remaining, tangents, work)
 
 
 @njit(void(MODEL, RUN, int64, int64, boolean, WORK), **PART)

@@ -134,7 +134,8 @@ class Run(Structure):
     vanishes at the last event or entry and has not been left since, 2 where its speed does too, 3 where its
     acceleration does as well; ``due (transitions,)`` is 1 where the guard has been crossed at this instant
     and its transition has not fired; ``recent`` are the last transitions that fired, jump ``j`` at ``j``
-    modulo its length, and ``rehearsal (3, transitions)`` is scratch for jumps that are only tried;
+    modulo its length, and ``visits (64, n + 2)`` the states right after them, the phases and the cycles;
+    ``rehearsal (3, transitions)`` is scratch for jumps that are only tried;
     ``first_step (modes,)`` remembers the step a mode began with and ``stay (modes,)`` how long the last stay
     in it was; ``scale (n,)`` the size of the components over the last step,
     against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the
@@ -153,6 +154,7 @@ class Run(Structure):
     due: INDICES
     recent: INDICES
     rehearsal: INDEX_MATRIX
+    visits: MATRIX
     first_step: VECTOR
     stay: VECTOR
     scale: VECTOR

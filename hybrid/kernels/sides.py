@@ -138,6 +138,8 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             crossed = order == 1 and before == -now and (direction == 0 or now == direction)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
+            # A guard that fires both ways and has been crossed has been taken back.
+            crossed = crossed and not (direction == 0 and due[transition] == 1)
         beyond = now == (direction if direction != 0 else before)
         pushed = came == LANDED and left == mode and was_on and not crossed and beyond and order == 2
         if pushed and due[transition] == 0 and model.marker[transition] == 0:

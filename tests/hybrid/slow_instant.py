@@ -1,7 +1,8 @@
-"""A plain, slow reference for what fires at one instant, where fields are constant: exact fractions, no tricks.
+"""A plain, slow reference for what fires at one instant, with constant fields and exact fractions.
 
-A transition is ``(source, target, guard, direction, reset, when)`` with ``guard = (component, place)`` for
-the guard ``x[component] - place``, and functions ``reset(x)`` and ``when(x)``.
+A transition is ``(source, target, guard, direction, reset, when)`` with ``guard = (component, place, name)``
+for the guard ``x[component] - place``, the same one for all with that name, and functions ``reset(x)`` and
+``when(x)``.
 """
 
 from fractions import Fraction
@@ -14,7 +15,7 @@ class Stuck(Exception):
 
 
 class Reference:
-    """One run: ``fired`` lists the times and the indices of the transitions, ``x`` and ``mode`` are the end."""
+    """One run: ``fired`` lists times and indices of transitions, ``x`` and ``mode`` are the end."""
 
     def __init__(self, velocities, transitions, x, mode, end, most=10_000):
         self.velocities, self.transitions = velocities, transitions
@@ -51,7 +52,7 @@ class Reference:
         return [i for i, each in enumerate(self.transitions) if each[0] == self.mode]
 
     def value(self, i):
-        component, place = self.transitions[i][2]
+        component, place, _ = self.transitions[i][2]
         return self.x[component] - place
 
     def speed(self, i):
@@ -130,7 +131,11 @@ class Reference:
         elif own:
             due = False
         elif before is None:
-            others = [each[3] for each in self.transitions if each[0] == self.mode and each[2] == self.transitions[j][2]]
+            others = [
+                each[3]
+                for each in self.transitions
+                if each[0] == self.mode and each[2] == self.transitions[j][2]
+            ]
             due = all(other == direction for other in others)
         elif before == -direction:
             due = True

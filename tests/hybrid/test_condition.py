@@ -123,12 +123,14 @@ def two_modes(when, **options):
 class TestEntry:
     @pytest.mark.parametrize("start", [0.0, 0.5])
     def test_a_start_on_or_beyond_the_guard(self, start):
-        """Fires at once if the condition holds there; if not it is behind the guard, and stays."""
+        """On the guard it fires at once if the condition holds there; if not, or beyond, it lies behind."""
         system = two_modes(lambda t, x, p: p.c + t)
         arc = simulate(system, (start,), (0.0, 1.0), mode="low")
-        assert [(jump.t, jump.target) for jump in arc.jumps] == [(0.0, "high")]
+        assert [(jump.t, jump.target) for jump in arc.jumps] == ([(0.0, "high")] if start == 0 else [])
+        assert ("counts as crossed" in arc.status.message) == (start > 0)
         arc = simulate(system, (start,), (0.0, 1.0), mode="low", parameters={"c": -0.5})
         assert not arc.jumps
+        assert "counts as crossed" not in arc.status.message
         np.testing.assert_allclose(arc.x[-1], [start + 1.0], atol=1e-14)
 
     def test_the_condition_tells_which_mode_a_start_is_in(self):
@@ -263,10 +265,12 @@ class TestEndOfTheRun:
         arc = simulate(self.SYSTEM, self.START, (0.0, 10.0), samples=np.arange(11.0))
         np.testing.assert_array_equal(arc.t, [0.0, 1.0, 2.0])
 
-    def test_a_start_beyond_ends_at_once(self):
+    def test_a_start_beyond_does_not_end_there(self):
+        """``-1 + 3 t - t^2`` meets ``t / 2`` from below first, and then from above."""
         arc = simulate(self.SYSTEM, (0.0, -1.0, 1.0, 3.0), (0.0, 10.0), mode="flight")
         assert arc.status.code == StatusCode.TERMINAL
-        assert arc.t[-1] == 0.0
+        assert "The start lies beyond the guard of 'landing'" in arc.status.message
+        assert arc.t[-1] == pytest.approx(2.0, rel=1e-14)
         with pytest.raises(hybrid.ArgumentError, match="left through 'landing'"):
             simulate(self.SYSTEM, (0.0, -1.0, 1.0, 3.0), (0.0, 10.0))
 

@@ -99,26 +99,6 @@ class TestExact:
         assert len(arc.jumps) == 2
         np.testing.assert_allclose(arc.fundamental, [[1, 0], [-5, 2.5]], atol=1e-13)
 
-    def test_a_start_beyond_a_guard(self, solver):
-        """Its time is that of the start, whatever the speed of the guard: only the reset counts."""
-        system = HybridSystem(
-            state=("x", "y"),
-            modes=[steady("b", 1.0, 2.0), steady("c", -1.0, 5.0), steady("d", 2.0, 7.0)],
-            transitions=[
-                Transition(
-                    "b",
-                    "c",
-                    Guard(lambda t, x, p: x.y, -1),
-                    Reset(lambda t, x, p: (x.x * x.y, 3 * x.y)),
-                ),
-                Transition("c", "d", Guard(lambda t, x, p: x.y + 1, -1)),
-            ],
-        )
-        arc = simulate(system, (2.0, -0.5), (0.25, 1.25), mode="b", solver=solver, tangent=True)
-        assert [jump.t for jump in arc.jumps] == [0.25, 0.25]
-        np.testing.assert_allclose(arc.fundamental, [[-0.5, 2.0], [0, 3]], atol=1e-13)
-        np.testing.assert_allclose(product(arc), arc.fundamental, atol=1e-13)
-
     def test_taken_up_again_between_the_jumps(self, solver):
         trajectory = start(chain(), (0.0, 0.5), 0.0, mode="a", solver=solver, tangent=np.eye(2))
         for jumps in (1, 2, 3):
