@@ -13,11 +13,15 @@ from weakref import WeakKeyDictionary
 import attrs
 import numpy as np
 
+from hybrid.agreement import check_agreement
 from hybrid.cache import announced, compiled_into, source_key, write_whole
-from hybrid.errors import ArgumentError
+from hybrid.errors import ArgumentError, ModelError
 from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
-from hybrid.load import address, load_kernels
+from hybrid.load import address, entry, load_kernels
+from hybrid.opaque import namespace_of, refusal_of
+from hybrid.periodicity import period_fault
+from hybrid.roles import CONDITION, Role
 from hybrid.surface import is_paired
 from hybrid.system import HybridSystem
 
@@ -34,6 +38,13 @@ ROLES = (
     "reset_jacobian",
     "series",
 )
+
+# The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
+ROLE_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
+GRADIENT = 3
+# Parameter vectors to remember.
+REMEMBERED = 10_000
+UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
 
 # Division by zero is infinite, not an error. The products of series may be fused into their sums; in a guard
 # that could make a difference of equal terms differ from zero.
@@ -55,18 +66,24 @@ class CompiledSystem:
         The compiled functions, in the order of ``ROLES``.
     plans
         What runs by one solver have in common, kept here by those who make runs.
+    periodic_at
+        Parameter vectors at which the declared period was found to be one, where that is not proved.
     """
 
     system: HybridSystem
     emitted: Emitted
     roles: tuple[Any, ...]
     plans: dict[Any, Any] = attrs.field(factory=dict, init=False)
+    periodic_at: set[bytes] = attrs.field(factory=set, init=False)
 
     def __repr__(self) -> str:
         system = self.system
         lines = [f"CompiledSystem of {system.name or 'a system'}: {system.dimension} states"]
-        for name, propagator in zip(system.mode_names, self.emitted.propagators, strict=True):
+        modes = zip(system.mode_names, self.emitted.propagators, self.emitted.discontinuities, strict=True)
+        for name, propagator, jumps in modes:
             lines.append(f"  mode {name}: {propagator}")
+            if jumps:
+                lines.append(f"    its field jumps where {jumps}: {UNCARRIED}")
         for index, name in enumerate(system.transition_names):
             lines.append(f"  transition {name}: {self._crossings_of(index)}")
         return "\n".join(lines)
@@ -79,6 +96,31 @@ class CompiledSystem:
         if emitted.is_sampled(transition):
             return "guard sampled on each step: its crossings are not proved"
         return "guard bounded on each step, its crossings are proved"
+
+    def value(self, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """A compiled function of the mode or transition of that index, ``(rows,)``; nan if it fails."""
+        out = np.full(role.rows, np.nan)
+        offset = len(self.system.transitions) if role.name == CONDITION else 0
+        self._call("vector_role", ROLE_NUMBERS[role.name], index + offset, t, x, parameters, out)
+        return out
+
+    def derivative(
+        self, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+    ) -> np.ndarray:
+        """Its derivative ``(rows, n + 1)``, that in time last."""
+        out = np.full((role.rows, self.system.dimension + 1), np.nan)
+        if role.size is None:
+            self._call("vector_role", GRADIENT, index, t, x, parameters, out[0])
+        else:
+            self._call("matrix_role", ROLE_NUMBERS[role.name], index, t, x, parameters, out)
+        return out
+
+    def _call(
+        self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
+    ) -> None:
+        call = entry(vars(load_kernels("hybrid.kernels.evaluate"))[kernel])
+        model = self._model.replace(parameters=np.array(parameters, dtype=float))
+        call(model, number, index, float(t), np.array(x, dtype=float), out)
 
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
@@ -100,10 +142,25 @@ class CompiledSystem:
         values = self.system.parameter_values(parameters)
         # Runs may share a model.
         values.flags.writeable = False
-        changes: dict[str, Any] = {"parameters": values, "period": period_at(self.system, values) or 0.0}
+        period = period_at(self.system, values) or 0.0
+        if parameters and not self.emitted.proved_period:
+            self._check_period(values, period)
+        changes: dict[str, Any] = {"parameters": values, "period": period}
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
         return self._model.replace(**changes)
+
+    def _check_period(self, values: np.ndarray, period: float) -> None:
+        """ModelError if the period is none at these values; they are remembered if it is one."""
+        key = values.tobytes()
+        if key in self.periodic_at:
+            return
+        fault = period_fault(self.system, values, period)
+        if fault is not None:
+            raise ModelError(fault)
+        if len(self.periodic_at) >= REMEMBERED:
+            self.periodic_at.clear()
+        self.periodic_at.add(key)
 
     @cached_property
     def _programs(self) -> Any:
@@ -187,7 +244,8 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     Raises
     ------
     ModelError
-        If a function can be neither traced nor differentiated, or a given derivative is wrong.
+        If a function can be neither traced nor compiled, nor differentiated, or the compiled function is not
+        the Python function.
     ArgumentError
         If ``system`` is not a HybridSystem.
     """
@@ -199,13 +257,19 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
         emitted = traced_or_kept(system)
         with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
             compiled = CompiledSystem(system, emitted, _compiled_roles(emitted))
+        check_agreement(compiled)
         _COMPILED[system] = compiled
     return compiled
 
 
 def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
     if emitted.opaque:
-        return _decorated(_executed(emitted), cached=False)
+        # Functions of the user's are compiled in this process, and never kept.
+        own = namespace_of(emitted)
+        try:
+            return _decorated(own, cached=False)
+        except Exception as error:
+            raise refusal_of(emitted, own, error) from error
     if emitted.source not in _ROLES:
         # Series call a kernel, which becomes part of them.
         folder = models_folder()
@@ -225,18 +289,6 @@ def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
         cfunc(types.get(role, VECTOR_ROLE).signature, cache=cached, **FUSED.get(role, IEEE))(namespace[role])
         for role in ROLES
     )
-
-
-def _executed(emitted: Emitted) -> dict[str, Any]:
-    """Roles that call functions of the user's as they are: compiled in this process, never kept."""
-    from numba import njit
-
-    namespace: dict[str, Any] = {
-        name: value if isinstance(value, type) else njit(error_model="numpy")(value)
-        for name, value in emitted.opaque.items()
-    }
-    exec(compile(emitted.source, "<hybrid model>", "exec"), namespace)
-    return namespace
 
 
 def _written(source: str, folder: Path) -> Path:

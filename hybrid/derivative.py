@@ -77,13 +77,13 @@ def complex_step_error(system: HybridSystem, role: Role) -> Exception | None:
     values = system.parameter_values()
     for t, x in sample_points(system.dimension):
         try:
-            complex_step = _complex_step(system, role, t, x, values)
+            found = complex_step(system, role, t, x, values)
         except ArithmeticError:
             continue
         except Exception as error:
             return error
         reference = _central_difference(system, role, t, x, values)
-        if reference is not None and not reference.confirms(complex_step):
+        if reference is not None and not reference.confirms(found):
             return ModelError("it runs on complex numbers, but is not differentiable there")
     return None
 
@@ -131,7 +131,7 @@ def reference_derivative(
     if difference is None:
         return None
     try:
-        values = _complex_step(system, role, t, x, parameters)
+        values = complex_step(system, role, t, x, parameters)
     except Exception:  # whatever stops it, the central difference stands in
         return difference
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
@@ -181,7 +181,8 @@ def derivative_fault(system: HybridSystem, role: Role, given: np.ndarray, refere
     column = (*system.state_names, "t")[j]
     return (
         f"{role.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
-        f"{reference.source} of the {role.name} gives {expected}. Mend it, or leave it out: it is derived."
+        f"{reference.source} of the {role.name} gives {expected}. Fix it, or leave it out: "
+        "the library derives it."
     )
 
 
@@ -234,13 +235,15 @@ class _ComplexState(np.ndarray):
         return complex(value) if isinstance(value, np.complexfloating) else value
 
 
-def _complex_step(
+def complex_step(
     system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
+    """Derivative ``(rows, n + 1)`` of a model function by the complex step, in plain Python."""
     p = parameter_view(system, parameters)
     columns = []
     for shift in COMPLEX_STEP * np.eye(len(x) + 1):
         z = x + 1j * shift[:-1]
+        z.flags.writeable = False
         state = z.view(_ComplexState) if isinstance(system.state, int) else state_values(system, z.tolist())
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             # Storing a complex number in a real array drops the derivative, with a mere warning.

@@ -8,7 +8,6 @@ columns, time last. The variational flow is the one role that reads all of ``x (
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -16,15 +15,18 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import sympy
 
+from hybrid.continuity import jumps_of, may_jump
 from hybrid.derivative import COMPLEX_STEP, complex_step_error, symbolic_jacobian
 from hybrid.emitted import Emitted, Propagator
 from hybrid.errors import ModelError
 from hybrid.kernels.codes import WIDE
 from hybrid.names import PARAMETERS, STATE, plain_class
+from hybrid.opaque import READONLY, OpaqueFunction, check_plain
+from hybrid.periodicity import is_periodic
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
 from hybrid.program import programs
-from hybrid.propagator import Boundary, propagator
+from hybrid.propagator import Boundary, known_positive, propagator, simplified
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
 from hybrid.series_loops import padded
 from hybrid.surface import surfaces
@@ -36,6 +38,8 @@ if TYPE_CHECKING:
 
 # A cell of a matrix in the statements for a derivative.
 _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
+# A state or a parameter in an expression.
+_INDEXED = re.compile(r"\b[xp]\[\d+\]")
 
 
 def emit(system: HybridSystem) -> Emitted:
@@ -52,12 +56,18 @@ def emit(system: HybridSystem) -> Emitted:
     guards = [writer.write(guard_role(transition)) for transition in system.transitions]
     conditions = [_written_condition(writer, transition) for transition in system.transitions]
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
-    propagators = [_propagator(writer, system, i, fields[i], guards) for i in range(len(fields))]
+    boundaries = [_boundaries(system, mode.name, guards, writer.symbols) for mode in system.modes]
+    propagators = [
+        propagator(field.expressions, around, writer.symbols)
+        for field, around in zip(fields, boundaries, strict=True)
+    ]
     functions = (
         _function("flow", [field.value for field in fields]),
         _function("flow_jacobian", [field.derivative for field in fields]),
         _function("variational_flow", [_variational(field, system.dimension) for field in fields]),
-        _function("guard", [*(guard.value for guard in guards), *conditions]),
+        _function(
+            "guard", [*(guard.value for guard in guards), *(condition.value for condition in conditions)]
+        ),
         _function("guard_gradient", [guard.derivative for guard in guards]),
         _function("reset", [reset.value for reset in resets]),
         _function("reset_jacobian", [reset.derivative for reset in resets]),
@@ -78,6 +88,10 @@ def emit(system: HybridSystem) -> Emitted:
         orientation=orientation,
         affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
+        discontinuities=tuple(
+            _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
+        ),
+        proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
         propagators=tuple(propagators),
         tangent_start=_tangent_start(propagators),
     )
@@ -126,7 +140,7 @@ class _Writer:
     def write(self, role: Role) -> _Written:
         targets = ["out[0]"] if role.size is None else [f"out[{i}]" for i in range(role.size)]
         try:
-            expressions = self._traced(role.function)
+            expressions = self.traced(role.function)
             jacobian = symbolic_jacobian(expressions, self.symbols.variables)
             _check_printable(entry for row in jacobian for entry in row)
         except ModelError as error:
@@ -138,13 +152,14 @@ class _Writer:
         given = role.derivative is not None
         return _Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
-    def condition(self, role: Role) -> list[str]:
+    def condition(self, role: Role) -> _Written:
         """Statements for the condition of a guard; a truth value becomes 1 or 0."""
         try:
-            [value] = self._traced(role.function)
-        except ModelError:
-            return self._opaque_value(role, ["out[0]"])
-        return assignments(["out[0]"], [Select(value, ONE, ZERO) if value.is_Boolean else value])
+            [value] = self.traced(role.function)
+        except ModelError as reason:
+            return _Written(self._opaque_value(role, ["out[0]"], reason), [])
+        statements = assignments(["out[0]"], [Select(value, ONE, ZERO) if value.is_Boolean else value])
+        return _Written(statements, [], [value])
 
     def identity(self) -> _Written:
         """The reset of a transition that has none."""
@@ -152,36 +167,35 @@ class _Writer:
         value = assignments([f"out[{i}]" for i in range(n)], self.symbols.x)
         cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
         entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
-        return _Written(value, assignments(cells, entries))
+        return _Written(value, assignments(cells, entries), [*self.symbols.x])
 
-    def _traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
+    def traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
+        """Expressions of a function; ModelError if it has none that can be compiled."""
         expressions = trace(function, self.system.state, tuple(self.system.parameters))
         _check_printable(expressions)
         return expressions
 
     def _write_opaque(self, role: Role, targets: Sequence[str], reason: ModelError) -> _Written:
-        value = self._opaque_value(role, targets)
+        value = self._opaque_value(role, targets, reason)
         if role.derivative is not None:
             return _Written(value, self._given_derivative(role, role.derivative))
         error = complex_step_error(self.system, role)
         if error is not None:
             raise ModelError(
                 f"{role.title} cannot be differentiated. Tracing stopped: {reason}. The complex step "
-                f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, np.where) "
-                f"or give its derivative as {role.derivative_name}=."
+                f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, "
+                f"np.maximum) or give its derivative as {role.derivative_name}=."
             ) from (reason.__cause__ or error)
-        return _Written(value, self._complex_step(role))
+        return _Written(value, self._complex_step(role, reason))
 
-    def _opaque_value(self, role: Role, targets: Sequence[str]) -> list[str]:
-        lines = [
-            f"v = {self._opaque_name(role.title, role.function)}(t, {self._state()}, {self._parameters()})"
-        ]
-        return lines + [
-            f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)
-        ]
+    def _opaque_value(self, role: Role, targets: Sequence[str], reason: ModelError) -> list[str]:
+        name = self._opaque_name(role.title, role.function, reason)
+        lines = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
+        lines += [f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)]
+        return _or_nan(lines, targets)
 
-    def _complex_step(self, role: Role) -> list[str]:
-        n, name = self.system.dimension, self._opaque_name(role.title, role.function)
+    def _complex_step(self, role: Role, reason: ModelError) -> list[str]:
+        n, name = self.system.dimension, self._opaque_name(role.title, role.function, reason)
         lines = []
         if isinstance(self.system.state, int):
             lines.append(f"z = x[:{n}].astype(np.complex128)")
@@ -194,37 +208,39 @@ class _Writer:
             if j < n:
                 lines.append(f"z[{j}] = complex(x[{j}], {COMPLEX_STEP!r})")
             # a copy, since the function may hand back a view of its argument
-            lines.append(f"v{j} = {name}({time}, z.copy(), {self._parameters()})")
+            lines.append(f"v{j} = {name}({time}, {READONLY}(z.copy()), {self._parameters()})")
             if j < n:
                 lines.append(f"z[{j}] = complex(x[{j}], 0.0)")
-        cells = iter(self._cells(role))
+        targets = self._cells(role)
+        cells = iter(targets)
         for i in range(role.rows):
             for j in range(n + 1):
                 value = f"v{j}" if role.size is None else f"v{j}[{i}]"
                 lines.append(f"{next(cells)} = {value}.imag / {COMPLEX_STEP!r}")
-        return lines
+        return _or_nan(lines, targets)
 
     def _given_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
         n, cells = self.system.dimension, self._cells(role)
         try:
-            entries = self._traced(derivative)
-        except ModelError:
-            return self._opaque_derivative(role, derivative)
+            entries = self.traced(derivative)
+        except ModelError as reason:
+            return self._opaque_derivative(role, derivative, reason)
         width = len(entries) // role.rows
         zeros = [ZERO] * (n + 1 - width)
         rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(role.rows)]
         return assignments(cells, [entry for row in rows for entry in row])
 
-    def _opaque_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
+    def _opaque_derivative(self, role: Role, derivative: Callable[..., Any], reason: ModelError) -> list[str]:
         n = self.system.dimension
-        name = self._opaque_name(role.derivative_title, derivative)
+        name = self._opaque_name(role.derivative_title, derivative, reason)
         lines = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
         width = n + 1 if derivative_has_time_column(self.system, role) else n
-        cells = iter(self._cells(role))
+        targets = self._cells(role)
+        cells = iter(targets)
         for i in range(role.rows):
             row = "v" if role.size is None else f"v[{i}]"
             lines += [f"{next(cells)} = {f'{row}[{j}]' if j < width else '0.0'}" for j in range(n + 1)]
-        return lines
+        return _or_nan(lines, targets)
 
     def _cells(self, role: Role) -> list[str]:
         columns = range(self.system.dimension + 1)
@@ -232,24 +248,19 @@ class _Writer:
             return [f"out[{j}]" for j in columns]
         return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
 
-    def _opaque_name(self, title: str, function: Callable[..., Any]) -> str:
+    def _opaque_name(self, title: str, function: Callable[..., Any], reason: ModelError) -> str:
         for name, known in self.opaque.items():
-            if known is function:
+            if isinstance(known, OpaqueFunction) and known.function is function:
                 return name
-        if not inspect.isfunction(function):
-            raise ModelError(
-                f"{title} cannot be traced, and is compiled as it is only if it is a plain function; got "
-                f"{function!r}. Write it with NumPy functions (np.sin, np.where), so that it can be traced, "
-                "or as a function (def or lambda) of (t, x, p) alone."
-            )
+        check_plain(title, function)
         name = f"model_{sum(key.startswith('model_') for key in self.opaque)}"
-        self.opaque[name] = function
+        self.opaque[name] = OpaqueFunction(title, function, str(reason).rstrip("."))
         return name
 
     def _state(self) -> str:
         state = self.system.state
         if isinstance(state, int):
-            return f"x[:{state}]"
+            return f"{READONLY}(x[:{state}])"
         self.opaque["State"] = plain_class(STATE, state)
         return f"State({', '.join(f'x[{i}]' for i in range(len(state)))})"
 
@@ -257,6 +268,12 @@ class _Writer:
         names = tuple(self.system.parameters)
         self.opaque["Parameters"] = plain_class(PARAMETERS, names)
         return f"Parameters({', '.join(f'p[{i}]' for i in range(len(names)))})"
+
+
+def _or_nan(lines: Sequence[str], targets: Sequence[str]) -> list[str]:
+    """Statements that store nan where a function raises an error, which compiled code has nobody to tell."""
+    failed = [f"    {target} = np.nan" for target in targets]
+    return ["try:", *(f"    {line}" for line in lines), "except Exception:", *failed]
 
 
 def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
@@ -270,20 +287,50 @@ def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Writte
     return writer.identity() if role is None else writer.write(role)
 
 
-def _propagator(
-    writer: _Writer, system: HybridSystem, index: int, field: _Written, guards: Sequence[_Written]
-) -> Propagator:
-    mode = system.modes[index].name
-    boundaries = [
+def _boundaries(
+    system: HybridSystem, mode: str, guards: Sequence[_Written], symbols: Symbols
+) -> list[Boundary]:
+    return [
         Boundary(
             None if written.expressions is None else written.expressions[0],
             -transition.guard.direction if _ends_mode(transition) else 0,
-            _is_affine(written, writer.symbols.variables),
+            _is_affine(written, symbols.variables),
         )
         for transition, written in zip(system.transitions, guards, strict=True)
         if transition.source == mode
     ]
-    return propagator(field.expressions, boundaries, writer.symbols)
+
+
+def _where_it_jumps(
+    system: HybridSystem, index: int, field: _Written, boundaries: Sequence[Boundary], symbols: Symbols
+) -> str:
+    """Where the field of a mode jumps in the state, in words; empty if it is proved to jump nowhere."""
+    if field.expressions is None:
+        role = field_role(system, system.modes[index])
+        differentiable = role.derivative is None or complex_step_error(system, role) is None
+        return "it branches" if may_jump(role.function, differentiable) else ""
+    known = known_positive(boundaries)
+    places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
+    names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
+    names |= {f"p[{i}]": name for i, name in enumerate(system.parameters)}
+    return ", or ".join(_INDEXED.sub(lambda match: names[match[0]], place) for place in places)
+
+
+def _has_proved_period(system: HybridSystem, written: Iterable[_Written], writer: _Writer) -> bool:
+    """Whether all traced functions are proved to have the declared period, at any parameters."""
+    if system.period is None:
+        return True
+    period: Any = system.period
+    symbols = writer.symbols
+    if callable(period):
+        try:
+            [period] = writer.traced(lambda t, x, p: system.period(p))  # type: ignore[operator,misc]
+        except ModelError:
+            return False
+    return all(
+        each.expressions is not None and is_periodic(each.expressions, symbols.t, sympy.sympify(period))
+        for each in written
+    )
 
 
 def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -> tuple[bool, ...]:
@@ -297,9 +344,9 @@ def _ends_mode(transition: Transition) -> bool:
     return transition.source != transition.target and transition.guard.when is None
 
 
-def _written_condition(writer: _Writer, transition: Transition) -> list[str]:
+def _written_condition(writer: _Writer, transition: Transition) -> _Written:
     role = condition_role(transition)
-    return [] if role is None else writer.condition(role)
+    return _Written([], [], []) if role is None else writer.condition(role)
 
 
 def _function(name: str, branches: Iterable[Sequence[str]], arguments: str = "index, t, x, p, out") -> str:

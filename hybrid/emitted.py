@@ -80,8 +80,8 @@ class Emitted:
         guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
         model gives the same text, in any process.
     opaque
-        What the text refers to by name: the model functions that tracing could not follow, to be
-        compiled themselves, and the named tuples they take. Empty if all were traced.
+        What the text refers to by name: the model functions that tracing could not follow, each an
+        ``OpaqueFunction``, and the named tuples they take. Empty if all were traced.
     affine_guard
         By transition: whether the guard's gradient, its slope in time included, is proved to depend on
         parameters only.
@@ -96,6 +96,10 @@ class Emitted:
         factor, and the sign of that factor.
     autonomous
         By mode: whether the field is proved not to depend on time.
+    discontinuities
+        By mode: where the field jumps in the state, in words; empty where it is proved to be continuous.
+    proved_period
+        Whether every function is proved to have the declared period, whatever the parameters.
     propagators
         By mode: how it is best advanced.
     tangent_start
@@ -111,6 +115,8 @@ class Emitted:
     orientation: tuple[int, ...]
     affine_mode: tuple[bool, ...]
     autonomous: tuple[bool, ...]
+    discontinuities: tuple[str, ...]
+    proved_period: bool
     propagators: tuple[Propagator, ...]
     tangent_start: int
 

@@ -60,6 +60,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "several transitions that accumulate in turn.",
             "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
         )
+    if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
+        return _discontinuous(trajectory)
     if code == codes.DONE and ambiguous:
         also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""
         return Status(
@@ -80,6 +82,18 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         return chatter_status(where, [names[i] for i in _recent(trajectory, count[codes.ROUND])])
     last = count[codes.LAST_FIRED]
     return run_status(code, where, names[last] if last >= 0 else None)
+
+
+def _discontinuous(trajectory: Trajectory) -> Status:
+    modes = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
+    places = [f"the field of mode {mode!r} jumps where {jumps}" for mode, jumps in modes if jumps]
+    return Status(
+        StatusCode.DISCONTINUOUS_FIELD,
+        f"Reached the end, but {', and '.join(places)}: tangent vectors, and what is made of them, are not "
+        "valid beyond such a jump.",
+        "Make the pieces of the field modes joined by guards there; where they point at each other, "
+        "hybrid.filippov derives the sliding mode between them.",
+    )
 
 
 def _grazed(trajectory: Trajectory, grazed: int) -> Status:

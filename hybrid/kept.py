@@ -56,13 +56,13 @@ def traced_or_kept(system: HybridSystem) -> Emitted:
     """What `emit` makes of a system, or what it made of the same one before."""
     operations = operations_of(system)
     if operations is None:
-        return _traced(system)[0]
+        return _traced(system)
     path = models_folder() / f"emitted_{_digest(operations)}.json"
     kept = _read(path)
     if kept is not None:
         return kept
-    emitted, complete = _traced(system)
-    if complete:
+    emitted = _traced(system)
+    if not emitted.opaque:
         write_whole(path, json.dumps(attrs.asdict(emitted), default=int))
     return emitted
 
@@ -79,6 +79,7 @@ def operations_of(system: HybridSystem) -> str | None:
     """
     try:
         functions = [_listed(system, role) for role in roles(system)]
+        period = _listed_period(system)
     except Exception:
         return None
     graph = [
@@ -93,7 +94,7 @@ def operations_of(system: HybridSystem) -> str | None:
         ]
         for transition in system.transitions
     ]
-    return json.dumps([system.state, [*system.parameters], [*system.mode_names], graph, functions])
+    return json.dumps([system.state, [*system.parameters], [*system.mode_names], graph, functions, period])
 
 
 def _listed(system: HybridSystem, role: Role) -> list[Any]:
@@ -113,6 +114,21 @@ def _listed(system: HybridSystem, role: Role) -> list[Any]:
     return [role.owner, role.name, *lists]
 
 
+def _listed_period(system: HybridSystem) -> Any:
+    """The declared period: a number, or the operations that make one."""
+    period: Any = system.period
+    if not callable(period):
+        return None if period is None else float(period).hex()
+    operations = Operations()
+    p = [operations.listed("p", i) for i in range(len(system.parameters))]
+    names = tuple(system.parameters)
+    try:
+        values = values_of(lambda t, x, p: period(p), 1, names, operations, (-1, [-1], p))
+    except Exception:
+        return "cannot be traced"
+    return [[*operations.places], values]
+
+
 def _digest(operations: str) -> str:
     return hashlib.sha256(f"{_tracer()}\n{operations}".encode()).hexdigest()
 
@@ -128,21 +144,18 @@ def _tracer() -> str:
     return " ".join([digest, sys.version, np.__version__, *versions])
 
 
-def _traced(system: HybridSystem) -> tuple[Emitted, bool]:
-    """What emitting finds, and whether all of it follows from operations."""
+def _traced(system: HybridSystem) -> Emitted:
+    """What emitting finds; SymPy is imported only now."""
     from hybrid.emit import emit
-    from hybrid.trace import SYMBOLIC
 
-    failures = SYMBOLIC.failures
-    emitted = emit(system)
-    return emitted, not emitted.opaque and SYMBOLIC.failures == failures
+    return emit(system)
 
 
 def _read(path: Path) -> Emitted | None:
     try:
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        for name in (*of_transitions, "affine_mode", "autonomous"):
+        for name in (*of_transitions, "affine_mode", "autonomous", "discontinuities"):
             kept[name] = tuple(kept[name])
         rows, numbers, first = (kept["programs"][name] for name in ("rows", "numbers", "first"))
         kept["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hybrid.errors import ModelError, unknown_name
 
 if TYPE_CHECKING:
@@ -57,8 +59,12 @@ def named_values(kind: str, names: tuple[str, ...], values: Iterable[Any]) -> An
 
 
 def state_values(system: HybridSystem, values: Any) -> Any:
-    """The state as model functions see it: by name, or as given if the system only has a dimension."""
-    return values if isinstance(system.state, int) else named_values(STATE, system.state, values)
+    """The state as model functions see it: by name, or read-only if the system only has a dimension."""
+    if not isinstance(system.state, int):
+        return named_values(STATE, system.state, values)
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view
 
 
 def parameter_view(system: HybridSystem, values: Iterable[Any]) -> Any:

@@ -34,7 +34,7 @@ MATH_FUNCTIONS: dict[type[sympy.Basic], str] = {
     sympy.acosh: "acosh",
     sympy.atanh: "atanh",
     hypot: "hypot",
-    sym.TruncatedRemainder: "fmod",
+    sym.TruncatedRemainder: "np.fmod",
     sym.Absolute: "abs",
     sympy.Abs: "abs",
     # math.floor gives an integer, which cannot hold every float
@@ -46,7 +46,7 @@ MATH_FUNCTIONS: dict[type[sympy.Basic], str] = {
 IMPORTS = (
     "import numpy as np\n"
     "from math import (\n"
-    "    acos, acosh, asin, asinh, atan, atan2, atanh, copysign, cos, cosh, exp, expm1, fmod, hypot, inf,\n"
+    "    acos, acosh, asin, asinh, atan, atan2, atanh, copysign, cos, cosh, exp, expm1, hypot, inf,\n"
     "    log, log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
     ")\n"
     "from hybrid.kernels.columns import (\n"

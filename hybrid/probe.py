@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.derivative import check_derivative
+from hybrid.derivative import check_derivative, evaluate, sample_points
 from hybrid.errors import ModelError
 from hybrid.names import parameter_view, state_values
 from hybrid.roles import CONDITION, Role, roles
@@ -38,6 +38,7 @@ def probe_system(system: HybridSystem) -> None:
         _probe_role(system, role)
     if callable(system.period):
         _probe_period(system)
+    _check_period(system)
 
 
 def sample_state(system: HybridSystem) -> np.ndarray:
@@ -65,8 +66,22 @@ def _probe_role(system: HybridSystem, role: Role) -> None:
     value = _call(role.title, role.function, arguments)
     if value is not None:
         _check_value(system, role, value[0])
+        _check_pure(system, role)
     if role.derivative is not None:
         _probe_derivative(system, role, arguments)
+
+
+def _check_pure(system: HybridSystem, role: Role) -> None:
+    """The same arguments must give the same values, however often and in whatever order they come."""
+    values, points = system.parameter_values(), [*sample_points(system.dimension)]
+    passes = [[evaluate(system, role.function, t, x, values) for t, x in points] for _ in range(2)]
+    for (t, x), first, second in zip(points, *passes, strict=True):
+        if first is not None and second is not None and not np.array_equal(first, second):
+            raise ModelError(
+                f"{role.title} returned {first.tolist()} and, called again with the same arguments "
+                f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
+                "random numbers, no counters, nothing kept between calls."
+            )
 
 
 def _probe_derivative(system: HybridSystem, role: Role, arguments: tuple[Any, ...]) -> None:
@@ -85,6 +100,21 @@ def _probe_period(system: HybridSystem) -> None:
         raise ModelError(f"{title} must return a number; got {value[0]!r}.")
 
 
+def _check_period(system: HybridSystem) -> None:
+    """A declared period must be one at the declared parameters."""
+    from hybrid.periodicity import period_fault
+    from hybrid.system import period_at
+
+    values = system.parameter_values()
+    try:
+        period = period_at(system, values)
+    except (ArithmeticError, ValueError):  # told by the run at these parameters
+        return
+    fault = None if period is None else period_fault(system, values, period)
+    if fault is not None:
+        raise ModelError(fault)
+
+
 def _call(
     title: str, function: Callable[..., Any], arguments: tuple[Any, ...], signature: str = "t, x, p"
 ) -> tuple[Any] | None:
@@ -100,6 +130,11 @@ def _call(
     except Exception as error:
         if isinstance(error, ValueError) and "math domain" in str(error):
             return None
+        if isinstance(error, ValueError) and "read-only" in str(error):
+            raise ModelError(
+                f"{title} writes into its argument, which is the state of the run: {error}. Take a copy "
+                "first, x = x.copy(), or build the values anew."
+            ) from error
         raise ModelError(
             f"{title} fails when called with ({signature}): {type(error).__name__}: {error}."
         ) from error

@@ -68,7 +68,7 @@ def propagator(
     """The propagator of a mode from its traced field (None if it could not be traced) and its guards."""
     if field is None:
         return Propagator(RUNGE_KUTTA, 0, "its field is not traced")
-    known = [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
+    known = known_positive(boundaries)
     try:
         with distribute(False):
             return _series(field, boundaries, known, symbols)
@@ -76,10 +76,15 @@ def propagator(
         return Propagator(RUNGE_KUTTA, 0, str(reason))
 
 
+def known_positive(boundaries: Iterable[Boundary]) -> list[sympy.Expr]:
+    """What is positive or zero in the whole mode, since it ends where its guards say."""
+    return [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
+
+
 def _series(
     field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], known: list[sympy.Expr], symbols: Symbols
 ) -> Propagator:
-    field = [_simplified(entry, known) for entry in field]
+    field = [simplified(entry, known) for entry in field]
     z = _singular_base(field, known)
     if z is not None:
         held = [_is_held(boundary, z) for boundary in boundaries]
@@ -126,11 +131,11 @@ def _columns(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy
     return [b.guard if is_held and b.guard is not None else ZERO for b, is_held in pairs]
 
 
-def _simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
+def simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
     """The expression where everything in ``known`` is positive or zero."""
     if not expression.has(Maximum, Minimum, Absolute, Sign, Step, Select):
         return expression
-    args = [_simplified(argument, known) for argument in expression.args]
+    args = [simplified(argument, known) for argument in expression.args]
     if isinstance(expression, Maximum | Minimum):
         a, b = args
         sign = _sign_of(a - b, known) * (1 if isinstance(expression, Maximum) else -1)

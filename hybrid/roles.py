@@ -81,15 +81,20 @@ def reset_role(system: HybridSystem, transition: Transition) -> Role | None:
     return Role(owner, "reset", reset.function, "jacobian", reset.jacobian, system.dimension)
 
 
-def roles(system: HybridSystem) -> Iterator[Role]:
-    """Every model function of a system, fields first."""
-    for mode in system.modes:
-        yield field_role(system, mode)
-    for transition in system.transitions:
-        yield guard_role(transition)
+def indexed_roles(system: HybridSystem) -> Iterator[tuple[int, Role]]:
+    """Every model function with the index of its mode or transition, fields first."""
+    for index, mode in enumerate(system.modes):
+        yield index, field_role(system, mode)
+    for index, transition in enumerate(system.transitions):
+        yield index, guard_role(transition)
         condition = condition_role(transition)
         if condition is not None:
-            yield condition
+            yield index, condition
         reset = reset_role(system, transition)
         if reset is not None:
-            yield reset
+            yield index, reset
+
+
+def roles(system: HybridSystem) -> Iterator[Role]:
+    """Every model function of a system, fields first."""
+    return (role for _, role in indexed_roles(system))

@@ -29,6 +29,7 @@ class StatusCode(IntEnum):
     SINGULAR_SALTATION = 100
     NOT_CONVERGED = 101
     NOT_RUN = 102
+    DISCONTINUOUS_FIELD = 103
 
 
 @attrs.frozen

@@ -18,17 +18,7 @@ from hybrid.ufuncs import RULES
 
 
 class SymbolicAlgebra:
-    """Traced numbers as SymPy expressions.
-
-    Attributes
-    ----------
-    failures
-        How often a rule has failed, which a model function may have caught: what it did then no list of its
-        operations tells.
-    """
-
-    def __init__(self) -> None:
-        self.failures = 0
+    """Traced numbers as SymPy expressions."""
 
     def number(self, value: Any) -> sympy.Expr:
         """A number of the same value."""
@@ -36,11 +26,7 @@ class SymbolicAlgebra:
 
     def combined(self, name: str, contents: tuple[sympy.Expr, ...]) -> sympy.Expr:
         """What the rule of that name makes of expressions."""
-        try:
-            return RULES[name](*contents)
-        except Exception:
-            self.failures += 1
-            raise
+        return RULES[name](*contents)
 
     def expression(self, content: sympy.Expr) -> sympy.Expr:
         """The content itself."""

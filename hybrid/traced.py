@@ -55,6 +55,8 @@ class Algebra(Protocol):
 
 
 _ALGEBRA: ContextVar[Algebra] = ContextVar("_ALGEBRA")
+# What could not be followed since the function was called, in order.
+_REFUSALS: ContextVar[list[TraceError]] = ContextVar("_REFUSALS")
 
 
 @contextmanager
@@ -71,13 +73,21 @@ class TraceError(ModelError):
     """Tracing cannot follow a model function; the text says what stopped it and what to write instead."""
 
 
+def refusal(text: str) -> TraceError:
+    """A TraceError that is also noted down, since the model function may catch it and go on another way."""
+    error = TraceError(text)
+    _REFUSALS.get([]).append(error)
+    return error
+
+
 NEEDS_NUMBER = (
     "a number is needed where tracing has a symbol: use np.sin in place of math.sin (and so on), and "
     "np.zeros_like(x) in place of np.zeros to fill an array"
 )
+NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
 NEEDS_DECISION = (
-    "a branch cannot be traced: use np.where or np.maximum (in place of if, and, max), or make it a mode "
-    "with a guard"
+    "a branch cannot be traced: make its sides modes joined by a guard, or write np.maximum, np.clip or "
+    "np.where (in place of if, and, max) where the value does not jump at the switch"
 )
 
 
@@ -89,10 +99,27 @@ class Traced(NDArrayOperatorsMixin):
     def __init__(self, content: Any) -> None:
         self.content = content
 
+    # Python hands out np.float64, and so a question after the type gets the same answer here.
+    __class__ = property(lambda self: np.float64)
+
     @property
     def expression(self) -> Any:
         """The SymPy expression that it stands for."""
         return _ALGEBRA.get().expression(self.content)
+
+    @property
+    def real(self) -> Traced:
+        """The number itself, which is real."""
+        return self
+
+    @property
+    def imag(self) -> float:
+        """Zero."""
+        return 0.0
+
+    def conjugate(self) -> Traced:
+        """The number itself, which is real."""
+        return self
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method == "__call__" and not options and not any(isinstance(i, np.ndarray) for i in inputs):
@@ -106,22 +133,45 @@ class Traced(NDArrayOperatorsMixin):
         # np.cos of an object array, np.array([x.q, x.v]) say, calls the method cos of each element.
         if name in UFUNCS:
             return lambda *others: _lifted(name)(self, *others)
-        raise AttributeError(f"a traced number has no attribute {name!r}")
+        text = f"a traced number has no attribute {name!r}"
+        if not name.startswith("__") and hasattr(np.float64, name):
+            refusal(text)
+        raise AttributeError(text)
 
     def __bool__(self) -> bool:
-        raise TraceError(NEEDS_DECISION)
+        raise refusal(NEEDS_DECISION)
 
     def __float__(self) -> float:
-        raise TraceError(NEEDS_NUMBER)
+        raise refusal(NEEDS_NUMBER)
 
     def __int__(self) -> int:
-        raise TraceError(NEEDS_NUMBER)
+        raise refusal(NEEDS_NUMBER)
 
     def __complex__(self) -> complex:
-        raise TraceError(NEEDS_NUMBER)
+        raise refusal(NEEDS_NUMBER)
 
     def __index__(self) -> int:
-        raise TraceError(NEEDS_NUMBER)
+        raise refusal(NEEDS_NUMBER)
+
+    def __trunc__(self) -> int:
+        raise refusal(NEEDS_NUMBER)
+
+    def __floor__(self) -> int:
+        raise refusal(NEEDS_NUMBER)
+
+    def __ceil__(self) -> int:
+        raise refusal(NEEDS_NUMBER)
+
+    def __round__(self, digits: int | None = None) -> int:
+        raise refusal(NEEDS_NUMBER)
+
+    def __hash__(self) -> int:
+        raise refusal("a number is needed as a key: a table that is looked up by the state cannot be traced")
+
+    def __format__(self, specification: str) -> str:
+        if specification:
+            raise refusal(NEEDS_NUMBER)
+        return repr(self)
 
     def __repr__(self) -> str:
         return f"Traced({self.expression})"
@@ -130,6 +180,11 @@ class Traced(NDArrayOperatorsMixin):
 class TracedArray(np.ndarray):
     """An object array of traced numbers, on which NumPy's functions act element by element."""
 
+    def __setitem__(self, key: Any, value: Any) -> None:
+        if not self.flags.writeable:
+            raise refusal(NEEDS_COPY)
+        super().__setitem__(key, value)
+
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         return _apply(ufunc, method, inputs, options)
 
@@ -137,17 +192,31 @@ class TracedArray(np.ndarray):
         if function in FUNCTIONS:
             return _apply_function(function, args, kwargs)
         # NumPy does the rest on object arrays, and mixes in single numbers if told they belong there
-        return _wrapped(super().__array_function__(function, (TracedArray,), args, kwargs))
+        try:
+            return _wrapped(super().__array_function__(function, (TracedArray,), args, kwargs))
+        except TraceError:
+            raise
+        except Exception as error:
+            raise refusal(
+                f"np.{function.__name__} cannot be traced: {type(error).__name__}: {error}"
+            ) from error
 
 
 def _known(ufunc: np.ufunc) -> str:
     if ufunc.__name__ not in UFUNCS:
-        raise TraceError(f"np.{ufunc.__name__} cannot be traced")
+        raise refusal(f"np.{ufunc.__name__} cannot be traced")
     return str(ufunc.__name__)
 
 
 def _lifted(name: str) -> Callable[..., Traced]:
-    return lambda *arguments: Traced(_ALGEBRA.get().combined(name, tuple(map(_content, arguments))))
+    def combine(*arguments: Any) -> Traced:
+        contents = tuple(map(_content, arguments))
+        try:
+            return Traced(_ALGEBRA.get().combined(name, contents))
+        except Exception as error:
+            raise refusal(f"np.{name}: {type(error).__name__}: {error}") from error
+
+    return combine
 
 
 def _content(value: Any) -> Any:
@@ -157,8 +226,8 @@ def _content(value: Any) -> Any:
         return _content(value[()])
     try:
         return _ALGEBRA.get().number(value)
-    except (TypeError, ValueError):
-        raise TraceError(f"{value!r} is not a number") from None
+    except (TypeError, ValueError, OverflowError):
+        raise refusal(f"{value!r} is not a number") from None
 
 
 def _plain(value: Any) -> np.ndarray:
@@ -189,7 +258,7 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
 
 def _where(condition: Any, *choices: Any) -> Any:
     if len(choices) != 2:
-        raise TraceError("np.where needs both values to be traced: np.where(condition, a, b)")
+        raise refusal("np.where needs both values to be traced: np.where(condition, a, b)")
     return _wrapped(np.frompyfunc(_lifted(WHERE), 3, 1)(*map(_plain, (condition, *choices))))
 
 
@@ -200,7 +269,35 @@ def _clipped(a: Any, a_min: Any = None, a_max: Any = None, **bounds: Any) -> Any
     return a if high is None else np.minimum(a, high)
 
 
-FUNCTIONS: dict[Any, Callable[..., Any]] = {np.where: _where, np.clip: _clipped}
+def _select(conditions: Any, choices: Any, default: Any = 0) -> Any:
+    if len(conditions) != len(choices):
+        raise refusal("np.select needs one choice per condition")
+    value = default
+    for condition, choice in reversed([*zip(conditions, choices, strict=True)]):
+        value = _where(condition, choice, value)
+    return value
+
+
+def _piecewise(x: Any, conditions: Any, functions: Any, *args: Any, **kwargs: Any) -> Any:
+    if isinstance(conditions, Traced):
+        conditions = [conditions]
+    extra = len(functions) - len(conditions)
+    if extra not in (0, 1):
+        raise refusal("np.piecewise needs one function per condition, and at most one more")
+    values = [each(x, *args, **kwargs) if callable(each) else each for each in functions]
+    # The last condition that holds decides, as where NumPy fills an array.
+    value = values[-1] if extra else 0
+    for condition, other in zip(conditions, values, strict=False):
+        value = _where(condition, other, value)
+    return value
+
+
+FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.where: _where,
+    np.clip: _clipped,
+    np.select: _select,
+    np.piecewise: _piecewise,
+}
 
 
 def _apply_function(function: Any, args: Any, kwargs: Any) -> Any:
@@ -208,7 +305,12 @@ def _apply_function(function: Any, args: Any, kwargs: Any) -> Any:
         return FUNCTIONS[function](*args, **kwargs)
     # Anything else, np.sum((a, b)) say, NumPy can do on object arrays, if it can do it at all.
     plain = (_plain(argument) if _holds_traced(argument) else argument for argument in args)
-    return _wrapped(function(*plain, **kwargs))
+    try:
+        return _wrapped(function(*plain, **kwargs))
+    except TraceError:
+        raise
+    except Exception as error:
+        raise refusal(f"np.{function.__name__} cannot be traced: {type(error).__name__}: {error}") from error
 
 
 def _holds_traced(argument: Any) -> bool:
@@ -224,12 +326,27 @@ def values_of(
     algebra: Algebra,
     symbols: tuple[Any, Iterable[Any], Iterable[Any]],
 ) -> list[Any]:
-    """Contents of a model function's values, in one row, for ``t``, ``x`` and ``p`` with given contents."""
+    """Contents of a model function's values, in one row, for ``t``, ``x`` and ``p`` with given contents.
+
+    Raises
+    ------
+    TraceError
+        If the function cannot be followed, or goes on where it could not be: then it has caught the error,
+        and what it returns is not what it returns on numbers.
+    """
     t, states, values = symbols
     x: Any = np.array([Traced(content) for content in states], dtype=object).view(TracedArray)
     x.flags.writeable = False
     if not isinstance(state, int):
         x = named_values(STATE, state, x)
     p = named_values(PARAMETERS, parameters, map(Traced, values))
-    with in_terms_of(algebra):
-        return [_content(value) for value in _plain(function(Traced(t), x, p)).ravel()]
+    refusals: list[TraceError] = []
+    token = _REFUSALS.set(refusals)
+    try:
+        with in_terms_of(algebra):
+            contents = [_content(value) for value in _plain(function(Traced(t), x, p)).ravel()]
+    finally:
+        _REFUSALS.reset(token)
+    if refusals:
+        raise refusals[0]
+    return contents

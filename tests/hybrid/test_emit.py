@@ -13,6 +13,7 @@ from hybrid.derivative import sample_points
 from hybrid.emit import emit
 from hybrid.errors import ModelError
 from hybrid.names import parameter_view, state_values
+from hybrid.opaque import READONLY, OpaqueFunction, namespace_of
 from hybrid.roles import field_role, guard_role, reset_role
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
 
@@ -21,10 +22,12 @@ ROLES = ("flow", "flow_jacobian", "guard", "guard_gradient", "reset", "reset_jac
 
 def load(emitted, *, compiled):
     """The six roles as functions."""
-    scope = dict(emitted.opaque)
     if compiled:
-        scope = {k: v if isinstance(v, type) else numba.njit(v) for k, v in scope.items()}
-    exec(emitted.source, scope)
+        scope = namespace_of(emitted)
+    else:
+        scope = {k: v.function if isinstance(v, OpaqueFunction) else v for k, v in emitted.opaque.items()}
+        scope[READONLY] = lambda x: x
+        exec(emitted.source, scope)
     functions = (scope[name] for name in ROLES)
     return dict(
         zip(ROLES, (numba.njit(f, error_model="numpy") if compiled else f for f in functions), strict=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import models
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition, kept
+from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition, kept
 from hybrid.emit import emit
 from hybrid.kept import models_folder, operations_of, traced_or_kept
 from hybrid.traced import UFUNCS, WHERE
@@ -255,7 +255,12 @@ def caught(t, x, p):
     return x.v, square
 
 
-@pytest.mark.parametrize("field", [opaque, shown, proved, caught])
+def test_a_function_that_catches_what_stops_tracing_is_refused(emissions):
+    with pytest.raises(ModelError, match=r"Mode 'swing': field cannot be traced, and what catches errors"):
+        traced_or_kept(oscillator(caught))
+
+
+@pytest.mark.parametrize("field", [opaque, shown, proved])
 def test_functions_that_operations_do_not_tell_all_of_are_traced_each_time(field, emissions):
     for count in (1, 2):
         traced_or_kept(oscillator(field))

@@ -42,7 +42,10 @@ def test_views_of_a_system():
     plain = HybridSystem(state=2, modes=[Mode("a", lambda t, x, p: -x)])
     values = np.array([3.0, 4.0])
     assert state_values(named, [3.0]).q == 3.0
-    assert state_values(plain, values) is values
+    view = state_values(plain, values)
+    np.testing.assert_array_equal(view, values)
+    with pytest.raises(ValueError, match="read-only"):
+        view[0] = 1.0
     assert parameter_view(named, [5.0]).k == 5.0
 
 

@@ -1,0 +1,199 @@
+"""How model functions that could not be traced are compiled: whole numbers do not wrap around in silence.
+
+Python's whole numbers have no largest one, numba's have 64 bits. Here a result that does not fit raises an
+error; a number too large for an index is a float from the start, and so is every power of whole numbers.
+"""
+
+import math
+import operator
+
+from numba.core import ir, types
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.imputils import impl_ret_borrowed
+from numba.core.ir_utils import build_definitions, guard
+from numba.core.untyped_passes import IRProcessing
+from numba.extending import intrinsic, overload
+
+# Whole numbers beyond this are no indices.
+LARGEST_INDEX = 2**31
+# No whole number of 64 bits is as large as this.
+TOO_LARGE = 9.2e18
+TEXT = "a whole number beyond 2**63"
+
+
+def _fits(a, b):
+    """Whether two numbers are whole and of Python's kind, so that their result may not fit."""
+    return isinstance(a, types.Integer) and isinstance(b, types.Integer) and types.uint64 not in (a, b)
+
+
+def _checked(name, whole, other):
+    """A function of two numbers that is ``whole`` of whole ones and ``other`` of any others."""
+
+    def stub(a, b):
+        return other(a, b)
+
+    stub.__name__ = stub.__qualname__ = name
+    overload(stub)(lambda a, b: whole if _fits(a, b) else (lambda a, b: other(a, b)))
+    return stub
+
+
+def _sum(a, b):
+    if abs(float(a) + float(b)) > TOO_LARGE:
+        raise OverflowError(TEXT)
+    return a + b
+
+
+def _difference(a, b):
+    if abs(float(a) - float(b)) > TOO_LARGE:
+        raise OverflowError(TEXT)
+    return a - b
+
+
+def _product(a, b):
+    if abs(float(a) * float(b)) > TOO_LARGE:
+        raise OverflowError(TEXT)
+    return a * b
+
+
+def _power(a, b):
+    return float(a) ** float(b)
+
+
+def _quotient(a, b):
+    if b == 0:
+        raise ZeroDivisionError("division by zero")
+    return a / b
+
+
+def _whole_quotient(a, b):
+    if b == 0:
+        raise ZeroDivisionError("division by zero")
+    return a // b
+
+
+def _remainder(a, b):
+    if b == 0:
+        raise ZeroDivisionError("division by zero")
+    return a % b
+
+
+def _shift(a, b):
+    if b < 0 or b > 62 or abs(float(a)) * 2.0**b > TOO_LARGE:
+        raise OverflowError(TEXT)
+    return a << b
+
+
+WHOLE = {
+    "add": _sum,
+    "sub": _difference,
+    "mul": _product,
+    "pow": _power,
+    "truediv": _quotient,
+    "floordiv": _whole_quotient,
+    "mod": _remainder,
+    "lshift": _shift,
+}
+OPERATIONS = {}
+for _name, _of_whole in WHOLE.items():
+    for _prefix in ("", "i"):
+        _operator = getattr(operator, _prefix + _name)
+        OPERATIONS[_operator] = _checked(f"whole_{_prefix}{_name}", _of_whole, _operator)
+
+
+def _rounding(function):
+    """A function that makes a whole number of a float."""
+
+    def stub(a):
+        return function(a)
+
+    def implementation(a):
+        def of_float(a):
+            if not abs(a) <= TOO_LARGE:
+                raise OverflowError(TEXT)
+            return function(a)
+
+        return of_float if isinstance(a, types.Float) else (lambda a: function(a))
+
+    overload(stub)(implementation)
+    return stub
+
+
+ROUNDINGS = {function: _rounding(function) for function in (int, math.floor, math.ceil, math.trunc)}
+
+
+@intrinsic
+def readonly(typing_context, array):
+    """The array, which what is called with it cannot write into."""
+
+    def same(context, builder, signature, arguments):
+        return impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
+
+    return array.copy(readonly=True)(array), same
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _CheckWholeNumbers(FunctionPass):
+    """Replace what could wrap around."""
+
+    _name = "check_whole_numbers"
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state):
+        """Whether anything was replaced."""
+        func_ir, changed = state.func_ir, False
+        for block in func_ir.blocks.values():
+            body = []
+            for statement in block.body:
+                if isinstance(statement, ir.Assign):
+                    changed |= _replace(func_ir, statement, body)
+                body.append(statement)
+            block.body = body
+        if changed:
+            func_ir._definitions = build_definitions(func_ir.blocks)
+        return changed
+
+
+def _replace(func_ir, statement, body):
+    """Replace the value of one assignment if need be; what it needs before goes to ``body``."""
+    value, place = statement.value, statement.loc
+    if isinstance(value, ir.Const | ir.Global | ir.FreeVar):
+        known = value.value
+        if type(known) is int and abs(known) > LARGEST_INDEX:
+            statement.value = ir.Const(float(known), place)
+            return True
+        return _replace_rounding(statement, known)
+    if not isinstance(value, ir.Expr):
+        return False
+    if value.op == "getattr":
+        owner = guard(func_ir.get_definition, value.value)
+        module = getattr(owner, "value", None)
+        return _replace_rounding(statement, getattr(module, value.attr, None) if module is math else None)
+    if value.op in ("binop", "inplace_binop") and value.fn in OPERATIONS:
+        function = ir.Var(statement.target.scope, f"$whole.{len(body)}.{place.line}.{id(statement)}", place)
+        stub = OPERATIONS[value.fn]
+        body.append(ir.Assign(ir.Global(stub.__name__, stub, place), function, place))
+        statement.value = ir.Expr.call(function, (value.lhs, value.rhs), (), place)
+        return True
+    return False
+
+
+def _replace_rounding(statement, function):
+    stub = ROUNDINGS.get(function) if callable(function) else None
+    if stub is None:
+        return False
+    statement.value = ir.Global("rounding", stub, statement.loc)
+    return True
+
+
+class WholeNumberCompiler(CompilerBase):
+    """Numba's passes, and one that replaces arithmetic on whole numbers."""
+
+    def define_pipelines(self):
+        """The one pipeline."""
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        pipeline.add_pass_after(_CheckWholeNumbers, IRProcessing)
+        pipeline.finalize()
+        return [pipeline]
