@@ -46,6 +46,16 @@ def check_agreement(compiled: CompiledSystem) -> None:
                 raise ModelError(fault)
 
 
+def compiled_value(
+    compiled: CompiledSystem, role: Role, index: int, t: float, x: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """The compiled function as it runs."""
+    return compiled.value(role, index, t, x, values)
+
+
+Value = Callable[..., np.ndarray]
+
+
 def comparison_points(system: HybridSystem) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     """Times, states ``(n,)`` and parameter vectors ``(m,)``: the declared one, and others near to it."""
     declared = system.parameter_values()
@@ -60,11 +70,20 @@ def comparison_points(system: HybridSystem) -> Iterator[tuple[float, np.ndarray,
 
 
 def disagreement(
-    compiled: CompiledSystem, role: Role, index: int, t: float, x: np.ndarray, values: np.ndarray
+    compiled: CompiledSystem,
+    role: Role,
+    index: int,
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    value: Value = compiled_value,
 ) -> str | None:
-    """Where a compiled function, or its derivative if Python has one, is not Python's; None if nowhere."""
+    """Where a compiled function, or its derivative if Python has one, is not Python's; None if nowhere.
+
+    ``value`` is what evaluates the compiled function.
+    """
     system = compiled.system
-    found = compiled.value(role, index, t, x, values)
+    found = value(compiled, role, index, t, x, values)
     text = _difference(system, role.title, role.function, found, t, x, values)
     if text is not None or role.name == CONDITION:
         return text

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dis
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -79,11 +79,55 @@ def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Exp
             if ratio and type(atom) not in (*ROUNDING, *REMAINDERS):
                 together.append((other, other_sides if ratio > 0 else other_sides[::-1]))
     together.append((atom, sides))
-    ends = []
-    for side in (0, 1):
-        values = {each: pair[side] for each, pair in together}
-        ends.append(_without_choices(_replaced(entry, values, names)))
-    return _vanishes_on(ends[1] - ends[0], _replaced(surface, {}, names))
+    ours = {each for each, _ in together}
+    bare = _replaced(surface, {}, names)
+    for old, new in _substitutions(bare):
+        # Some of the other atoms are known where this one jumps: q < 1 where q = 0.
+        known = {
+            other: side
+            for other in names
+            if other not in ours and (side := _known_side(other, step, names, old, new)) is not None
+        }
+        below, above = (
+            _without_choices(_replaced(entry, known | {each: pair[side] for each, pair in together}, names))
+            for side in (0, 1)
+        )
+        if _is_zero((above - below).subs(old, new)):
+            return True
+    return False
+
+
+def _substitutions(surface: sympy.Expr) -> Iterator[tuple[sympy.Expr, sympy.Expr]]:
+    """What to put for what, so that a surface vanishes."""
+    variables = [each for each in surface.free_symbols if each.name == "t" or each.name.startswith("x[")]
+    for variable in sorted(variables, key=sympy.default_sort_key):
+        # A slope that depends on the state may vanish, where the surface has another sheet.
+        slope = surface.diff(variable)
+        if slope != 0 and not slope.has(*variables) and not slope.atoms(sympy.Dummy):
+            yield variable, sympy.expand(variable - surface / slope)
+    for term in sympy.Add.make_args(surface):
+        if not (term.is_number or term.is_Symbol):
+            coefficient, factor = term.as_coeff_Mul()
+            yield factor, factor - surface / coefficient
+
+
+def _known_side(
+    atom: sympy.Expr,
+    step: sympy.Symbol,
+    names: Mapping[sympy.Expr, sympy.Dummy],
+    old: sympy.Expr,
+    new: sympy.Expr,
+) -> sympy.Expr | None:
+    """What an atom is with one expression put for another, if its side is known then."""
+    if isinstance(atom, (*ROUNDING, *REMAINDERS, Atan2)):
+        return None
+    surface, sides = _sides(atom, step)
+    if surface is None:
+        return None
+    height = sympy.expand(_replaced(surface, {}, names).subs(old, new))
+    if not (height.is_number and height.is_real) or height == 0:
+        return None
+    return sides[1] if height.is_positive else sides[0]
 
 
 def _sides(atom: sympy.Expr, step: sympy.Symbol) -> tuple[sympy.Expr | None, tuple[sympy.Expr, sympy.Expr]]:
@@ -178,29 +222,6 @@ def _truth(raw: sympy.Expr, value: sympy.Expr) -> sympy.Expr:
     if is_truth or value in (ZERO, ONE):
         return value
     return ONE
-
-
-def _vanishes_on(difference: sympy.Expr, surface: sympy.Expr) -> bool:
-    """Whether the difference is proved to vanish where the surface does."""
-    if _is_zero(difference):
-        return True
-    variables = [s for s in surface.free_symbols if s.name == "t" or s.name.startswith("x[")]
-    for variable in sorted(variables, key=sympy.default_sort_key):
-        # A slope that depends on the state may vanish, where the surface has another sheet.
-        slope = surface.diff(variable)
-        if slope == 0 or slope.has(*variables) or slope.atoms(sympy.Dummy):
-            continue
-        there = variable - surface / slope
-        if _is_zero(difference.subs(variable, sympy.expand(there))):
-            return True
-    # The surface is where some expression has a given value: let it have that value.
-    for term in sympy.Add.make_args(surface):
-        if term.is_number or term.is_Symbol:
-            continue
-        coefficient, factor = term.as_coeff_Mul()
-        if _is_zero(difference.subs(factor, factor - surface / coefficient)):
-            return True
-    return False
 
 
 def _is_zero(expression: sympy.Expr) -> bool:

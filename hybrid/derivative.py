@@ -155,7 +155,7 @@ def evaluate(
     try:
         with np.errstate(all="ignore"):
             values = np.ravel(np.asarray(function(np.float64(t), state_values(system, x), p), dtype=float))
-    except (ArithmeticError, ValueError):
+    except Exception:  # whatever stops it there, it has no value there
         return None
     return values if np.all(np.isfinite(values)) else None
 

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 import attrs
 
 from hybrid.kernels import codes
-from hybrid.status import Status, StatusCode, chatter_status, run_status, stuck_status
+from hybrid.status import (
+    Status,
+    StatusCode,
+    chatter_status,
+    discontinuous_status,
+    run_status,
+    stuck_status,
+)
 
 if TYPE_CHECKING:
     from hybrid.run import Trajectory
@@ -26,7 +33,8 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
     if trajectory.beyond:
         names = ", ".join(map(repr, trajectory.beyond))
         yield (
-            f"The start lies beyond the guard of {names}, which counts as crossed: only the next crossing fires."
+            f"The start lies beyond the guard of {names}, which counts as crossed: only the next crossing "
+            "fires."
         )
 
 
@@ -61,7 +69,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
         )
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
-        return _discontinuous(trajectory)
+        jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
+        return discontinuous_status({mode: where for mode, where in jumping if where})
     if code == codes.DONE and ambiguous:
         also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""
         return Status(
@@ -82,18 +91,6 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         return chatter_status(where, [names[i] for i in _recent(trajectory, count[codes.ROUND])])
     last = count[codes.LAST_FIRED]
     return run_status(code, where, names[last] if last >= 0 else None)
-
-
-def _discontinuous(trajectory: Trajectory) -> Status:
-    modes = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
-    places = [f"the field of mode {mode!r} jumps where {jumps}" for mode, jumps in modes if jumps]
-    return Status(
-        StatusCode.DISCONTINUOUS_FIELD,
-        f"Reached the end, but {', and '.join(places)}: tangent vectors, and what is made of them, are not "
-        "valid beyond such a jump.",
-        "Make the pieces of the field modes joined by guards there; where they point at each other, "
-        "hybrid.filippov derives the sliding mode between them.",
-    )
 
 
 def _grazed(trajectory: Trajectory, grazed: int) -> Status:

@@ -62,7 +62,7 @@ def namespace_of(emitted: Emitted) -> dict[str, Any]:
     """The generated roles, with the functions that they call compiled by their first call."""
     from numba import njit
 
-    from hybrid.kernels.whole import WholeNumberCompiler, readonly
+    from hybrid.whole import WholeNumberCompiler, readonly
 
     compiled = njit(error_model="numpy", boundscheck=True, pipeline_class=WholeNumberCompiler)
     namespace: dict[str, Any] = {
@@ -76,7 +76,7 @@ def namespace_of(emitted: Emitted) -> dict[str, Any]:
 
 def _own_copy(function: Callable[..., Any]) -> FunctionType:
     """The function with defaults that are floats where they are large whole numbers."""
-    from hybrid.kernels.whole import LARGEST_INDEX
+    from hybrid.whole import LARGEST_INDEX
 
     assert isinstance(function, FunctionType)
     defaults = tuple(

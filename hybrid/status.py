@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
@@ -126,4 +126,16 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
         f"{message} Each one takes the state beyond the guard of the next.",
         "Change the resets so that one of them leaves the state on the near side of these guards, or give a "
         "guard a condition (when=).",
+    )
+
+
+def discontinuous_status(jumps: Mapping[str, str]) -> Status:
+    """Status of a run with tangent vectors in a system whose fields jump: where, by the name of the mode."""
+    places = [f"the field of mode {mode!r} jumps where {where}" for mode, where in jumps.items()]
+    return Status(
+        StatusCode.DISCONTINUOUS_FIELD,
+        f"Reached the end, but {', and '.join(places)}: tangent vectors, and what is made of them, are not "
+        "valid beyond such a jump.",
+        "Make the pieces of the field modes joined by guards there; where they point at each other, "
+        "hybrid.filippov derives the sliding mode between them.",
     )

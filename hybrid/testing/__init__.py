@@ -9,6 +9,7 @@ from hybrid.testing.check import PropertyReport, SystemReport, check_system
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.events import check_jumps, check_sides
+from hybrid.testing.functions import check_compiled, check_period
 from hybrid.testing.invariance import (
     check_cut,
     check_elastic,
@@ -36,6 +37,7 @@ __all__ = [
     "Run",
     "SystemReport",
     "cases",
+    "check_compiled",
     "check_continuity",
     "check_crossings",
     "check_cut",
@@ -46,6 +48,7 @@ __all__ = [
     "check_jumps",
     "check_names",
     "check_order",
+    "check_period",
     "check_saltation",
     "check_samples",
     "check_scale",

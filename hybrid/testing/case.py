@@ -10,8 +10,9 @@ import attrs
 import numpy as np
 from hypothesis.errors import UnsatisfiedAssumption
 
+from hybrid.agreement import compiled_value
 from hybrid.arc import HybridArc, Jump
-from hybrid.compile import compile_system
+from hybrid.compile import CompiledSystem, compile_system
 from hybrid.derivative import evaluate
 from hybrid.errors import ArgumentError
 from hybrid.roles import Role
@@ -57,16 +58,19 @@ class Engine:
         self, system: HybridSystem, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray
     ) -> np.ndarray:
         """The derivative ``(rows, n + 1)`` that runs use of the field of a mode, a guard or a reset."""
-        model = compile_system(system).model()
-        functions = {
-            "field": model.flow_jacobian,
-            "guard": model.guard_gradient,
-            "reset": model.reset_jacobian,
-        }
-        out = np.zeros((role.rows, system.dimension + 1))
-        with np.errstate(all="ignore"):
-            functions[role.name](index, np.float64(t), x, parameters, out[0] if role.size is None else out)
-        return out
+        return compile_system(system).derivative(role, index, t, x, parameters)
+
+    def value(
+        self,
+        compiled: CompiledSystem,
+        role: Role,
+        index: int,
+        t: float,
+        x: np.ndarray,
+        parameters: np.ndarray,
+    ) -> np.ndarray:
+        """The values ``(rows,)`` that runs use of a field, a guard, its condition or a reset."""
+        return compiled_value(compiled, role, index, t, x, parameters)
 
 
 LIBRARY = Engine()

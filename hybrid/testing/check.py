@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import attrs
@@ -13,6 +13,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis.errors import Unsatisfiable, UnsatisfiedAssumption
 from hypothesis.strategies import SearchStrategy
 
+from hybrid.compile import compile_system
 from hybrid.run import check_count
 from hybrid.solvers import RungeKutta
 from hybrid.system import HybridSystem
@@ -20,6 +21,7 @@ from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mod
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
+from hybrid.testing.functions import COMPILED, PERIOD, check_compiled, check_period
 from hybrid.testing.invariance import (
     CUT,
     ELASTIC,
@@ -97,11 +99,13 @@ class SystemReport:
     properties
         One :class:`PropertyReport` each.
     unfit
-        How many runs could not be judged, by reason; only derivatives were looked at.
+        How many runs could not be judged, by reason; only the functions themselves were looked at.
     jumps
         How often each transition was taken, by name.
     visits
         How often each mode was entered or started in, by name.
+    discontinuities
+        Where fields jump, by mode: tangent vectors are not valid beyond.
     """
 
     name: str
@@ -109,6 +113,7 @@ class SystemReport:
     unfit: Counter[str]
     jumps: Counter[str]
     visits: Counter[str]
+    discontinuities: Mapping[str, str]
 
     @property
     def unchecked(self) -> tuple[str, ...]:
@@ -125,6 +130,11 @@ class SystemReport:
         if self.unfit:
             lines.append(f"- {self.unfit.total()} runs could not be judged ({_most_common(self.unfit)}).")
         lines += [f"- {found}" for found in self.properties]
+        for mode, jumps in self.discontinuities.items():
+            lines.append(
+                f"- The field of mode {mode!r} jumps where {jumps}: tangent vectors are not valid beyond. "
+                "Make its pieces modes joined by guards there."
+            )
         if self.never_seen:
             lines.append(f"- Never seen: {', '.join(self.never_seen)}. Give ranges that lead there.")
         return "\n".join(lines)
@@ -199,6 +209,8 @@ def check_system(
     check_count("examples", examples, 1)
     properties: dict[str, Callable[[Case], None]] = {
         DERIVATIVES: check_derivatives,
+        COMPILED: check_compiled,
+        PERIOD: check_period,
         JUMPS: check_jumps,
         SIDES: check_sides,
         CROSSINGS: check_crossings,
@@ -278,7 +290,7 @@ class _Tally:
         if self.failed:
             names = [self.failed]
         else:
-            names = list(self.properties) if self._is_fit(case) else [DERIVATIVES]
+            names = list(self.properties) if self._is_fit(case) else [DERIVATIVES, COMPILED, PERIOD]
         for name in names:
             try:
                 self.properties[name](case)
@@ -313,4 +325,6 @@ class _Tally:
         found = [PropertyReport(name, self.held[name], self.discarded[name]) for name in self.properties]
         if without_elastic:
             found.append(PropertyReport(ELASTIC, 0, Counter({"elastic= is not given": 1})))
-        return SystemReport(name, tuple(found), self.unfit, self.jumps, self.visits)
+        told = compile_system(self.system).emitted.discontinuities
+        jumps = {mode: text for mode, text in zip(self.system.mode_names, told, strict=True) if text}
+        return SystemReport(name, tuple(found), self.unfit, self.jumps, self.visits, jumps)

@@ -19,6 +19,8 @@ from numba.extending import intrinsic, overload
 LARGEST_INDEX = 2**31
 # No whole number of 64 bits is as large as this.
 TOO_LARGE = 9.2e18
+# Powers up to this one are products in Python too.
+MOST_FACTORS = 100
 TEXT = "a whole number beyond 2**63"
 
 
@@ -33,8 +35,15 @@ def _checked(name, whole, other):
     def stub(a, b):
         return other(a, b)
 
+    def implementation(a, b):
+        if _fits(a, b):
+            return whole
+        if name.endswith("pow") and isinstance(a, types.Complex) and not isinstance(b, types.Complex):
+            return _complex_power
+        return lambda a, b: other(a, b)
+
     stub.__name__ = stub.__qualname__ = name
-    overload(stub)(lambda a, b: whole if _fits(a, b) else (lambda a, b: other(a, b)))
+    overload(stub)(implementation)
     return stub
 
 
@@ -58,6 +67,20 @@ def _product(a, b):
 
 def _power(a, b):
     return float(a) ** float(b)
+
+
+def _complex_power(a, b):
+    """As in Python by products, which keep a small imaginary part, and with it the complex step."""
+    n = int(b)
+    if n != b or abs(n) > MOST_FACTORS:
+        return a ** complex(b, 0.0)
+    power, factor, left = complex(1.0, 0.0), a, abs(n)
+    while left > 0:
+        if left % 2 == 1:
+            power *= factor
+        factor *= factor
+        left //= 2
+    return 1.0 / power if n < 0 else power
 
 
 def _quotient(a, b):

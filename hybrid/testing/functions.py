@@ -1,0 +1,59 @@
+"""The functions that run are the functions that were written, and repeat as declared."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.agreement import disagreement
+from hybrid.compile import compile_system
+from hybrid.periodicity import period_fault_at
+from hybrid.roles import indexed_roles
+from hybrid.testing.case import Case, discard
+
+COMPILED = "The compiled functions equal the Python functions"
+PERIOD = "The declared period is a period of every function"
+
+
+def check_compiled(case: Case) -> None:
+    """Every compiled function equals its Python function at the start of the case, up to rounding.
+
+    Raises
+    ------
+    PropertyError
+        If a value of a field, guard, condition, reset or given derivative differs.
+    """
+    compiled = compile_system(case.system)
+    x = np.array(case.x0)
+    for index, role in indexed_roles(case.system):
+        value = case.engine.value
+        fault = disagreement(compiled, role, index, case.t0, x, case.values, value)
+        if fault is not None:
+            case.fail(
+                COMPILED,
+                fault,
+                hint="a function that depends on more than the values of its arguments.",
+            )
+
+
+def check_period(case: Case) -> None:
+    """Every function has the same values one declared period later, at the start of the case.
+
+    Raises
+    ------
+    PropertyError
+        If one has not.
+    """
+    system, x = case.system, np.array(case.x0)
+    period = system.forcing_period(case.parameters)
+    if period is None:
+        discard("no period is declared")
+    phase = case.t0 % period
+    for _, role in indexed_roles(system):
+        fault = period_fault_at(system, role, phase, x, case.values, period)
+        if fault is not None:
+            case.fail(
+                PERIOD,
+                fault,
+                hint="a number in the period where a function has a parameter; or time that enters a "
+                "function outside of its forcing.",
+            )
