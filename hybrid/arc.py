@@ -186,8 +186,8 @@ class Pieces:
 
     Attributes
     ----------
-    t, h
-        Start and length of each step, ``(S,)``.
+    t, low, h
+        Start of each step, what the start has lost in rounding, and length, ``(S,)``.
     mode, j
         Mode index and jump count of each, ``(S,)``.
     coefficients
@@ -196,6 +196,7 @@ class Pieces:
     """
 
     t: np.ndarray
+    low: np.ndarray
     h: np.ndarray
     mode: np.ndarray
     j: np.ndarray
@@ -206,7 +207,7 @@ class Pieces:
         states = np.empty((len(times), self.coefficients.shape[2] - 1))
         index = np.empty(len(times), dtype=np.int64)
         kernel = entry(load_kernels("hybrid.kernels.dense").states_at)
-        kernel(np.ascontiguousarray(times), self.t, self.h, self.coefficients, states, index)
+        kernel(np.ascontiguousarray(times), self.t, self.low, self.h, self.coefficients, states, index)
         return states, index
 
 

@@ -179,17 +179,17 @@ class CompiledSystem:
         from hybrid.kernels.layout import Model
 
         system = self.system
-        outgoing, first = [], [0]
-        for name in system.mode_names:
-            outgoing += [i for i, transition in enumerate(system.transitions) if transition.source == name]
-            first.append(len(outgoing))
         transitions = system.transitions
+        first_outgoing, outgoing = _leaving(system, at_entry=False)
+        first_at_entry, at_entry = _leaving(system, at_entry=True)
         return Model(
             **dict(zip(ROLES, self.roles, strict=True)),
             parameters=system.parameter_values(),
             dimension=system.dimension,
-            first_outgoing=_indices(first),
-            outgoing=_indices(outgoing),
+            first_outgoing=first_outgoing,
+            outgoing=outgoing,
+            first_at_entry=first_at_entry,
+            at_entry=at_entry,
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             affine_guard=_indices(self.emitted.affine_guard),
@@ -205,10 +205,31 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
+            timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
             tangent_start=self.emitted.tangent_start,
             tangent_columns=_indices(propagator.tangent_columns for propagator in self.emitted.propagators),
             period=0.0,
         )
+
+    def _is_timed(self, mode: int) -> bool:
+        """Whether the field of a mode, or one of the guards in it, may depend on time."""
+        emitted, name = self.emitted, self.system.mode_names[mode]
+        pairs = zip(self.system.transitions, emitted.timed_guard, strict=True)
+        return not emitted.autonomous[mode] or any(timed for each, timed in pairs if each.source == name)
+
+
+def _leaving(system: HybridSystem, *, at_entry: bool) -> tuple[np.ndarray, np.ndarray]:
+    """First places, and the indices of the transitions that leave each mode, whose guards are of one kind."""
+    indices: list[int] = []
+    first = [0]
+    for name in system.mode_names:
+        indices += [
+            i
+            for i, transition in enumerate(system.transitions)
+            if transition.source == name and transition.guard.at_entry == at_entry
+        ]
+        first.append(len(indices))
+    return _indices(first), _indices(indices)
 
 
 @attrs.frozen

@@ -92,6 +92,7 @@ def emit(system: HybridSystem) -> Emitted:
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
         ),
         proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
+        timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
         propagators=tuple(propagators),
         tangent_start=_tangent_start(propagators),
     )
@@ -297,7 +298,7 @@ def _boundaries(
             _is_affine(written, symbols.variables),
         )
         for transition, written in zip(system.transitions, guards, strict=True)
-        if transition.source == mode
+        if transition.source == mode and not transition.guard.at_entry
     ]
 
 

@@ -100,6 +100,8 @@ class Emitted:
         By mode: where the field jumps in the state, in words; empty where it is proved to be continuous.
     proved_period
         Whether every function is proved to have the declared period, whatever the parameters.
+    timed_guard
+        By transition: whether the guard may depend on time.
     propagators
         By mode: how it is best advanced.
     tangent_start
@@ -117,6 +119,7 @@ class Emitted:
     autonomous: tuple[bool, ...]
     discontinuities: tuple[str, ...]
     proved_period: bool
+    timed_guard: tuple[bool, ...]
     propagators: tuple[Propagator, ...]
     tangent_start: int
 

@@ -90,7 +90,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code == codes.ACCUMULATION and not count[codes.AT_REST]:
         return chatter_status(where, [names[i] for i in _recent(trajectory, count[codes.ROUND])])
     last = count[codes.LAST_FIRED]
-    return run_status(code, where, names[last] if last >= 0 else None)
+    bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(count[codes.MODE]) == 1
+    return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
 
 
 def _grazed(trajectory: Trajectory, grazed: int) -> Status:

@@ -11,14 +11,10 @@ import numpy as np
 from hybrid.errors import ModelError
 from hybrid.system import Guard, HybridSystem, Mode, ModelFunction, Reset, Transition
 
-# A state further from the surface than this share of its size does not slide, and is in the mode of its
-# side. What the integration lets the state drift while it slides is far less.
-SLIDING_BAND = 1e-6
 # Two fields that both move through the surface slower than this share of their speeds are tangent to it.
 TANGENT = 1e-9
-# An orbit that would go no further than this beyond the surface before it turns back has not arrived there,
-# in the same measure.
-TOUCH = 1e-15
+# An orbit that comes to the surface slower than this share of its speed, and turns back, only touches it.
+TOUCH = 3e-8
 
 
 def filippov(
@@ -66,8 +62,8 @@ def filippov(
     -------
     HybridSystem
         Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run, and
-        ``sliding too high`` and ``sliding too low``, which a start in the sliding mode takes if it is further
-        than 1e-6 from the surface, relative to ``1 + |x|``.
+        ``below too high``, ``above too low``, ``sliding too high`` and ``sliding too low``: a start takes one of
+        them if it lies off the surface, by more than rounding, where its mode does not belong.
 
     Raises
     ------
@@ -109,16 +105,14 @@ def filippov(
     if surface.may_attract(state, tuple(parameters)):
         modes.append(Mode("sliding", surface.sliding_field))
         transitions = [
+            _entered("below", "above", switching),
+            _entered("above", "below", switching),
+            _entered("sliding", "above", switching),
+            _entered("sliding", "below", switching),
             Transition("below", "sliding", Guard(switching, +1, when=surface.arrives_from_below)),
             Transition("below", "above", Guard(switching, +1, when=surface.crosses_up)),
             Transition("above", "sliding", Guard(switching, -1, when=surface.arrives_from_above)),
             Transition("above", "below", Guard(switching, -1, when=surface.crosses_down)),
-            Transition(
-                "sliding", "above", Guard(_at_entry, +1, when=surface.is_above), name="sliding too high"
-            ),
-            Transition(
-                "sliding", "below", Guard(_at_entry, +1, when=surface.is_below), name="sliding too low"
-            ),
             Transition("sliding", None, Guard(surface.attraction, -1), name="two-fold"),
             Transition("sliding", "above", Guard(surface.speed_above, +1), Reset(surface.projection)),
             Transition("sliding", "below", Guard(surface.speed_below, -1), Reset(surface.projection)),
@@ -189,24 +183,19 @@ class _Surface:
             for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
         ]
 
-    # The conditions of the crossings of h = 0. Where one is asked far from the surface, the state has entered
-    # the mode of the other side; the other field need not exist there.
+    # The conditions of the crossings of h = 0.
 
     def arrives_from_below(self, t: Any, x: Any, p: Any) -> Any:
-        slides = self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) <= 0.0)
-        return slides & (self._height(t, x, p) <= SLIDING_BAND)
+        return self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) <= 0.0)
 
     def arrives_from_above(self, t: Any, x: Any, p: Any) -> Any:
-        slides = self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) >= 0.0)
-        return slides & (self._height(t, x, p) >= -SLIDING_BAND)
+        return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) >= 0.0)
 
     def crosses_up(self, t: Any, x: Any, p: Any) -> Any:
-        crosses = self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) > 0.0)
-        return self.is_above(t, x, p) | crosses
+        return self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) > 0.0)
 
     def crosses_down(self, t: Any, x: Any, p: Any) -> Any:
-        crosses = self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) < 0.0)
-        return self.is_below(t, x, p) | crosses
+        return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) < 0.0)
 
     def _goes_on(self, t: Any, x: Any, p: Any, side: float) -> Any:
         """Whether an orbit that reaches the surface rising (side +1) or falling (-1) does more than touch it.
@@ -214,10 +203,11 @@ class _Surface:
         One that leaves the sliding mode at a fold starts on the surface, with a speed that is zero up to
         rounding and an acceleration back to where it belongs: it has arrived nowhere.
         """
-        rates = (self.speed_below, self.turn_below) if side > 0 else (self.speed_above, self.turn_above)
-        speed, turn = (rate(t, x, p) for rate in rates)
-        depth = TOUCH * self._size(t, x, p)
-        return (side * turn >= 0.0) | (speed * speed > -2.0 * depth * side * turn)
+        if side > 0:
+            field, speed, turn = self.below, self.speed_below(t, x, p), self.turn_below(t, x, p)
+        else:
+            field, speed, turn = self.above, self.speed_above(t, x, p), self.turn_above(t, x, p)
+        return (side * turn >= 0.0) | (side * speed > TOUCH * self._steepest(t, x, p, field(t, x, p)))
 
     def attraction(self, t: Any, x: Any, p: Any) -> Any:
         L_b, L_a = self.speeds(t, x, p)
@@ -228,24 +218,12 @@ class _Surface:
 
         It is as smooth as the fields, so that the sliding mode has a Taylor series where they do.
         """
-        slope = self.gradient(t, x, p)[:-1]
-        speed = [*self.below(t, x, p), *self.above(t, x, p)]
-        return TANGENT * np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
+        return TANGENT * self._steepest(t, x, p, [*self.below(t, x, p), *self.above(t, x, p)])
 
-    def is_above(self, t: Any, x: Any, p: Any) -> Any:
-        return self._height(t, x, p) > SLIDING_BAND
-
-    def is_below(self, t: Any, x: Any, p: Any) -> Any:
-        return self._height(t, x, p) < -SLIDING_BAND
-
-    def _height(self, t: Any, x: Any, p: Any) -> Any:
-        """Distance from the surface relative to the size of the state, with the sign of ``h``."""
-        return self.switching(t, x, p) / self._size(t, x, p)
-
-    def _size(self, t: Any, x: Any, p: Any) -> Any:
-        """How much ``h`` changes over distances of the size of the state."""
-        normal = self.gradient(t, x, p)[:-1]
-        return _dot([np.abs(slope) for slope in normal], [1.0 + np.abs(value) for value in x], 0.0)
+    def _steepest(self, t: Any, x: Any, p: Any, velocity: Iterable[Any]) -> Any:
+        """The rate of ``h`` if all of the velocity were normal to the surface."""
+        slope, speed = self.gradient(t, x, p)[:-1], [*velocity]
+        return np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
 
     def projection(self, t: Any, x: Any, p: Any) -> list[Any]:
         """The nearest point of the surface, to first order."""
@@ -314,9 +292,11 @@ def _rate(gradient: ModelFunction, field: ModelFunction) -> ModelFunction:
     return rate
 
 
-def _at_entry(t: Any, x: Any, p: Any) -> float:
-    """A guard that lies behind the state from the start: its condition is asked once, at the entry."""
-    return 1.0
+def _entered(source: str, target: str, switching: ModelFunction) -> Transition:
+    """Where a start off the surface goes that names a mode which does not belong there."""
+    direction, place = (+1, "high") if target == "above" else (-1, "low")
+    guard = Guard(switching, direction, at_entry=True)
+    return Transition(source, target, guard, name=f"{source} too {place}")
 
 
 def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:

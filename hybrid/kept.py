@@ -89,6 +89,7 @@ def operations_of(system: HybridSystem) -> str | None:
             transition.target,
             transition.accumulates_to,
             int(transition.guard.direction),
+            transition.guard.at_entry,
             transition.guard.when is None,
             transition.reset is None,
         ]
@@ -155,7 +156,7 @@ def _read(path: Path) -> Emitted | None:
     try:
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        for name in (*of_transitions, "affine_mode", "autonomous", "discontinuities"):
+        for name in (*of_transitions, "affine_mode", "autonomous", "discontinuities", "timed_guard"):
             kept[name] = tuple(kept[name])
         rows, numbers, first = (kept["programs"][name] for name in ("rows", "numbers", "first"))
         kept["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))

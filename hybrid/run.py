@@ -168,7 +168,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
     n = dimension
     shapes = {
         "used": (4,),
-        "step_time": (steps, 2),
+        "step_time": (steps, 3),
         "step_place": (steps, 3),
         "step_coefficients": (steps, degree + 1, n + 1),
         "jump_time": (jumps, 2),

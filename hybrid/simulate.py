@@ -223,11 +223,11 @@ class _Recorder:
 
 def _places_of_steps(
     record: Any, used: int, period: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Start, length, mode and jump count of the steps in a record."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Start in two parts, length, mode and jump count of the steps in a record."""
     cycle, mode, j = record.step_place[:used].T
-    phase, h = record.step_time[:used].T
-    return cycle * period + phase, h.copy(), mode.copy(), j.copy()
+    phase, h, low = record.step_time[:used].T
+    return cycle * period + phase, low.copy(), h.copy(), mode.copy(), j.copy()
 
 
 @cache

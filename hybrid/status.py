@@ -57,11 +57,18 @@ class Status:
 NAME_THE_LIMIT = (
     "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
 )
+DECLARE_PERIOD = (
+    "This mode depends on time, and late times are rounded coarsely. If its forcing has a period, declare "
+    "the period with HybridSystem(period=...): the phase of the forcing then keeps all its digits."
+)
 SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
 
 
-def run_status(code: int, where: str, transition: str | None) -> Status:
-    """Status of a run that ended with a kernel code, after a transition (or None)."""
+def run_status(code: int, where: str, transition: str | None, *, bare_time: bool) -> Status:
+    """Status of a run that ended with a kernel code, after a transition (or None).
+
+    ``bare_time`` says that the mode depends on time and no forcing period is declared.
+    """
     if code == StatusCode.SUCCESS:
         return SUCCESS
     last = f"transition {transition!r}" if transition else "a transition"
@@ -76,7 +83,8 @@ def run_status(code: int, where: str, transition: str | None) -> Status:
         ),
         StatusCode.STEP_TOO_SMALL: (
             f"No step was small enough for the tolerance {where}.",
-            "Loosen rtol and atol; a singular or discontinuous field wants a transition there.",
+            "Loosen rtol and atol; a singular or discontinuous field wants a transition there."
+            + (f" {DECLARE_PERIOD}" if bare_time else ""),
         ),
         StatusCode.NON_FINITE: (
             f"The field or the state became infinite or nan {where}.",

@@ -65,17 +65,32 @@ class Guard:
         Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if it is positive
         (or true) there, and is passed as if there were no guard if not. It is asked at crossings and at the
         entry of the mode only, and need not be continuous.
+    at_entry
+        True for a guard whose crossings are not looked for: its transition fires only where a state enters
+        the mode, or starts in it, beyond the guard by more than rounding. ``direction`` says which side that
+        is.
 
     Raises
     ------
     ModelError
-        If a given function is not callable or ``direction`` is none of -1, 0, +1.
+        If a given function is not callable, ``direction`` is none of -1, 0, +1, or ``at_entry`` is no bool or
+        comes without a direction.
     """
 
     function: ModelFunction = attrs.field(validator=_callable)
     direction: int = attrs.field(default=0)
     gradient: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
     when: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+    at_entry: bool = attrs.field(default=False, kw_only=True)
+
+    @at_entry.validator
+    def _check_at_entry(self, attribute: attrs.Attribute[bool], value: object) -> None:
+        if not isinstance(value, bool):
+            raise ModelError(f"Guard: at_entry must be True or False; got {value!r}.")
+        if value and self.direction == 0:
+            raise ModelError(
+                "Guard: at_entry=True needs direction -1 or +1, the side that the mode excludes."
+            )
 
     @direction.validator
     def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:

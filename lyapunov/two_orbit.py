@@ -236,7 +236,8 @@ def _companion(
         companion.run.side[:] = reference.run.side
         companion.run.count[codes.PREVIOUS_MODE] = companion.run.count[codes.MODE]
     companion.run.count[codes.CYCLE] = reference.run.count[codes.CYCLE]
-    companion.run.clock[codes.PHASE] = reference.run.clock[codes.PHASE]
+    for slot in (codes.PHASE, codes.PHASE_LOW):
+        companion.run.clock[slot] = reference.run.clock[slot]
     return companion
 
 

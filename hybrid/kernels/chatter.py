@@ -4,6 +4,7 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.clock import measured_time
 from hybrid.kernels.codes import (
     CHATTER_JUMPS,
     CHATTERING,
@@ -55,7 +56,7 @@ def remaining_chatter(model, run, transition, speed, work):
     """
     ratio = run.clock[RESTITUTION]
     pull = far_side(model, run, transition) * guard_acceleration(
-        model, transition, run.count[MODE], run.clock[PHASE], run.y, work
+        model, run, transition, run.count[MODE], run.clock[PHASE], run.y, work
     )
     if not (0.0 < ratio < 1.0 and pull > 0.0):
         return 0.0
@@ -72,7 +73,7 @@ def mean_field(model, run, transition, t, x, out, work):
     mode = run.count[MODE]
     model.flow(mode, t, x, model.parameters, work.field)
     guard_speed(model, transition, t, x, work.field, work.gradient)
-    acceleration = guard_acceleration(model, transition, mode, t, x, work)
+    acceleration = guard_acceleration(model, run, transition, mode, t, x, work)
     for i in range(model.dimension):
         out[i] = work.field[i] - acceleration * run.trail[IMPULSE, i]
     return acceleration
@@ -101,12 +102,13 @@ def follow_mean(model, run, transition, speed, span, work):
 
 
 @njit(**INLINE)
-def change_of_limit_time(method, run, gain, shift, span):
+def change_of_limit_time(model, method, run, gain, shift, span):
     """What later jumps will still change of the time to the limit, in units of the tolerances.
 
     Judged from the change since the jump before, by ``shift``, of which they will still make ``gain`` times.
     """
-    return gain * abs(shift) / (method.rtol * span + 8.0 * EPSILON * abs(run.clock[PHASE]))
+    rounding = 8.0 * EPSILON * measured_time(model, run, run.count[MODE])
+    return gain * abs(shift) / (method.rtol * span + rounding)
 
 
 @njit(**KERNEL)
@@ -157,7 +159,7 @@ def accumulation(model, method, run, transition, since_last, work):
         shift = span - (run.trail[LIMIT, n] - since_last)
         # The change is of second order in the speed, which each jump multiplies by the ratio.
         gain = ratio * ratio / (1.0 - ratio * ratio)
-        misfit = change_of_limit_time(method, run, gain, shift, span)
+        misfit = change_of_limit_time(model, method, run, gain, shift, span)
         if drowned or not misfit * method.rtol > FAR:
             follow_mean(model, run, transition, side * speed, span, work)
             misfit = change_of_limit(model, method, run, gain, misfit, work)
@@ -192,7 +194,7 @@ def remember_impulse(model, run, transition, transversality, work):
 
 
 @njit(**KERNEL)
-def speed_gradient(model, transition, mode, t, x, out, work):
+def speed_gradient(model, run, transition, mode, t, x, out, work):
     """Derivative of the guard's speed along the flow in the state, ``(n,)``.
 
     ``D_x g D_x f`` is exact; the curvature of a guard that is not affine is a central difference of its
@@ -210,7 +212,8 @@ def speed_gradient(model, transition, mode, t, x, out, work):
     if model.affine_guard[transition] == 1:
         return
     for j in range(n):
-        step = 6e-6 * max(abs(x[j]), 1e-3)
+        size = max(abs(x[j]), run.scale[j])
+        step = 6e-6 * (size if size > 0.0 else 1.0)
         for i in range(n):
             work.state[i] = x[i]
         work.state[j] = x[j] + step
@@ -232,7 +235,7 @@ def chatter_matrix(model, run, transition, work):
     n = model.dimension
     slope, carried = work.error, work.second_error
     impulse = run.trail[IMPULSE]
-    speed_gradient(model, transition, run.count[MODE], run.clock[PHASE], run.y, slope, work)
+    speed_gradient(model, run, transition, run.count[MODE], run.clock[PHASE], run.y, slope, work)
     model.guard_gradient(transition, run.clock[PHASE], run.y, model.parameters, work.gradient)
     coupling = 0.0
     for i in range(n):

@@ -2,6 +2,7 @@
 
 from numba import int64, njit, void
 
+from hybrid.kernels.clock import IN_ORDER
 from hybrid.kernels.layout import CUBE, ENTRY, INDICES, KERNEL, MATRIX, VECTOR
 from hybrid.kernels.path import value_at
 from hybrid.kernels.series_guards import time_of
@@ -28,6 +29,12 @@ def step_at(start, time, step):
     return low
 
 
+@njit(**IN_ORDER)
+def time_since(time, start, low):
+    """Time since a start in two parts."""
+    return (time - start) - low
+
+
 @njit(**KERNEL)
 def degree_of_all(polynomials):
     """The largest degree of the polynomials in the columns, at least 1."""
@@ -40,12 +47,12 @@ def degree_of_all(polynomials):
     return degree
 
 
-@njit(void(VECTOR, VECTOR, VECTOR, CUBE, MATRIX, INDICES), **ENTRY)
-def states_at(times, start, span, coefficients, states, steps):
+@njit(void(VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, INDICES), **ENTRY)
+def states_at(times, start, low, span, coefficients, states, steps):
     """States ``(N, n)`` at times ``(N,)`` and the step that each was taken from; at a jump, after it.
 
     ``coefficients (S, d + 1, n + 1)`` are those of the powers of a place on ``[0, 1]``, of the state and of
-    the time since the ``start`` of each step.
+    the time since the start of each step, which is ``start`` and what that has lost in rounding, ``low``.
     """
     step, last, top, degree = int64(0), int64(-1), 0, 0
     n = states.shape[1]
@@ -57,7 +64,7 @@ def states_at(times, start, span, coefficients, states, steps):
             degree = top
             while degree > 1 and polynomials[degree, n] == 0.0:
                 degree -= 1
-        since = times[i] - start[step]
+        since = time_since(times[i], start[step], low[step])
         if degree == 1:
             place = min(max(since / span[step], 0.0), 1.0)
         else:

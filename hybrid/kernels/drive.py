@@ -5,11 +5,10 @@ import math
 from numba import boolean, float64, int64, njit
 
 from hybrid.kernels.bernstein import crosses_towards
-from hybrid.kernels.clock import forward, time_left
+from hybrid.kernels.clock import forward, set_clock, time_left
 from hybrid.kernels.codes import (
     ACCUMULATION,
     AT_REST,
-    CYCLE,
     DONE,
     ENTERING,
     GO_ON,
@@ -180,7 +179,6 @@ def advance(
         fired = run.count[PENDING]
         past = time_left(model, run, stop_cycle, stop_phase) < 0.0
         if past or (span >= remaining and fired == NO_TRANSITION):
-            run.count[CYCLE] = stop_cycle
-            run.clock[PHASE] = stop_phase
+            set_clock(run, stop_cycle, stop_phase)
         if fired != NO_TRANSITION:
             run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)

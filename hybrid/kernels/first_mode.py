@@ -4,7 +4,7 @@ import math
 
 from numba import int64, njit
 
-from hybrid.kernels.codes import BEYOND, LEAVES, MODE, NO_TRANSITION, PHASE
+from hybrid.kernels.codes import BEYOND, LEAVES, MODE, NO_OBJECTION, NO_TRANSITION, PHASE
 from hybrid.kernels.guards import allowed, guard_value
 from hybrid.kernels.layout import ENTRY, INDICES, MODEL, PARTS, RUN, WORK
 
@@ -19,7 +19,7 @@ def try_modes(parts, model, run, work, first, stop, verdicts):
     t = run.clock[PHASE]
     for mode in range(first, stop):
         run.count[MODE] = mode
-        parts.enter(model, run, work)
+        fires = parts.enter(model, run, work)
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
             transition = model.outgoing[slot]
             if not math.isfinite(guard_value(model, transition, t, run.y, work.scalar)):
@@ -30,4 +30,6 @@ def try_modes(parts, model, run, work, first, stop, verdicts):
                 continue
             if allowed(model, transition, t, run.y, work.scalar):
                 verdicts[transition] = LEAVES if run.due[transition] == 1 else BEYOND
+        if fires >= 0 and verdicts[fires] == NO_OBJECTION:
+            verdicts[fires] = BEYOND
     return NO_TRANSITION

@@ -156,7 +156,7 @@ def note_grazing(run, transition, degree, side, band, work):
 
 
 @njit(**KERNEL)
-def guard_acceleration(model, transition, mode, t, x, work):
+def guard_acceleration(model, run, transition, mode, t, x, work):
     """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
 
     ``D_x g (D_x f f + D_t f)`` is exact; the curvature of the guard itself is a difference of its gradient
@@ -172,11 +172,11 @@ def guard_acceleration(model, transition, mode, t, x, work):
         total += work.gradient[i] * bend
     if model.affine_guard[transition] == 1:
         return total
-    size, speed = 1e-3, 0.0
+    size, speed = 0.0, 0.0
     for i in range(n):
-        size = max(size, abs(x[i]))
+        size = max(size, abs(x[i]), run.scale[i])
         speed = max(speed, abs(work.field[i]))
-    epsilon = 1e-7 * size / speed if speed > 0.0 else 1e-7
+    epsilon = 1e-7 * (size if size > 0.0 else 1.0) / (speed if speed > 0.0 else 1.0)
     for i in range(n):
         work.state[i] = x[i] + epsilon * work.field[i]
     before = guard_speed(model, transition, t, x, work.field, work.gradient)
@@ -198,7 +198,7 @@ def keep_grazing(model, run, record, transition, t, x, value, work):
     model.flow(mode, t, place, model.parameters, work.field)
     guard_speed(model, transition, t, place, work.field, work.gradient)
     record.grazing_time[slot, 0], record.grazing_time[slot, 1] = t, value
-    record.grazing_time[slot, 2] = guard_acceleration(model, transition, mode, t, place, work)
+    record.grazing_time[slot, 2] = guard_acceleration(model, run, transition, mode, t, place, work)
     record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
     record.grazing_place[slot, 2] = run.count[JUMPS]
     record.used[2] = slot + 1

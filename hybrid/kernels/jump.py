@@ -16,8 +16,6 @@ from hybrid.kernels.clock import forward
 from hybrid.kernels.codes import (
     CHATTERING,
     CYCLE,
-    EARLIER_JUMP_CYCLE,
-    EARLIER_JUMP_PHASE,
     ENTERING,
     GRAZING,
     ILL_CONDITIONED,
@@ -54,6 +52,7 @@ from hybrid.kernels.guards import (
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
 from hybrid.kernels.locked import (
+    begin_at_start,
     begin_instant,
     change_of_instant,
     follow,
@@ -170,7 +169,7 @@ def is_grazing(model, method, run, transition, transversality, work):
     if it comes from there. The saltation matrix is then an extrapolation of a square root from beside its
     branch point.
     """
-    acceleration = guard_acceleration(model, transition, run.count[MODE], run.clock[PHASE], run.y, work)
+    acceleration = guard_acceleration(model, run, transition, run.count[MODE], run.clock[PHASE], run.y, work)
     band = error_band(method, run, work.gradient, model.dimension)
     if transversality * transversality <= 2.0 * abs(acceleration) * band:
         return True
@@ -248,6 +247,8 @@ def cross_with_map(model, run, transition, mode, tangents, work):
 def recall_map(model, run, tangents, work):
     """Make up for the tangent map of the jump that began this instant, if nobody has asked for it."""
     n = model.dimension
+    if run.count[LAST_FIRED] == NO_TRANSITION:
+        begin_at_start(run, n, tangents)
     if run.count[MAP_IS_KNOWN] == 1:
         return
     fired, mode, x_minus = run.count[LAST_FIRED], run.count[PREVIOUS_MODE], run.instant[:n]
@@ -318,10 +319,7 @@ def follow_impacts(model, method, run, record, transition, remaining, tangents, 
     if not 0.0 < run.clock[RESTITUTION] < 1.0:
         run.count[CHATTERING] = 0
         return False
-    since_last = run.clock[PHASE] - run.clock[EARLIER_JUMP_PHASE]
-    since_last += model.period * (run.count[CYCLE] - run.clock[EARLIER_JUMP_CYCLE])
-    run.clock[EARLIER_JUMP_PHASE], run.clock[EARLIER_JUMP_CYCLE] = run.clock[PHASE], run.count[CYCLE]
-    span = accumulation(model, method, run, transition, since_last, work)
+    span = accumulation(model, method, run, transition, run.stay[run.count[MODE]], work)
     if not 0.0 < span <= remaining:
         return False
     limit_mode = model.accumulates_to[transition]

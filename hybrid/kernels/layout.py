@@ -49,13 +49,15 @@ class Model(Structure):
 
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
     which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
-    transitions that leave mode ``m``, in the order they were listed; ``target`` is -1 for one that ends the
+    transitions that leave mode ``m``, in the order they were listed, but for those that only its entry fires:
+    these are in ``at_entry[first_at_entry[m]:first_at_entry[m + 1]]``. ``target`` is -1 for one that ends the
     run. ``affine_guard`` is 1 for a guard that is affine in state and time, ``guard_in_series`` for one that
     the series of its mode hold in a column; ``bound`` and ``spread`` run the ``programs`` of the others.
     Transitions with the same ``surface`` have the same guard up to a factor, its sign the product of their
     ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
     surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0.
+    ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
     """
@@ -72,6 +74,8 @@ class Model(Structure):
     dimension: int64
     first_outgoing: INDICES
     outgoing: INDICES
+    first_at_entry: INDICES
+    at_entry: INDICES
     target: INDICES
     direction: INDICES
     affine_guard: INDICES
@@ -86,6 +90,7 @@ class Model(Structure):
     accumulates_to: INDICES
     propagator: INDICES
     degree: INDICES
+    timed: INDICES
     tangent_start: int64
     tangent_columns: INDICES
     period: float64
@@ -217,12 +222,12 @@ WORK = Work.numba_type
 class Record(Structure):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
-    ``used (4,)`` counts the steps, jumps, grazings and saltation matrices in it. A step: its start ``(phase,
-    length)``, ``(cycle, mode, jump count)`` and polynomials ``(d + 1, n + 1)`` of a place on [0, 1], the
-    state and the time since. A jump: its phase and transversality, ``(cycle, transition, kind, known)`` and
-    the states ``(2, n)`` before and after. The saltation matrices ``(n, n)`` are those of the jumps where
-    they are known, in order. A grazing: ``(phase, value, acceleration)`` of the guard, ``(cycle, transition,
-    jump count)`` and the state.
+    ``used (4,)`` counts the steps, jumps, grazings and saltation matrices in it. A step: ``(phase, length,
+    what the phase lost in rounding)`` of its start, ``(cycle, mode, jump count)`` and polynomials ``(d + 1, n
+    + 1)`` of a place on [0, 1], the state and the time since. A jump: its phase and transversality, ``(cycle,
+    transition, kind, known)`` and the states ``(2, n)`` before and after. The saltation matrices ``(n, n)``
+    are those of the jumps where they are known, in order. A grazing: ``(phase, value, acceleration)`` of the
+    guard, ``(cycle, transition, jump count)`` and the state.
     """
 
     used: INDICES

@@ -80,6 +80,17 @@ def postpone_map(run, n):
 
 
 @njit(**KERNEL)
+def begin_at_start(run, n, tangents):
+    """As ``begin_instant`` where a run starts beyond a guard."""
+    keep_tangents(run, n, tangents)
+    for i in range(n * (1 + n)):
+        run.instant[i] = 0.0
+    for i in range(n):
+        run.instant[n + n * i + i] = 1.0
+    run.count[MAP_IS_KNOWN] = 1
+
+
+@njit(**KERNEL)
 def follow(run, n, work):
     """Take a jump set off at once into the tangent map of its instant.
 

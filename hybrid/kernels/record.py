@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.codes import CYCLE, GRAZING_GUARD, GRAZING_VALUE, JUMPS, MODE
+from hybrid.kernels.codes import CYCLE, GRAZING_GUARD, GRAZING_VALUE, JUMPS, MODE, PHASE_LOW
 from hybrid.kernels.guards import allowed, keep_grazing
 from hybrid.kernels.layout import KERNEL
 
@@ -12,6 +12,7 @@ def start_record(run, record, t, span):
     """Write the place of a step into the record, and return its slot: the polynomial is still missing."""
     slot = record.used[0]
     record.step_time[slot, 0], record.step_time[slot, 1] = t, span
+    record.step_time[slot, 2] = run.clock[PHASE_LOW]
     record.step_place[slot, 0], record.step_place[slot, 1] = run.count[CYCLE], run.count[MODE]
     record.step_place[slot, 2] = run.count[JUMPS]
     record.used[0] = slot + 1

@@ -2,6 +2,7 @@
 
 from numba import float64, int64, njit, types
 
+from hybrid.kernels.clock import measured_time
 from hybrid.kernels.codes import (
     DIVERGENCE,
     GO_ON,
@@ -178,7 +179,7 @@ def runge_kutta_step(parts, model, method, run, record, tangents, remaining, wor
     if run.count[PHASE_OF_RUN] == STALE:
         rates(model, mode, t, run.y, tangents, work.stages[0])
         if run.clock[NEXT_STEP] <= 0.0:
-            run.clock[NEXT_STEP] = starting_step(model, method, mode, t, run.y, tangents, work)
+            run.clock[NEXT_STEP] = starting_step(model, method, mode, t, run.y, tangents, remaining, work)
         if not run.clock[NEXT_STEP] > 0.0:
             return NON_FINITE, 0.0
         run.count[PHASE_OF_RUN] = READY
@@ -191,7 +192,7 @@ def runge_kutta_step(parts, model, method, run, record, tangents, remaining, wor
         run.count[REJECTED] += 1
         shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
         run.clock[NEXT_STEP] = h * shrink
-        if h * shrink <= 4.0 * EPSILON * abs(t) or h * shrink < 1e-200:
+        if h * shrink <= 4.0 * EPSILON * measured_time(model, run, mode) or h * shrink < 1e-200:
             return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
         return GO_ON, 0.0
     grow = growth_factor(method, run, h, max(ratio, 1e-16))

@@ -11,6 +11,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.bernstein import first_crossing
+from hybrid.kernels.clock import measured_time
 from hybrid.kernels.codes import (
     DESINGULARISED,
     DIVERGENCE,
@@ -248,7 +249,7 @@ def series_step(model, method, run, record, tangents, remaining, work):
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock < 0:
-        h = min(h, method.max_step, remaining, as_far_as_last_time(run, mode))
+        h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))
         if not h < 1e100:
             h = unhurried(series, n, run)
     else:
@@ -277,7 +278,8 @@ def series_step(model, method, run, record, tangents, remaining, work):
             evaluate_with_sizes(series, order, h, 0, front)
             run.count[PENDING] = fired
     span = h if clock < 0 else min(series[order + 1, clock], remaining)
-    if fired == NO_TRANSITION and not span > 4.0 * EPSILON * abs(t) and span < remaining:
+    finest = 4.0 * EPSILON * measured_time(model, run, mode)
+    if fired == NO_TRANSITION and not span > finest and span < remaining:
         return STEP_TOO_SMALL, 0.0
     if record.step_time.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
@@ -291,14 +293,14 @@ def series_step(model, method, run, record, tangents, remaining, work):
 
 
 @njit(**INLINE)
-def as_far_as_last_time(run, mode):
+def as_far_as_last_time(model, run, mode):
     """A little more than is left of a stay as long as the last one; anything if it is longer already.
 
     The event that ends it is found on the way; a longer step would only make it harder to find. A stay that
     was next to nothing says nothing of this one.
     """
     left, beyond = run.stay[mode] - run.clock[SINCE_ENTRY], AHEAD * run.stay[mode]
-    if left > 0.0 and beyond > NEXT_TO_NOTHING * abs(run.clock[PHASE]):
+    if left > 0.0 and beyond > NEXT_TO_NOTHING * measured_time(model, run, mode):
         return left + beyond
     return math.inf
 

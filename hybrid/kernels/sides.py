@@ -56,7 +56,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
         trend, order = speed, 1
         if abs(speed) <= speed_rounding(model, run, mode, t, work):
-            trend, order = guard_acceleration(model, transition, mode, t, x, work), 2
+            trend, order = guard_acceleration(model, run, transition, mode, t, x, work), 2
             if abs(trend) <= acceleration_rounding(model, run, t, work):
                 trend, order = 0.0, 3
     direction = model.direction[transition]
@@ -89,16 +89,16 @@ def crossed_by_landing(model, transition, known, own, was_on, before, now, order
 
 
 @njit(**KERNEL)
-def is_held(model, transition, mode, t, x, work):
+def is_held(model, run, transition, mode, t, x, work):
     """Whether a reset takes, or turns round, the speed with which a state at rest is pushed through a guard.
 
     Judged a moment after ``t``; ``work.field`` is current.
     """
     n = model.dimension
-    size, pace = 1e-3, 0.0
+    size, pace = 0.0, 0.0
     for i in range(n):
-        size, pace = max(size, abs(x[i])), max(pace, abs(work.field[i]))
-    moment = 1e-7 * size / pace if pace > 0.0 else 1e-7
+        size, pace = max(size, abs(x[i]), run.scale[i]), max(pace, abs(work.field[i]))
+    moment = 1e-7 * (size if size > 0.0 else 1.0) / (pace if pace > 0.0 else 1.0)
     later, after = work.settled, work.state
     for i in range(n):
         later[i] = x[i] + moment * work.field[i]
@@ -143,7 +143,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         beyond = now == (direction if direction != 0 else before)
         pushed = came == LANDED and left == mode and was_on and not crossed and beyond and order == 2
         if pushed and due[transition] == 0 and model.marker[transition] == 0:
-            pushed = is_held(model, transition, mode, t, x, work)
+            pushed = is_held(model, run, transition, mode, t, x, work)
             # Another's reset has left the state where it rests: its own has to hold it once more.
             crossed = pushed and not own
             rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
@@ -165,6 +165,18 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
     if chosen != NO_TRANSITION:
         return chosen
     return RESTING if rests else NO_TRANSITION
+
+
+@njit(**KERNEL)
+def beyond_at_entry(model, run, mode, t, work):
+    """A transition that only the entry of a mode fires, if the state lies beyond its guard; else none."""
+    for slot in range(model.first_at_entry[mode], model.first_at_entry[mode + 1]):
+        transition = model.at_entry[slot]
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        beyond = value * model.direction[transition] > rounding_band(model, run, transition, t, run.y, work)
+        if beyond and allowed(model, transition, t, run.y, work.scalar):
+            return transition
+    return NO_TRANSITION
 
 
 @njit(**KERNEL)

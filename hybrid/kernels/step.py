@@ -19,6 +19,11 @@ from hybrid.kernels.layout import (
     WORK,
 )
 
+# A state that is smaller than this many tolerances is taken to be of this size as a run starts.
+MANY_TOLERANCES = 1e4
+# Share of a run, or of a forcing period, that is the unit of time of a state at rest.
+AT_REST = 1e-4
+
 
 @njit(**INLINE)
 def rates(model, mode, t, y, tangents, out):
@@ -143,10 +148,12 @@ def interpolant_path(method, h, y, dimension, work):
 
 
 @njit(**KERNEL)
-def starting_step(model, method, mode, t, y, tangents, work):
+def starting_step(model, method, mode, t, y, tangents, remaining, work):
     """A first step length from the sizes of ``y``, ``y'`` and ``y''`` (Hairer, Norsett, Wanner 1993, II.4).
 
-    ``work.stages[0]`` holds the rates at ``(t, y)``; uses ``work.stages[1]`` as scratch.
+    The unit of time is that in which the state changes by its size, or by many tolerances where it is zero:
+    no unit of the model matters. A state at rest has none, and the end of the run or the forcing period
+    stands in. ``work.stages[0]`` holds the rates at ``(t, y)``; uses ``work.stages[1]`` as scratch.
     """
     n = model.dimension
     length = n * (1 + tangents)
@@ -156,8 +163,10 @@ def starting_step(model, method, mode, t, y, tangents, work):
         size += (y[i] / scale) ** 2
         speed += (work.stages[0, i] / scale) ** 2
     size, speed = math.sqrt(size / length), math.sqrt(speed / length)
-    h = 1e-6 if size < 1e-5 or speed < 1e-5 else 0.01 * size / speed
-    h = min(h, method.max_step)
+    horizon = min(model.period, remaining) if model.period > 0.0 else remaining
+    unit = max(size, MANY_TOLERANCES) / speed if speed > 0.0 else math.inf
+    unit = min(unit, (1.0 if speed > 0.0 else AT_REST) * horizon)
+    h = min(0.01 * unit, method.max_step)
     for i in range(length):
         work.trial[i] = y[i] + h * work.stages[0, i]
     rates(model, mode, t + h, work.trial, tangents, work.stages[1])
@@ -166,10 +175,10 @@ def starting_step(model, method, mode, t, y, tangents, work):
         scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
         bend += ((work.stages[1, i] - work.stages[0, i]) / scale) ** 2
     bend = math.sqrt(bend / length) / h
-    steepest = max(speed, bend)
+    steepest = max(speed * unit, bend * unit * unit)
     if not steepest > 1e-15:
-        return min(max(1e-6, 1e-3 * h), method.max_step)
-    return min(100.0 * h, (0.01 / steepest) ** method.exponent, method.max_step)
+        return h
+    return min(100.0 * h, unit * (0.01 / steepest) ** method.exponent, method.max_step)
 
 
 @njit(**INLINE)

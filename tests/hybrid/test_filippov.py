@@ -420,12 +420,14 @@ class TestModel:
     def test_names(self, block):
         assert block.mode_names == ("below", "above", "sliding")
         assert block.transition_names == (
+            "below too high",
+            "above too low",
+            "sliding too high",
+            "sliding too low",
             "below->sliding",
             "below->above",
             "above->sliding",
             "above->below",
-            "sliding too high",
-            "sliding too low",
             "two-fold",
             "sliding->above",
             "sliding->below",
@@ -478,3 +480,77 @@ class TestModel:
         code = "import json, sys, hybrid.filippov; print(json.dumps('sympy' in sys.modules))"
         result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert json.loads(result.stdout) is False
+
+
+def in_units(state, time):
+    """The relay and the block of above, a length and a time measured in other units."""
+    relay = planar(
+        lambda t, x, p: ((x.y + state) / time, -x.x / time),
+        lambda t, x, p: ((x.y - state) / time, -x.x / time),
+        switching=lambda t, x, p: x.x + x.y,
+    )
+    fold = planar(
+        lambda t, x, p: (state / time, 2 * state / time),
+        lambda t, x, p: (state / time, x.x / time),
+    )
+    return relay, fold
+
+
+class TestUnits:
+    """Nothing is measured against one: powers of two as units change no digit."""
+
+    @pytest.mark.parametrize(("state", "time"), [(2.0**-30, 1.0), (2.0**-60, 2.0**20), (2.0**30, 2.0**-20)])
+    @pytest.mark.parametrize("solver", [hybrid.Taylor, hybrid.DOP853])
+    @pytest.mark.parametrize(
+        ("which", "x0"), [(0, (-0.1, 0.1)), (0, (0.3, -0.9)), (1, (-2.3, -0.5)), (1, (-1.0, 0.5))]
+    )
+    def test_the_run_is_the_same(self, state, time, solver, which, x0):
+        arcs = []
+        for unit, second in ((1.0, 1.0), (state, time)):
+            system = in_units(unit, second)[which]
+            options = {"solver": solver(rtol=1e-10, atol=unit * 1e-12), "tangent": True}
+            arcs.append(hybrid.simulate(system, unit * np.array(x0), (0.0, 4.0 * second), **options))
+        here, there = arcs
+        assert here.status.ok
+        assert here.jumps
+        assert there.status.code == here.status.code
+        assert events(there) == events(here)
+        np.testing.assert_allclose(there.jumps.t / time, here.jumps.t, rtol=1e-14)
+        np.testing.assert_allclose(there.x[-1] / state, here.x[-1], rtol=1e-13, atol=1e-15)
+        np.testing.assert_allclose(there.fundamental, here.fundamental, rtol=1e-12, atol=1e-13)
+
+
+def test_an_arrival_from_above_is_one_jump():
+    system = planar(lambda t, x, p: (1.0, 1.0), lambda t, x, p: (1.0, -3.0))
+    for offset in (0.0, 7.0, -1e3):
+        arc = hybrid.simulate(system, (offset, 0.75), (0.0, 1.0))
+        assert events(arc) == ["above->sliding"]
+        assert arc.jumps[0].t == pytest.approx(0.25, abs=1e-15)
+        np.testing.assert_allclose(arc.x[-1], [offset + 1.0, 0.0], atol=1e-15)
+        # What is lost is the height; from above the height costs time at the field above.
+        np.testing.assert_allclose(arc.jumps[0].saltation, [[1.0, 0.0], [0.0, 0.0]], atol=1e-15)
+
+
+def test_leaving_projects_what_the_solver_has_let_drift():
+    arc = hybrid.simulate(
+        TestMovingSurface.SYSTEM,
+        (0.0, 1.0),
+        (math.pi / 8, 0.6),
+        parameters={"w": 4.0},
+        solver=hybrid.Tsit5(rtol=1e-4, atol=1e-5),
+    )
+    [leave] = arc.jumps
+    assert leave.transition == "sliding->above"
+    assert abs(leave.x_minus[1] - math.sin(4.0 * leave.t)) > 1e-8
+    assert leave.x_plus[1] == pytest.approx(math.sin(4.0 * leave.t), abs=1e-15)
+
+
+@pytest.mark.parametrize("height", [5e-7, -5e-7])
+def test_a_start_in_the_sliding_mode_off_the_surface_falls_onto_it(height):
+    system = planar(lambda t, x, p: (1.0, 2.0), lambda t, x, p: (1.0, -2.0))
+    arc = hybrid.simulate(system, (-0.7, height), (0.0, 1.0), mode="sliding")
+    first = "high" if height > 0 else "low"
+    side = "above" if height > 0 else "below"
+    assert events(arc) == [f"sliding too {first}", f"{side}->sliding"]
+    np.testing.assert_allclose(arc.jumps.t, [0.0, 2.5e-7], atol=1e-16)
+    np.testing.assert_allclose(arc.x[-1], [0.3, 0.0], atol=1e-15)
