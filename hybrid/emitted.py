@@ -14,7 +14,8 @@ class Propagator:
     Attributes
     ----------
     kind
-        A code of ``hybrid.kernels.codes``: RUNGE_KUTTA, TAYLOR, EXACT or DESINGULARISED.
+        A code of ``hybrid.kernels.codes``: RUNGE_KUTTA, TAYLOR, EXACT, DESINGULARISED or
+        ROOTED.
     degree
         Degree in time of every solution, and of every guard along it, if those are polynomials, else 0.
     reason

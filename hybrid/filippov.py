@@ -62,8 +62,8 @@ def filippov(
     -------
     HybridSystem
         Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run, and
-        ``below too high``, ``above too low``, ``sliding too high`` and ``sliding too low``: a start takes one of
-        them if it lies off the surface, by more than rounding, where its mode does not belong.
+        ``below too high``, ``above too low``, ``sliding too high`` and ``sliding too low``: a start takes one
+        of them if it lies off the surface, by more than rounding, where its mode does not belong.
 
     Raises
     ------

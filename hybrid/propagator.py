@@ -20,12 +20,23 @@ from hybrid.kernels.codes import (
     EXACT,
     HIGHEST_ORDER,
     NARROW,
+    ROOTED,
     RUNGE_KUTTA,
     TAYLOR,
     WIDE,
 )
 from hybrid.linear_series import LinearForm, linear_form, table_statements
 from hybrid.printer import assignments
+from hybrid.roots import (
+    ROOT,
+    Root,
+    in_roots,
+    is_multiple,
+    on_clock,
+    regular_root,
+    singular_bases,
+    slope_along,
+)
 from hybrid.series import ONE_THEN_ZERO, PAIRS, NoSeries, Recurrences
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
 from hybrid.symbolic import (
@@ -41,8 +52,6 @@ from hybrid.symbolic import (
 )
 from hybrid.trace import Symbols
 
-ROOT = sympy.Symbol("w", positive=True)
-HALF = sympy.Rational(1, 2)
 ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 # Columns behind those of the guards: the time since the step's start, the integral of div f. All these are
 # written and evaluated as whole vectors; the others follow, the root of a desingularised mode first.
@@ -85,14 +94,23 @@ def _series(
     field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], known: list[sympy.Expr], symbols: Symbols
 ) -> Propagator:
     field = [simplified(entry, known) for entry in field]
-    z = _singular_base(field, known)
-    if z is not None:
-        held = [_is_held(boundary, z) for boundary in boundaries]
-        written = _write_desingularised(field, _columns(boundaries, held), z, symbols)
+    bases = singular_bases(field, known, symbols)
+    held = [_is_held(boundary, bases, symbols) for boundary in boundaries]
+    guards = _columns(boundaries, held)
+    roots = [
+        root for place, z in enumerate(bases) if (root := regular_root(field, z, place, symbols)) is not None
+    ]
+    if roots:
+        written = _write_rooted(field, boundaries, guards, roots, symbols)
+        reason = "half-integer powers of a guard, whose root is smooth"
+        return Propagator(ROOTED, 0, reason, *written, guards=tuple(held))
+    if len(bases) > 1:
+        raise NoSeries("it has fractional powers of more than one guard")
+    if bases:
+        [z] = bases
+        written = _write_desingularised(field, boundaries, guards, z, symbols)
         reason = "half-integer powers of a guard, on the clock dt = w ds"
         return Propagator(DESINGULARISED, 0, reason, *written, guards=tuple(held))
-    held = [_is_held(boundary) for boundary in boundaries]
-    guards = _columns(boundaries, held)
     jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
     if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
         written = _write(field, guards, symbols)
@@ -118,11 +136,12 @@ def _series(
     return Propagator(EXACT, 0, "affine in the state", *written, guards=tuple(held))
 
 
-def _is_held(boundary: Boundary, z: sympy.Expr | None = None) -> bool:
-    """Whether the series of a mode hold the guard: an affine one, and ``z``, whose root is a state."""
-    if boundary.guard is None:
+def _is_held(boundary: Boundary, bases: Sequence[sympy.Expr], symbols: Symbols) -> bool:
+    """Whether the series of a mode hold the guard: an affine one, and one whose root they may hold."""
+    guard = boundary.guard
+    if guard is None:
         return False
-    return boundary.is_affine or (z is not None and _sign_of(boundary.guard, [z]) != 0)
+    return boundary.is_affine or any(is_multiple(guard, z, symbols) for z in bases)
 
 
 def _columns(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy.Expr]:
@@ -163,18 +182,15 @@ def _sign_of(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> int:
     return 0
 
 
-def _singular_base(field: Sequence[sympy.Expr], known: Sequence[sympy.Expr]) -> sympy.Expr | None:
-    """The guard whose fractional powers the field has, which are singular where it vanishes; None if none."""
-    bases = set()
-    for power in {node for entry in field for node in entry.atoms(sympy.Pow)}:
-        if power.exp.is_Integer or _sign_of(power.base, known) == 0:
-            continue
-        if not (power.exp.is_Rational and power.exp.q == 2 and power.exp.is_positive):
-            raise NoSeries(f"it has the power {power.exp} of a guard")
-        bases.add(power.base)
-    if len(bases) > 1:
-        raise NoSeries("it has fractional powers of more than one guard")
-    return bases.pop() if bases else None
+def _in_terms_of_root(
+    boundaries: Sequence[Boundary], z: sympy.Expr, root: sympy.Symbol, symbols: Symbols
+) -> dict[int, sympy.Expr]:
+    """By place, the guards that are multiples of ``z``: the root with the sign of the guard in the mode."""
+    return {
+        place: (boundary.inside or _sign_of(boundary.guard, [z]) or 1) * root
+        for place, boundary in enumerate(boundaries)
+        if boundary.guard is not None and is_multiple(boundary.guard, z, symbols)
+    }
 
 
 def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
@@ -238,7 +254,11 @@ def _write_linear(
 
 
 def _write_desingularised(
-    field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols
+    field: Sequence[sympy.Expr],
+    boundaries: Sequence[Boundary],
+    guards: Sequence[sympy.Expr],
+    z: sympy.Expr,
+    symbols: Symbols,
 ) -> tuple[tuple[str, ...], int, int, int]:
     """Series on the clock ``dt = w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
 
@@ -255,25 +275,15 @@ def _write_desingularised(
     body = _Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()
     seeds = _seeds(symbols)
-    slope = z.diff(symbols.t) + sympy.Add(
-        *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
-    )
-    rates = [_on_clock(rate, z) for rate in field]
-    tangents = [_on_clock(directional(rate, seeds), z) for rate in field]
-    trace = _on_clock(sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True))), z)
+    slope = slope_along(field, z, symbols)
+    rates = [on_clock(rate, z) for rate in field]
+    tangents = [on_clock(directional(rate, seeds), z) for rate in field]
+    trace = on_clock(sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True))), z)
     # Where z is zero its root crosses zero, with a slope.
-    crossing = [_sign_of(guard, [z]) * ROOT or _in_roots(guard, z) for guard in guards]
-    size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in symbols.x))
+    roots = _in_terms_of_root(boundaries, z, ROOT, symbols)
+    crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
     columns, starts = _state(symbols)
-    place = next(i for i, guard in enumerate(guards) if _sign_of(guard, [z]))
-    body.at_start[z] = "root*root"
-    body.preamble += [
-        *assignments(["z", "size"], [z, size]),
-        f"last = abs(out[order + 1, {body.n + place}])",
-        # Anything as close to the root as this is one, whoever left it there.
-        f"same = abs(last*last - z) <= {SAME}*size < z",
-        f"root = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
-    ]
+    body.start_root("root", z, min(roots))
     turning = [ROOT * function.diff(symbols.t).xreplace(harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
@@ -281,10 +291,47 @@ def _write_desingularised(
         [*symbols.x, None, ROOT, *harmonics.values()],
         [*columns, clock, root, *driven],
         [*starts, "0.0", "root", *begun],
-        [*rates, ROOT, _in_roots(slope / 2, z), *turning],
+        [*rates, ROOT, in_roots(slope / 2, z), *turning],
         crossing,
         trace,
         tangents,
+        seeds,
+    )
+
+
+def _write_rooted(
+    field: Sequence[sympy.Expr],
+    boundaries: Sequence[Boundary],
+    guards: Sequence[sympy.Expr],
+    roots: Sequence[Root],
+    symbols: Symbols,
+) -> tuple[tuple[str, ...], int, int, int]:
+    """Series in time of the states and of the roots of guards, whose half-integer powers are theirs."""
+    body = _Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
+    seeds = _seeds(symbols)
+
+    def in_all_roots(expression: sympy.Expr) -> sympy.Expr:
+        for root in roots:
+            expression = in_roots(expression, root.base, root.symbol)
+        return expression
+
+    signed: dict[int, sympy.Expr] = {}
+    names = [f"root_{root.symbol}" for root in roots]
+    for name, root in zip(names, roots, strict=True):
+        places = _in_terms_of_root(boundaries, root.base, root.symbol, symbols)
+        body.start_root(name, root.base, min(places))
+        signed |= places
+    crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
+    columns, starts = _state(symbols)
+    trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
+    return body.assemble(
+        [*symbols.x, *(root.symbol for root in roots)],
+        [*columns, *body.rows.values()],
+        [*starts, *names],
+        [*(in_all_roots(rate) for rate in field), *(in_all_roots(root.rate) for root in roots)],
+        crossing,
+        in_all_roots(trace),
+        [in_all_roots(directional(rate, seeds)) for rate in field],
         seeds,
     )
 
@@ -303,25 +350,6 @@ def _harmonics(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr
         for function in PAIRS.get(node.func, (node.func,))[:2]:
             found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))
     return found
-
-
-def _on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
-    """``w`` times the rate, with powers of ``z`` as powers of ``w`` and none of them negative."""
-    terms = sympy.Add.make_args(_in_roots(rate, z))
-    singular = [term for term in terms if term.has(1 / ROOT)]
-    regular = sympy.Add(*(term for term in terms if term not in singular))
-    return sympy.Add(ROOT * regular, *(ROOT * term for term in singular))
-
-
-def _in_roots(expression: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
-    """Fractional powers of ``z`` as whole ones times its root, which saves the products that ``z`` is."""
-    powers = {p for p in expression.atoms(sympy.Pow) if p.base == z and not p.exp.is_Integer}
-    return expression.xreplace({p: sympy.Mul(*_whole_power(z, p.exp - HALF), ROOT) for p in powers})
-
-
-def _whole_power(z: sympy.Expr, exponent: sympy.Integer) -> tuple[sympy.Expr, ...]:
-    # Negative powers belong to those of the root: there they cancel one of a rate's.
-    return (z**exponent,) if exponent >= 0 else (ROOT ** (2 * exponent),)
 
 
 def _seeds(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:
@@ -359,6 +387,18 @@ class _Body:
     def column(self, place: int) -> str:
         """A column behind those of the guards."""
         return str(self.behind_guards + place)
+
+    def start_root(self, name: str, z: sympy.Expr, place: int) -> None:
+        """Statements for the value ``name`` that the root of ``z``, the guard in a place, starts from."""
+        size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
+        self.at_start[z] = f"{name}*{name}"
+        self.preamble += [
+            *assignments(["z", "size"], [z, size]),
+            f"last = abs(out[order + 1, {self.n + place}])",
+            # Anything as close to the root as this is one, whoever left it there.
+            f"same = abs(last*last - z) <= {SAME}*size < z",
+            f"{name} = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
+        ]
 
     def allot(self) -> str:
         """A new column."""

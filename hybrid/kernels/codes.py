@@ -46,7 +46,8 @@ MAP_IS_KNOWN = 20
 UNPROVED = 21
 AT_REST = 22
 ROUND = 23
-COUNTERS = 24
+CRAWLING = 24
+COUNTERS = 25
 
 # Slots of Run.clock.
 PHASE = 0
@@ -96,7 +97,14 @@ RUNGE_KUTTA = 0
 TAYLOR = 1
 EXACT = 2
 DESINGULARISED = 3
-PROPAGATORS = ("Runge-Kutta pair", "Taylor series", "exact", "Taylor series, desingularised")
+ROOTED = 4
+PROPAGATORS = (
+    "Runge-Kutta pair",
+    "Taylor series",
+    "exact",
+    "Taylor series, desingularised",
+    "Taylor series, with the root of a guard",
+)
 
 # What is known of a row of a guard's program, in the columns of ``Work.registers``: a range, a range of the
 # slope, and a range of the value in the middle of a piece.

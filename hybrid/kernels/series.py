@@ -13,6 +13,7 @@ from numba import njit
 from hybrid.kernels.bernstein import first_crossing
 from hybrid.kernels.clock import measured_time
 from hybrid.kernels.codes import (
+    CRAWLING,
     DESINGULARISED,
     DIVERGENCE,
     EXACT,
@@ -26,6 +27,7 @@ from hybrid.kernels.codes import (
     NON_FINITE,
     PENDING,
     PHASE,
+    ROOTED,
     SINCE_ENTRY,
     STEP_TOO_SMALL,
     STEPS,
@@ -78,6 +80,10 @@ CLOSE = 1e-8
 LONG = 100.0
 # Share of the last stay in a mode by which a step goes beyond it.
 AHEAD = 0.25
+# The clock of a guard's root stands still where guard and speed vanish together. Steps shorter than this
+# share of the stay in the mode do not lead away from there, if so many of them follow one another.
+CRAWL = 1e-4
+MOST_CRAWLING = 100
 # Share of time below which that is no step.
 NEXT_TO_NOTHING = 1e-10
 
@@ -221,6 +227,18 @@ def reach_guard(model, run, tangents, transition, t, longest, work):
 
 
 @njit(**KERNEL)
+def project_on_guard(model, run, transition, t, work):
+    """Bring the state onto the guard by the shortest way: its speed may be zero where its root vanishes."""
+    value = guard_value(model, transition, t, run.y, work.scalar)
+    model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+    square = 0.0
+    for i in range(model.dimension):
+        square += work.gradient[i] * work.gradient[i]
+    for i in range(model.dimension if square > 0.0 else 0):
+        run.y[i] -= value * work.gradient[i] / square
+
+
+@njit(**KERNEL)
 def series_step(model, method, run, record, tangents, remaining, work):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
@@ -278,6 +296,11 @@ def series_step(model, method, run, record, tangents, remaining, work):
             evaluate_with_sizes(series, order, h, 0, front)
             run.count[PENDING] = fired
     span = h if clock < 0 else min(series[order + 1, clock], remaining)
+    if clock >= 0:
+        crawls = fired == NO_TRANSITION and span <= CRAWL * run.clock[SINCE_ENTRY] and span < remaining
+        run.count[CRAWLING] = run.count[CRAWLING] + 1 if crawls else 0
+        if run.count[CRAWLING] > MOST_CRAWLING:
+            return STEP_TOO_SMALL, 0.0
     finest = 4.0 * EPSILON * measured_time(model, run, mode)
     if fired == NO_TRANSITION and not span > finest and span < remaining:
         return STEP_TOO_SMALL, 0.0
@@ -286,7 +309,9 @@ def series_step(model, method, run, record, tangents, remaining, work):
     accept_series(model, run, tangents, order, h, work)
     if cut:
         sides_at(model, run, t + span, work)
-    if fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
+    if fired != NO_TRANSITION and kind == ROOTED:
+        project_on_guard(model, run, fired, t + span, work)
+    elif fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
         longest = math.inf if clock >= 0 else CLOSE * span
         span += reach_guard(model, run, tangents, fired, t + span, longest, work)
     return GO_ON, span

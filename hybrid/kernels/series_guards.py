@@ -14,6 +14,7 @@ from hybrid.kernels.codes import (
     MODE,
     NARROW,
     NO_TRANSITION,
+    ROOTED,
 )
 from hybrid.kernels.crossings import crossing_on_path, leaves
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
@@ -341,7 +342,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if kind != EXACT:
             band = error_band(method, run, work.gradient, model.dimension)
         # Along the root of a guard, what is small for the guard is not as small.
-        if kind == DESINGULARISED:
+        if kind in (DESINGULARISED, ROOTED):
             rounding, band = math.sqrt(rounding), math.sqrt(band)
         size, power = beyond_known_roots(series, column, h, on_guard, size)
         if on_guard > 0:
