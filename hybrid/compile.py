@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid.agreement import check_agreement
 from hybrid.cache import announced, compiled_into, source_key, write_whole
-from hybrid.errors import ArgumentError, ModelError
+from hybrid.errors import ArgumentError
 from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
 from hybrid.load import address, entry, load_kernels
@@ -151,13 +151,13 @@ class CompiledSystem:
         return self._model.replace(**changes)
 
     def _check_period(self, values: np.ndarray, period: float) -> None:
-        """ModelError if the period is none at these values; they are remembered if it is one."""
+        """ArgumentError if the period is none at these values; they are remembered if it is one."""
         key = values.tobytes()
         if key in self.periodic_at:
             return
         fault = period_fault(self.system, values, period)
         if fault is not None:
-            raise ModelError(fault)
+            raise ArgumentError(fault)
         if len(self.periodic_at) >= REMEMBERED:
             self.periodic_at.clear()
         self.periodic_at.add(key)

@@ -1,4 +1,4 @@
-"""One call of every model function when a system is made, to meet a slip where it is made."""
+"""A few calls of every model function when a system is made, to meet a slip where it is made."""
 
 from __future__ import annotations
 
@@ -23,16 +23,17 @@ SAMPLE_STRIDE = 0.6180339887498949
 
 
 def probe_system(system: HybridSystem) -> None:
-    """Call every model function at one generic point and check what comes back.
+    """Call every model function at a few generic points and check what comes back.
 
     Arithmetic trouble there (a logarithm of a negative number, a division by zero) is no error: the
-    point is arbitrary. Given derivatives are compared with the functions they belong to.
+    points are arbitrary. Given derivatives are compared with the functions they belong to, and all functions
+    with themselves: called again, and one declared period later.
 
     Raises
     ------
     ModelError
-        If a function has the wrong arity, asks for a name that does not exist, fails, or returns the
-        wrong number or kind of values; or if a given derivative is wrong.
+        If a function has the wrong arity, asks for a name that does not exist, fails, is not pure, or returns
+        the wrong number or kind of values; or if a given derivative or the period is wrong.
     """
     for role in roles(system):
         _probe_role(system, role)

@@ -286,7 +286,8 @@ class HybridSystem:
     """A hybrid (piecewise-smooth) dynamical system: modes joined by transitions.
 
     Model functions are plain Python on scalars, ``f(t, x, p)``, with ``x.q`` and ``p.e`` by name and
-    NumPy functions for mathematics. They must be pure: they are traced once, not called in the loop.
+    NumPy functions for mathematics. They must be pure: they are traced once, not called in the loop. A field
+    should be smooth: tangent vectors are not valid beyond a jump of it inside its mode.
 
     Parameters
     ----------
@@ -298,15 +299,15 @@ class HybridSystem:
         Nodes and edges. Among simultaneous crossings the transition listed first fires.
     period
         Forcing period, a number or a function of ``p``. Every model function must have this period in
-        ``t``; time is then kept as whole periods and a phase.
+        ``t``, which is checked; time is then kept as whole periods and a phase.
     name
         For reports and figures.
 
     Raises
     ------
     ModelError
-        If names clash or do not exist, a mode cannot be reached, or a function has the wrong arity or
-        the wrong number of values.
+        If names clash or do not exist, a mode cannot be reached, a function has the wrong arity or the
+        wrong number of values, is not pure, or does not have the declared period.
     """
 
     state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=_as_state)

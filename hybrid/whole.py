@@ -4,8 +4,11 @@ Python's whole numbers have no largest one, numba's have 64 bits. Here a result 
 error; a number too large for an index is a float from the start, and so is every power of whole numbers.
 """
 
+from __future__ import annotations
+
 import math
 import operator
+from typing import Any
 
 from numba.core import ir, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -24,18 +27,18 @@ MOST_FACTORS = 100
 TEXT = "a whole number beyond 2**63"
 
 
-def _fits(a, b):
+def _fits(a: Any, b: Any) -> Any:
     """Whether two numbers are whole and of Python's kind, so that their result may not fit."""
     return isinstance(a, types.Integer) and isinstance(b, types.Integer) and types.uint64 not in (a, b)
 
 
-def _checked(name, whole, other):
+def _checked(name: Any, whole: Any, other: Any) -> Any:
     """A function of two numbers that is ``whole`` of whole ones and ``other`` of any others."""
 
-    def stub(a, b):
+    def stub(a: Any, b: Any) -> Any:
         return other(a, b)
 
-    def implementation(a, b):
+    def implementation(a: Any, b: Any) -> Any:
         if _fits(a, b):
             return whole
         if name.endswith("pow") and isinstance(a, types.Complex) and not isinstance(b, types.Complex):
@@ -47,29 +50,29 @@ def _checked(name, whole, other):
     return stub
 
 
-def _sum(a, b):
+def _sum(a: Any, b: Any) -> Any:
     if abs(float(a) + float(b)) > TOO_LARGE:
         raise OverflowError(TEXT)
     return a + b
 
 
-def _difference(a, b):
+def _difference(a: Any, b: Any) -> Any:
     if abs(float(a) - float(b)) > TOO_LARGE:
         raise OverflowError(TEXT)
     return a - b
 
 
-def _product(a, b):
+def _product(a: Any, b: Any) -> Any:
     if abs(float(a) * float(b)) > TOO_LARGE:
         raise OverflowError(TEXT)
     return a * b
 
 
-def _power(a, b):
+def _power(a: Any, b: Any) -> Any:
     return float(a) ** float(b)
 
 
-def _complex_power(a, b):
+def _complex_power(a: Any, b: Any) -> Any:
     """As in Python by products, which keep a small imaginary part, and with it the complex step."""
     n = int(b)
     if n != b or abs(n) > MOST_FACTORS:
@@ -83,25 +86,25 @@ def _complex_power(a, b):
     return 1.0 / power if n < 0 else power
 
 
-def _quotient(a, b):
+def _quotient(a: Any, b: Any) -> Any:
     if b == 0:
         raise ZeroDivisionError("division by zero")
     return a / b
 
 
-def _whole_quotient(a, b):
+def _whole_quotient(a: Any, b: Any) -> Any:
     if b == 0:
         raise ZeroDivisionError("division by zero")
     return a // b
 
 
-def _remainder(a, b):
+def _remainder(a: Any, b: Any) -> Any:
     if b == 0:
         raise ZeroDivisionError("division by zero")
     return a % b
 
 
-def _shift(a, b):
+def _shift(a: Any, b: Any) -> Any:
     if b < 0 or b > 62 or abs(float(a)) * 2.0**b > TOO_LARGE:
         raise OverflowError(TEXT)
     return a << b
@@ -124,14 +127,14 @@ for _name, _of_whole in WHOLE.items():
         OPERATIONS[_operator] = _checked(f"whole_{_prefix}{_name}", _of_whole, _operator)
 
 
-def _rounding(function):
+def _rounding(function: Any) -> Any:
     """A function that makes a whole number of a float."""
 
-    def stub(a):
+    def stub(a: Any) -> Any:
         return function(a)
 
-    def implementation(a):
-        def of_float(a):
+    def implementation(a: Any) -> Any:
+        def of_float(a: Any) -> Any:
             if not abs(a) <= TOO_LARGE:
                 raise OverflowError(TEXT)
             return function(a)
@@ -146,10 +149,10 @@ ROUNDINGS = {function: _rounding(function) for function in (int, math.floor, mat
 
 
 @intrinsic
-def readonly(typing_context, array):
+def readonly(typing_context: Any, array: Any) -> Any:
     """The array, which what is called with it cannot write into."""
 
-    def same(context, builder, signature, arguments):
+    def same(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
 
     return array.copy(readonly=True)(array), same
@@ -161,14 +164,14 @@ class _CheckWholeNumbers(FunctionPass):
 
     _name = "check_whole_numbers"
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__()
 
-    def run_pass(self, state):
+    def run_pass(self, state: Any) -> Any:
         """Whether anything was replaced."""
         func_ir, changed = state.func_ir, False
         for block in func_ir.blocks.values():
-            body = []
+            body: list[Any] = []
             for statement in block.body:
                 if isinstance(statement, ir.Assign):
                     changed |= _replace(func_ir, statement, body)
@@ -179,7 +182,7 @@ class _CheckWholeNumbers(FunctionPass):
         return changed
 
 
-def _replace(func_ir, statement, body):
+def _replace(func_ir: Any, statement: Any, body: Any) -> Any:
     """Replace the value of one assignment if need be; what it needs before goes to ``body``."""
     value, place = statement.value, statement.loc
     if isinstance(value, ir.Const | ir.Global | ir.FreeVar):
@@ -203,7 +206,7 @@ def _replace(func_ir, statement, body):
     return False
 
 
-def _replace_rounding(statement, function):
+def _replace_rounding(statement: Any, function: Any) -> Any:
     stub = ROUNDINGS.get(function) if callable(function) else None
     if stub is None:
         return False
@@ -214,7 +217,7 @@ def _replace_rounding(statement, function):
 class WholeNumberCompiler(CompilerBase):
     """Numba's passes, and one that replaces arithmetic on whole numbers."""
 
-    def define_pipelines(self):
+    def define_pipelines(self) -> Any:
         """The one pipeline."""
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.add_pass_after(_CheckWholeNumbers, IRProcessing)

@@ -16,6 +16,7 @@ from hybrid.testing import (
     Engine,
     PropertyError,
     cases,
+    check_compiled,
     check_continuity,
     check_crossings,
     check_cut,
@@ -26,6 +27,7 @@ from hybrid.testing import (
     check_jumps,
     check_names,
     check_order,
+    check_period,
     check_saltation,
     check_samples,
     check_scale,
@@ -86,6 +88,14 @@ def box(*, floor=-1, reset=lambda t, x, p: (x.q, -p.e * x.v), jacobian=None):
 
 BALL, TABLE, JERK, BOX = models.bouncing_ball(), shaken_table(), systems.jerk(), box()
 CONSTANT = systems.constant_fields()
+FLOOR = BOX.transitions[0]
+GATED = attrs.evolve(
+    BOX,
+    transitions=[
+        attrs.evolve(FLOOR, guard=attrs.evolve(FLOOR.guard, when=lambda t, x, p: 3 - x.v)),
+        BOX.transitions[1],
+    ],
+)
 IN_THE_BOX = {"states": {"q": (0.1, 0.9), "v": (-2.0, 2.0)}}
 
 
@@ -251,6 +261,17 @@ class DerivativeOfNoughtPointNine(Engine):
         return 0.9 * super().derivative(*arguments)
 
 
+class ValuesOff(Engine):
+    """One of the compiled functions is off by a little where the first component is negative."""
+
+    def __init__(self, name):
+        self.name = name
+
+    def value(self, compiled, role, index, t, x, parameters):
+        found = super().value(compiled, role, index, t, x, parameters)
+        return found + 1e-9 * (role.name == self.name and x[0] < 0)
+
+
 def test_the_formula_that_the_faults_are_made_from_is_right():
     report = check_system(TABLE, examples=10, engine=Saltation(right))
     assert next(p for p in report.properties if p.name.startswith("The saltation matrix is the der")).checked
@@ -297,6 +318,10 @@ def test_wrong_saltation_matrices(check, system, fault, text):
         (check_sum_rule, BALL, TangentsLost(), "miss a jump"),
         (check_saltation, BALL, TangentsLost(), "simulate(tangent=True)"),
         (check_derivatives, BALL, DerivativeOfNoughtPointNine(), "entry D_v of q is 0.9"),
+        (check_compiled, GATED, ValuesOff("field"), "Mode 'flight': field: value 0 is"),
+        (check_compiled, GATED, ValuesOff("guard"), "Transition 'floor': guard is"),
+        (check_compiled, GATED, ValuesOff("when"), "Transition 'floor': when is"),
+        (check_compiled, GATED, ValuesOff("reset"), "Transition 'floor': reset: value 0 is"),
     ],
 )
 def test_faults_of_the_solver(check, system, engine, text):
@@ -337,6 +362,21 @@ class TestFaultsOfAModel:
         guard = attrs.evolve(hit.guard, gradient=lambda t, x, p: (1.0, 0.0))
         with pytest.raises(hybrid.ModelError, match="has 2 columns, but the guard depends on t"):
             attrs.evolve(TABLE, transitions=[attrs.evolve(hit, guard=guard)])
+
+    def test_a_number_where_the_period_needs_a_parameter(self):
+        """Right at the parameters declared, and so accepted when the system is made."""
+        shaken = attrs.evolve(TABLE, period=2 * np.pi / 5.0)
+        assert "one period later" in found(check_period, shaken)
+        told = fails(shaken)
+        assert "The declared period is a period of every function: this does not hold" in told
+        assert "a number in the period where a function has a parameter" in told
+
+    def test_a_field_that_jumps_is_told(self):
+        rough = box()
+        rough = attrs.evolve(rough, modes=[Mode("flight", lambda t, x, p: (x.v, -p.c * np.sign(x.v) - x.q))])
+        report = check_system(rough, examples=3, **IN_THE_BOX)
+        assert report.discontinuities == {"flight": "v = 0"}
+        assert "The field of mode 'flight' jumps where v = 0" in str(report)
 
     def test_a_reset_with_the_wrong_sign(self):
         told = fails(box(reset=lambda t, x, p: (x.q, p.e * x.v)), **IN_THE_BOX)
