@@ -4,11 +4,13 @@ Python's whole numbers have no largest one, numba's have 64 bits. Here a result 
 error; a number too large for an index is a float from the start, and so is every power of whole numbers.
 """
 
+# Numba compares the signatures of what it overloads, annotations included, so there are none.
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators, allow-incomplete-defs
+
 from __future__ import annotations
 
 import math
 import operator
-from typing import Any
 
 from numba.core import ir, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -27,18 +29,18 @@ MOST_FACTORS = 100
 TEXT = "a whole number beyond 2**63"
 
 
-def _fits(a: Any, b: Any) -> Any:
+def _fits(a, b):
     """Whether two numbers are whole and of Python's kind, so that their result may not fit."""
     return isinstance(a, types.Integer) and isinstance(b, types.Integer) and types.uint64 not in (a, b)
 
 
-def _checked(name: Any, whole: Any, other: Any) -> Any:
+def _checked(name, whole, other):
     """A function of two numbers that is ``whole`` of whole ones and ``other`` of any others."""
 
-    def stub(a: Any, b: Any) -> Any:
+    def stub(a, b):
         return other(a, b)
 
-    def implementation(a: Any, b: Any) -> Any:
+    def implementation(a, b):
         if _fits(a, b):
             return whole
         if name.endswith("pow") and isinstance(a, types.Complex) and not isinstance(b, types.Complex):
@@ -50,29 +52,29 @@ def _checked(name: Any, whole: Any, other: Any) -> Any:
     return stub
 
 
-def _sum(a: Any, b: Any) -> Any:
+def _sum(a, b):
     if abs(float(a) + float(b)) > TOO_LARGE:
         raise OverflowError(TEXT)
     return a + b
 
 
-def _difference(a: Any, b: Any) -> Any:
+def _difference(a, b):
     if abs(float(a) - float(b)) > TOO_LARGE:
         raise OverflowError(TEXT)
     return a - b
 
 
-def _product(a: Any, b: Any) -> Any:
+def _product(a, b):
     if abs(float(a) * float(b)) > TOO_LARGE:
         raise OverflowError(TEXT)
     return a * b
 
 
-def _power(a: Any, b: Any) -> Any:
+def _power(a, b):
     return float(a) ** float(b)
 
 
-def _complex_power(a: Any, b: Any) -> Any:
+def _complex_power(a, b):
     """As in Python by products, which keep a small imaginary part, and with it the complex step."""
     n = int(b)
     if n != b or abs(n) > MOST_FACTORS:
@@ -86,25 +88,25 @@ def _complex_power(a: Any, b: Any) -> Any:
     return 1.0 / power if n < 0 else power
 
 
-def _quotient(a: Any, b: Any) -> Any:
+def _quotient(a, b):
     if b == 0:
         raise ZeroDivisionError("division by zero")
     return a / b
 
 
-def _whole_quotient(a: Any, b: Any) -> Any:
+def _whole_quotient(a, b):
     if b == 0:
         raise ZeroDivisionError("division by zero")
     return a // b
 
 
-def _remainder(a: Any, b: Any) -> Any:
+def _remainder(a, b):
     if b == 0:
         raise ZeroDivisionError("division by zero")
     return a % b
 
 
-def _shift(a: Any, b: Any) -> Any:
+def _shift(a, b):
     if b < 0 or b > 62 or abs(float(a)) * 2.0**b > TOO_LARGE:
         raise OverflowError(TEXT)
     return a << b
@@ -127,14 +129,14 @@ for _name, _of_whole in WHOLE.items():
         OPERATIONS[_operator] = _checked(f"whole_{_prefix}{_name}", _of_whole, _operator)
 
 
-def _rounding(function: Any) -> Any:
+def _rounding(function):
     """A function that makes a whole number of a float."""
 
-    def stub(a: Any) -> Any:
+    def stub(a):
         return function(a)
 
-    def implementation(a: Any) -> Any:
-        def of_float(a: Any) -> Any:
+    def implementation(a):
+        def of_float(a):
             if not abs(a) <= TOO_LARGE:
                 raise OverflowError(TEXT)
             return function(a)
@@ -149,10 +151,10 @@ ROUNDINGS = {function: _rounding(function) for function in (int, math.floor, mat
 
 
 @intrinsic
-def readonly(typing_context: Any, array: Any) -> Any:
+def readonly(typing_context, array):
     """The array, which what is called with it cannot write into."""
 
-    def same(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def same(context, builder, signature, arguments):
         return impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
 
     return array.copy(readonly=True)(array), same
@@ -164,14 +166,14 @@ class _CheckWholeNumbers(FunctionPass):
 
     _name = "check_whole_numbers"
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
 
-    def run_pass(self, state: Any) -> Any:
+    def run_pass(self, state):
         """Whether anything was replaced."""
         func_ir, changed = state.func_ir, False
         for block in func_ir.blocks.values():
-            body: list[Any] = []
+            body: list[object] = []
             for statement in block.body:
                 if isinstance(statement, ir.Assign):
                     changed |= _replace(func_ir, statement, body)
@@ -182,7 +184,7 @@ class _CheckWholeNumbers(FunctionPass):
         return changed
 
 
-def _replace(func_ir: Any, statement: Any, body: Any) -> Any:
+def _replace(func_ir, statement, body):
     """Replace the value of one assignment if need be; what it needs before goes to ``body``."""
     value, place = statement.value, statement.loc
     if isinstance(value, ir.Const | ir.Global | ir.FreeVar):
@@ -206,7 +208,7 @@ def _replace(func_ir: Any, statement: Any, body: Any) -> Any:
     return False
 
 
-def _replace_rounding(statement: Any, function: Any) -> Any:
+def _replace_rounding(statement, function):
     stub = ROUNDINGS.get(function) if callable(function) else None
     if stub is None:
         return False
@@ -217,7 +219,7 @@ def _replace_rounding(statement: Any, function: Any) -> Any:
 class WholeNumberCompiler(CompilerBase):
     """Numba's passes, and one that replaces arithmetic on whole numbers."""
 
-    def define_pipelines(self) -> Any:
+    def define_pipelines(self):
         """The one pipeline."""
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.add_pass_after(_CheckWholeNumbers, IRProcessing)
