@@ -14,7 +14,7 @@ from hybrid.run import check_solver
 from hybrid.simulate import simulate
 from hybrid.solvers import RungeKutta
 from hybrid.status import Status, StatusCode
-from hybrid.system import HybridSystem
+from hybrid.system import HybridSystem, as_system
 
 TIGHTER = (10.0, 100.0)
 # Below this rounding is all that a tolerance controls.
@@ -104,6 +104,7 @@ def global_error(
     >>> bool(abs(found.arc.jumps[0].t - exact) <= found.jumps[0] < 1e-13)
     True
     """
+    as_system("system", system)
     solver = check_solver(solver)
     if solver.rtol < 10 * LEAST_RTOL:
         raise ArgumentError(

@@ -6,8 +6,8 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.arc import HybridArc
 from hybrid.errors import ArgumentError
 
@@ -15,10 +15,6 @@ QUANTITIES = ("state", "times", "saltation", "fundamental", "exponents")
 EPSILON = float(np.finfo(float).eps)
 # A singular value with less than this of the largest is rounding, and so is its exponent.
 NEGLIGIBLE = 1e-12
-
-
-def _array(value: ArrayLike | None) -> np.ndarray | None:
-    return None if value is None else np.array(value, dtype=float)
 
 
 @attrs.frozen(eq=False)
@@ -44,13 +40,24 @@ class Answer:
         Time of the run where the method takes it itself, being a process of its own, for one.
     """
 
-    state: np.ndarray = attrs.field(converter=_array)
-    times: np.ndarray | None = attrs.field(default=None, converter=_array, kw_only=True)
-    saltation: np.ndarray | None = attrs.field(default=None, converter=_array, kw_only=True)
-    fundamental: np.ndarray | None = attrs.field(default=None, converter=_array, kw_only=True)
-    exponents: np.ndarray | None = attrs.field(default=None, converter=_array, kw_only=True)
+    state: np.ndarray = attrs.field()
+    times: np.ndarray | None = attrs.field(default=None, kw_only=True)
+    saltation: np.ndarray | None = attrs.field(default=None, kw_only=True)
+    fundamental: np.ndarray | None = attrs.field(default=None, kw_only=True)
+    exponents: np.ndarray | None = attrs.field(default=None, kw_only=True)
     steps: int | None = attrs.field(default=None, kw_only=True)
     seconds: float | None = attrs.field(default=None, kw_only=True)
+
+    def __attrs_post_init__(self) -> None:
+        for name in QUANTITIES:
+            value = getattr(self, name)
+            if value is not None or name == "state":
+                found = arguments.numbers(f"Answer: {name}", value, "hold numbers")
+                object.__setattr__(self, name, found)
+        if self.steps is not None:
+            arguments.count("Answer: steps", self.steps, 0)
+        if self.seconds is not None:
+            arguments.not_negative("Answer: seconds", self.seconds)
 
 
 def as_answer(name: str, result: Any, n: int, span: float) -> Answer:
@@ -67,12 +74,13 @@ def as_answer(name: str, result: Any, n: int, span: float) -> Answer:
     elif not isinstance(result, Answer):
         try:
             result = Answer(result)
-        except (TypeError, ValueError):
+        except ArgumentError:
             raise ArgumentError(
-                f"Method {name!r} must return the state at the end, an Answer or a HybridArc; got {result!r}."
+                f"{name} must be the state at the end, an Answer or a HybridArc; "
+                f"got {arguments.shown(result)}."
             ) from None
     if result.state.shape != (n,):
-        raise ArgumentError(f"Method {name!r}: the state must have shape ({n},); got {result.state.shape}.")
+        raise ArgumentError(f"{name}: the state must have shape ({n},); got {result.state.shape}.")
     if result.exponents is None and result.fundamental is not None and span > 0:
         return attrs.evolve(result, exponents=_exponents(result.fundamental, span))
     return result

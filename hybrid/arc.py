@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.load import entry, load_kernels
@@ -275,7 +276,7 @@ class HybridArc:
         ArgumentError
             If a time lies outside the run, or the run kept samples only.
         """
-        times = np.asarray(t, dtype=float)
+        times = arguments.numbers("t", t, "be a time or an array of times")
         if self._pieces is None:
             raise ArgumentError(
                 "This arc keeps samples only. Run simulate without samples= for dense output."

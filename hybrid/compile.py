@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import attrs
 import numpy as np
 
+from hybrid import arguments
 from hybrid.agreement import check_agreement
 from hybrid.cache import announced, compiled_into, source_key, write_whole
 from hybrid.errors import ArgumentError
@@ -23,7 +24,7 @@ from hybrid.opaque import namespace_of, refusal_of
 from hybrid.periodicity import period_fault
 from hybrid.roles import CONDITION, Role
 from hybrid.surface import is_paired
-from hybrid.system import HybridSystem
+from hybrid.system import HybridSystem, as_system
 
 if TYPE_CHECKING:
     from hybrid.emitted import Emitted
@@ -124,7 +125,7 @@ class CompiledSystem:
 
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
-        groups = -(-tangents // NARROW)
+        groups = -(-arguments.count("tangents", tangents, 0) // NARROW)
         widest = max(each.tangent_columns for each in self.emitted.propagators)
         return self.emitted.tangent_start + groups * widest
 
@@ -270,8 +271,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     ArgumentError
         If ``system`` is not a HybridSystem.
     """
-    if not isinstance(system, HybridSystem):
-        raise ArgumentError(f"system must be a HybridSystem; got {system!r}. Call the model's factory first.")
+    as_system("system", system)
     compiled = _COMPILED.get(system)
     if compiled is None:
         load_kernels()

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ModelError
-from hybrid.system import Guard, HybridSystem, Mode, ModelFunction, Reset, Transition
+from hybrid.system import Guard, HybridSystem, Mode, ModelFunction, Reset, Transition, as_parameters, as_state
 
 # Two fields that both move through the surface slower than this share of their speeds are tangent to it.
 TANGENT = 1e-9
@@ -97,6 +97,7 @@ def filippov(
     >>> str(arc.mode[0]), arc.jumps[0].transition, round(arc.jumps[0].t, 12)
     ('sliding', 'sliding->below', 2.5)
     """
+    state, parameters = as_state(state), as_parameters(parameters)
     for what, function in (("below", below), ("above", above), ("switching", switching)):
         if not callable(function):
             raise ModelError(f"filippov: {what} must be a function of (t, x, p); got {function!r}.")

@@ -8,13 +8,14 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.arc import HybridArc
 from hybrid.errors import ArgumentError
-from hybrid.run import check_count, check_state, start
+from hybrid.run import check_solver, start
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta
 from hybrid.status import SUCCESS, Status, StatusCode
-from hybrid.system import HybridSystem, finite_number
+from hybrid.system import HybridSystem, as_system
 
 # Newton steps are halved down to this part before they are taken as they are.
 SHORTEST_STEP = 1 / 64
@@ -135,26 +136,26 @@ def periodic_orbit(
     >>> orbit.status.ok
     True
     """
-    check_count("periods", periods, 1)
-    check_count("max_iterations", max_iterations, 0)
-    guess = check_state(system, x0)
-    if not tolerance > 0:
-        raise ArgumentError(f"tolerance must be positive; got {tolerance!r}.")
-    shooting = _Shooting(system, mode, parameters, solver or DOP853(rtol=1e-12, atol=1e-14))
+    as_system("system", system)
+    periods = arguments.count("periods", periods, 1)
+    max_iterations = arguments.count("max_iterations", max_iterations, 0)
+    guess = arguments.state("x0", x0, system)
+    t0 = arguments.number("t0", t0)
+    tolerance = arguments.positive("tolerance", tolerance)
+    method = DOP853(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+    shooting = _Shooting(system, mode, parameters, method)
     forcing = system.forcing_period(parameters)
     if forcing is not None:
         if period is not None:
             raise ArgumentError(
                 f"period is for autonomous systems; this one has the forcing period {forcing}. Use periods=."
             )
-        point = _Point(guess, finite_number("t0", t0), periods * forcing)
+        point = _Point(guess, t0, periods * forcing)
         return shooting.newton(point, None, tolerance, max_iterations)
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
-    length = finite_number("period", period)
-    if length <= 0:
-        raise ArgumentError(f"period must be positive; got {period!r}.")
-    return shooting.autonomous(_Point(guess, finite_number("t0", t0), length), tolerance, max_iterations)
+    length = arguments.positive("period", period)
+    return shooting.autonomous(_Point(guess, t0, length), tolerance, max_iterations)
 
 
 @attrs.frozen(eq=False)

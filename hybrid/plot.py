@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybrid import arguments
 from hybrid.arc import HybridArc
-from hybrid.errors import ArgumentError, unknown_name
-from hybrid.system import END, HybridSystem, Transition
+from hybrid.errors import ArgumentError
+from hybrid.system import END, HybridSystem, Transition, as_system
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -58,8 +59,8 @@ def plot_arc(
     ArgumentError
         If a component does not exist, or the number of axes differs from that of components.
     """
-    names = arc.system.state_names
-    chosen = range(len(names)) if components is None else [_component(arc.system, c) for c in components]
+    names = _as_arc(arc).system.state_names
+    chosen = range(len(names)) if components is None else _components(arc.system, components)
     axes = _axes(ax, len(chosen))
     lines = _lines(arc)
     for row, i in zip(axes, chosen, strict=True):
@@ -99,7 +100,8 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, ax: Axes | None = Non
     ArgumentError
         If a component does not exist.
     """
-    i, j = _component(arc.system, x), _component(arc.system, y)
+    system = _as_arc(arc).system
+    i, j = as_component("x", system, x), as_component("y", system, y)
     (ax,) = _axes(ax, 1, figsize=(5.0, 4.2))
     lines = _lines(arc)
     for mode, (_, states) in lines.items():
@@ -139,7 +141,7 @@ def plot_graph(system: HybridSystem, ax: Axes | None = None) -> Axes:
     -------
     matplotlib.axes.Axes
     """
-    graph = system.graph
+    graph = as_system("system", system).graph
     crowd = len(graph)
     (ax,) = _axes(ax, 1, figsize=((4.0, 2.6), (6.0, 2.8), (7.0, 6.0))[min(crowd, 3) - 1])
     where = _places(graph)
@@ -201,6 +203,8 @@ def plot_work_precision(result: WorkPrecision, ax: Axes | None = None, quantity:
     ArgumentError
         If the quantity was not measured.
     """
+    if not hasattr(result, "error_of"):
+        raise arguments.refusal("result", "be a WorkPrecision, from hybrid.work_precision", result)
     error = result.error_of(quantity)
     (ax,) = _axes(ax, 1, figsize=(6.4, 4.6))
     ends = []
@@ -364,15 +368,32 @@ def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:
     ax.set_axis_off()
 
 
-def _component(system: HybridSystem, component: str | int) -> int:
+def _as_arc(arc: object) -> HybridArc:
+    return arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.")
+
+
+def _components(system: HybridSystem, components: object) -> list[int]:
+    given = arguments.items("components", components, "be names or indices of components of the state")
+    return [as_component("components", system, each) for each in given]
+
+
+def as_component(name: str, system: HybridSystem, component: object) -> int:
+    """Index of a component of the state, given by name or index in the argument ``name``."""
     names = system.state_names
-    if isinstance(component, str):
-        if component not in names:
-            raise ArgumentError(unknown_name("State component", component, names, "State components"))
-        return names.index(component)
-    if not -len(names) <= component < len(names):
-        raise ArgumentError(f"State component {component} does not exist; the state has {len(names)}.")
-    return component % len(names)
+    if isinstance(component, int | np.integer) and not isinstance(component, bool):
+        if not -len(names) <= component < len(names):
+            raise ArgumentError(
+                f"{name}: State component {component} does not exist; the state has {len(names)}."
+            )
+        return int(component) % len(names)
+    return names.index(arguments.known(f"{name}: State component", component, names, "State components"))
+
+
+def as_axes(name: str, value: object) -> Axes:
+    """Axes of matplotlib, or an ArgumentError."""
+    from matplotlib.axes import Axes
+
+    return arguments.instance(name, value, Axes, "Make them with matplotlib.pyplot.subplots.")
 
 
 def _axes(ax: Any, count: int, figsize: tuple[float, float] | None = None) -> np.ndarray:
@@ -383,8 +404,10 @@ def _axes(ax: Any, count: int, figsize: tuple[float, float] | None = None) -> np
         size = figsize or (7.0, 0.8 + 1.5 * count)
         return plt.subplots(count, 1, sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
     axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
+    for each in axes:
+        as_axes("ax", each)
     if len(axes) != count:
-        raise ArgumentError(f"ax must hold {count} axes, one a component; got {len(axes)}.")
+        raise ArgumentError(f"ax must hold {count} axes, one per component; got {len(axes)}.")
     return axes
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import floor, isfinite
+from math import floor, ulp
 from typing import Any
 
 import attrs
 import numpy as np
 
+from hybrid import arguments
 from hybrid.compile import CompiledSystem, compile_system
 from hybrid.ending import status_of
 from hybrid.errors import ArgumentError
@@ -24,6 +25,8 @@ from hybrid.system import HybridSystem
 ISOLATION_DEPTH = 64
 # Transitions remembered in the order in which they fired: enough to see which go round without end.
 RECENT = 64
+# A time is known to this part of a forcing period, at least.
+FINEST_PHASE = 2.0**-10
 UNLIMITED = np.iinfo(np.int64).max
 DEFAULT_SOLVER = Taylor()
 
@@ -210,32 +213,6 @@ def _run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> 
     return Layout(Run, shapes)
 
 
-def check_state(system: HybridSystem, x0: Any) -> np.ndarray:
-    """``x0`` as a finite vector ``(n,)``; ArgumentError if it is not one."""
-    try:
-        state = np.array(x0, dtype=float)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"x0 must hold {system.dimension} numbers; got {x0!r}.") from None
-    if state.shape != (system.dimension,):
-        names = ", ".join(system.state_names)
-        raise ArgumentError(
-            f"x0 has shape {state.shape}; the state needs shape ({system.dimension},): {names}."
-        )
-    values = state.tolist()
-    if not all(map(isfinite, values)):
-        name, value = next(
-            pair for pair in zip(system.state_names, values, strict=True) if not isfinite(pair[1])
-        )
-        raise ArgumentError(f"x0: component {name!r} must be finite; got {value}.")
-    return state
-
-
-def check_count(name: str, value: object, least: int) -> None:
-    """ArgumentError unless ``value`` is a whole number of at least ``least``."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ArgumentError(f"{name} must be a whole number of at least {least}; got {value!r}.")
-
-
 def check_solver(solver: object) -> RungeKutta:
     """The solver, or the default one; ArgumentError for anything else."""
     if solver is None:
@@ -243,8 +220,18 @@ def check_solver(solver: object) -> RungeKutta:
     if isinstance(solver, RungeKutta) and hasattr(solver, "tableau"):
         return solver
     raise ArgumentError(
-        f"solver must be a solver object; got {solver!r}. Write for instance hybrid.DOP853(rtol=1e-8)."
+        f"solver must be a solver object; got {arguments.shown(solver)}. "
+        "Write for instance hybrid.DOP853(rtol=1e-8)."
     )
+
+
+def check_time(name: str, t: float, period: float) -> None:
+    """ArgumentError if the phase of ``t`` within the period, if there is one, is lost in rounding."""
+    if period > 0.0 and not ulp(t) <= FINEST_PHASE * period:
+        raise ArgumentError(
+            f"{name} must be small enough to have a phase: floating-point numbers near {t} are {ulp(t):.2g} "
+            f"apart, and the forcing period is {period:.6g}. Take whole periods off."
+        )
 
 
 def split_time(t: float, period: float) -> tuple[int, float]:
@@ -385,15 +372,19 @@ def start(
     parameters: Mapping[str, float] | None = None,
     solver: RungeKutta | None = None,
     tangent: np.ndarray | None = None,
+    time: str = "t0",
 ) -> Trajectory:
     """A trajectory at its start, everything about the call checked.
 
-    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any.
+    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
+    name of the argument that ``t0`` comes from.
     """
     compiled = compile_system(system)
-    state = check_state(system, x0)
+    state = arguments.state("x0", x0, system)
+    t0 = arguments.number(time, t0)
     solver = check_solver(solver)
     model = compiled.model(parameters)
+    check_time(time, t0, model.period)
     tangents = 0 if tangent is None else tangent.shape[1]
     plan = plan_of(compiled, solver, tangents)
     if plan.propagator is not None:

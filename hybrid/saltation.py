@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.load import entry, load_kernels
-from hybrid.run import check_state, kernel_method, split_time, workspace
+from hybrid.run import check_time, kernel_method, split_time, workspace
 from hybrid.solvers import Tsit5
-from hybrid.system import HybridSystem, Transition, finite_number
+from hybrid.system import HybridSystem, Transition
 
 
 def saltation_matrix(
@@ -60,9 +61,11 @@ def saltation_matrix(
     """
     compiled = compile_system(system)
     index = system.transition_index(transition)
-    state = check_state(system, x)
+    state = arguments.state("x", x, system)
     model = compiled.model(parameters)
-    phase = split_time(finite_number("t", t), model.period)[1]
+    t = arguments.number("t", t)
+    check_time("t", t, model.period)
+    phase = split_time(t, model.period)[1]
     matrices, (transversality,) = matrices_at(system, model, [index], [phase], state[None])
     if not np.all(np.isfinite(matrices)):
         raise ArgumentError(

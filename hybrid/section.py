@@ -9,14 +9,15 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import progress_bar
-from hybrid.run import UNLIMITED, Trajectory, check_count, empty_record, start
+from hybrid.run import UNLIMITED, Trajectory, empty_record, start
 from hybrid.solvers import RungeKutta
 from hybrid.status import Status
-from hybrid.system import Guard, HybridSystem, Transition
+from hybrid.system import Guard, HybridSystem, Transition, as_system
 
 POINTS_AT_ONCE = 500
 # A surface that is not met within this many steps is taken to be missed for good.
@@ -92,8 +93,9 @@ def stroboscopic_section(
     >>> section.x.shape
     (10, 2)
     """
-    check_count("periods", periods, 1)
-    check_count("transient", transient, 0)
+    periods = arguments.count("periods", periods, 1)
+    transient = arguments.count("transient", transient, 0)
+    progress = arguments.flag("progress", progress)
     trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
     if trajectory.model.period <= 0:
         raise ArgumentError(
@@ -193,13 +195,11 @@ def poincare_section(
     >>> [round(float(q), 4) for q in section.x[:, 0]]
     [0.64, 0.4096, 0.2621]
     """
-    check_count("points", points, 1)
-    check_count("transient", transient, 0)
-    if not isinstance(section, Guard):
-        raise ArgumentError(
-            f"section must be a Guard; got {section!r}. Write Guard(function, direction=...)."
-        )
-    marked = with_section(system, section)
+    points = arguments.count("points", points, 1)
+    transient = arguments.count("transient", transient, 0)
+    progress = arguments.flag("progress", progress)
+    arguments.instance("section", section, Guard, "Write Guard(function, direction=...).")
+    marked = with_section(as_system("system", system), section)
     trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
     with progress_bar(transient + points, "Section", progress, "point") as bar:
         return _collect(trajectory, len(system.modes), transient, points, bar)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
-from hybrid.errors import ArgumentError
 from hybrid.kernels import codes
-from hybrid.run import Trajectory, empty_record, record_layout, start
+from hybrid.run import Trajectory, check_time, empty_record, record_layout, start
 from hybrid.solvers import RungeKutta
-from hybrid.system import HybridSystem
+from hybrid.system import HybridSystem, as_system
 
 # Room of the record that kernels fill before Python empties it: large enough that the crossing costs nothing.
 STEPS_AT_ONCE = 2048
@@ -75,55 +74,30 @@ def simulate(
     >>> round(arc.jumps[0].t, 4)
     0.4515
     """
-    t0, t1 = _time_span(t_span)
-    times = None if samples is None else _sample_times(samples, t0, t1)
+    as_system("system", system)
+    t0, t1 = arguments.time_span("t_span", t_span)
+    times = None if samples is None else arguments.increasing_times("samples", samples, t0, t1)
     vectors = None if tangent is None or tangent is False else _tangent_matrix(tangent, system)
-    if not max_jumps >= 0:
-        raise ArgumentError(f"max_jumps must be at least 0; got {max_jumps!r}.")
-    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
-    arc = _Recorder(trajectory, times, t1).run(t1, int(max_jumps))
+    most = arguments.count("max_jumps", max_jumps, 0)
+    trajectory = start(
+        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors, time="t_span"
+    )
+    check_time("t_span", t1, trajectory.model.period)
+    arc = _Recorder(trajectory, times, t1).run(t1, most)
     trajectory.release()
     return arc
-
-
-def _time_span(t_span: Any) -> tuple[float, float]:
-    try:
-        t0, t1 = (float(t) for t in t_span)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"t_span must be a pair (t0, t1); got {t_span!r}.") from None
-    if not (isfinite(t0) and isfinite(t1)):
-        raise ArgumentError(f"t_span must be finite; got ({t0}, {t1}).")
-    if t1 < t0:
-        raise ArgumentError(
-            f"t_span must not run backwards; got ({t0}, {t1}). Write ({t1}, {t0}), "
-            "or reverse the sign of the fields."
-        )
-    return t0, t1
-
-
-def _sample_times(samples: ArrayLike, t0: float, t1: float) -> np.ndarray:
-    times = np.array(samples, dtype=float)
-    if times.ndim != 1 or (times.size > 1 and not np.all(np.diff(times) >= 0)):
-        raise ArgumentError(f"samples must be increasing times of shape (N,); got shape {times.shape}.")
-    if times.size and not (times[0] >= t0 and times[-1] <= t1):
-        raise ArgumentError(
-            f"samples must lie in t_span, [{t0}, {t1}]; they run from {times[0]} to {times[-1]}."
-        )
-    return times
 
 
 def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
     n = system.dimension
     if tangent is True:
         return np.eye(n)
-    matrix = np.array(tangent, dtype=float)
+    wanted = f"be True or a finite matrix of shape ({n}, k), one tangent vector per column"
+    matrix = arguments.numbers("tangent", tangent, wanted)
     if matrix.ndim == 1:
         matrix = matrix[:, None]
     if matrix.ndim != 2 or matrix.shape[0] != n or matrix.shape[1] == 0 or not np.all(np.isfinite(matrix)):
-        raise ArgumentError(
-            f"tangent must be True or a finite matrix of shape ({n}, k), one tangent vector a column; "
-            f"got shape {matrix.shape}."
-        )
+        raise arguments.refusal("tangent", wanted, matrix)
     return matrix
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
-from math import isfinite
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
+from hybrid import arguments
 from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.names import named_values
 from hybrid.probe import probe_system
@@ -46,6 +46,10 @@ def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object
         raise ModelError(
             f"{type(instance).__name__}: {attribute.name} must be a non-empty string; got {value!r}."
         )
+
+
+def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
 
 
 @attrs.frozen
@@ -94,7 +98,8 @@ class Guard:
 
     @direction.validator
     def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:
-        if value not in (-1, 0, 1):
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not whole or value not in (-1, 0, 1):
             raise ModelError(
                 f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {value!r}."
             )
@@ -196,7 +201,7 @@ class Transition:
     target: str | None = attrs.field(validator=_optional_name)
     guard: Guard = attrs.field(converter=_as_guard)
     reset: Reset | None = attrs.field(default=None, converter=_as_reset)
-    accumulates_to: str | None = attrs.field(default=None, kw_only=True)
+    accumulates_to: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
     name: str = attrs.field(kw_only=True, validator=_nonempty_name)
 
     @reset.validator
@@ -238,14 +243,15 @@ def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
 
 
 def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
-    return tuple(value)
+    return tuple(arguments.items("HybridSystem: modes", value, "be a list of Mode objects"))
 
 
 def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
-    return tuple(value)
+    return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
 
 
-def _as_state(value: Any) -> tuple[str, ...] | int:
+def as_state(value: Any) -> tuple[str, ...] | int:
+    """Names of the components of a state, or their number."""
     if isinstance(value, bool | str):
         raise ModelError(
             f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
@@ -255,6 +261,9 @@ def _as_state(value: Any) -> tuple[str, ...] | int:
         if value < 1:
             raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
         return int(value)
+    # A set has no order.
+    if not isinstance(value, Sequence | np.ndarray) or np.ndim(value) != 1:
+        raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)
     names = tuple(value)
     if not names:
         raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
@@ -262,23 +271,19 @@ def _as_state(value: Any) -> tuple[str, ...] | int:
     return names
 
 
-def _as_parameters(value: Any) -> Mapping[str, float]:
-    checked = {}
-    _check_identifiers(tuple(value), "parameter")
-    for name, number in dict(value).items():
-        checked[name] = finite_number(f"HybridSystem: parameter {name!r}", number)
-    return MappingProxyType(checked)
+def as_parameters(value: Any) -> Mapping[str, float]:
+    """Default values of parameters by name, read-only."""
+    given = arguments.mapping("HybridSystem: parameters", value)
+    _check_identifiers(tuple(given), "parameter")
+    return MappingProxyType(
+        {name: arguments.number(f"HybridSystem: parameter {name!r}", each) for name, each in given.items()}
+    )
 
 
-def finite_number(what: str, value: object) -> float:
-    """``value`` as a finite float, or an ArgumentError that begins with ``what``."""
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{what} must be a number; got {value!r}.") from None
-    if not isfinite(number):
-        raise ArgumentError(f"{what} must be finite; got {number}.")
-    return number
+def _as_period(value: Any) -> Any:
+    if value is None or callable(value):
+        return value
+    return arguments.positive("HybridSystem: period", value, "be a positive time or a function of p")
 
 
 @attrs.frozen(eq=False)
@@ -310,12 +315,12 @@ class HybridSystem:
         wrong number of values, is not pure, or does not have the declared period.
     """
 
-    state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=_as_state)
-    parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=_as_parameters)
+    state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=as_state)
+    parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
-    period: float | ModelFunction | None = attrs.field(default=None, kw_only=True)
-    name: str = attrs.field(default="", kw_only=True)
+    period: float | ModelFunction | None = attrs.field(default=None, kw_only=True, converter=_as_period)
+    name: str = attrs.field(default="", kw_only=True, validator=_name)
 
     def __attrs_post_init__(self) -> None:
         self._check_graph()
@@ -363,24 +368,23 @@ class HybridSystem:
 
     def mode_index(self, name: str) -> int:
         """Index of a mode; ModelError with the available names if there is none."""
-        if name not in self.mode_names:
+        if not isinstance(name, str) or name not in self.mode_names:
             raise ModelError(unknown_name("Mode", name, self.mode_names, "Modes"))
         return self.mode_names.index(name)
 
     def transition_index(self, name: str | Transition) -> int:
         """Index of a transition given by name or object; ModelError with the available names if none."""
         key = name.name if isinstance(name, Transition) else name
-        if key not in self.transition_names:
+        if not isinstance(key, str) or key not in self.transition_names:
             raise ModelError(unknown_name("Transition", key, self.transition_names, "Transitions"))
         return self.transition_names.index(key)
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the given overrides; ArgumentError for unknown names."""
         values = dict(self.parameters)
-        for name, number in dict(overrides or {}).items():
-            if name not in values:
-                raise ArgumentError(unknown_name("Parameter", name, values, "Parameters"))
-            values[name] = finite_number(f"Parameter {name!r}", number)
+        for name, number in arguments.mapping("parameters", overrides).items():
+            arguments.known("parameters: Parameter", name, values, "Parameters")
+            values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
         return np.array(list(values.values()), dtype=float)
 
     def forcing_period(self, overrides: Mapping[str, float] | None = None) -> float | None:
@@ -434,7 +438,12 @@ def period_at(system: HybridSystem, values: np.ndarray) -> float | None:
         return None
     if callable(value):
         value = value(named_values("Parameters", tuple(system.parameters), values))
-    period = finite_number("HybridSystem: period", value)
+    period = arguments.number("HybridSystem: period", value)
     if period <= 0:
         raise ArgumentError(f"HybridSystem: period must be positive; got {period}. Check the parameters.")
     return period
+
+
+def as_system(name: str, value: object) -> HybridSystem:
+    """A system, or an ArgumentError that begins with the name of the argument."""
+    return arguments.instance(name, value, HybridSystem, "Call the model's factory first.")

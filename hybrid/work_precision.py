@@ -11,13 +11,13 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.answer import QUANTITIES, Answer, as_answer, errors_of, rounding_of
 from hybrid.arc import HybridArc
-from hybrid.errors import ArgumentError, unknown_name
-from hybrid.run import check_count
+from hybrid.errors import ArgumentError
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta, Taylor, Tsit5
-from hybrid.system import HybridSystem
+from hybrid.system import HybridSystem, as_system
 from hybrid.text import table
 
 if TYPE_CHECKING:
@@ -96,8 +96,7 @@ class WorkPrecision:
         ArgumentError
             If there is no such method.
         """
-        if method not in self.methods:
-            raise ArgumentError(unknown_name("Method", method, self.methods, "Methods"))
+        arguments.known("Method", method, self.methods, "Methods")
         return self.method == method
 
     def seconds_at(self, method: str, error: float, quantity: str = "state") -> float:
@@ -108,6 +107,7 @@ class WorkPrecision:
         ArgumentError
             If there is no such method or quantity.
         """
+        error = arguments.positive("error", error)
         errors = self.error_of(quantity)
         rows = self.rows_of(method) & (errors > 0) & np.isfinite(errors)
         # A tighter tolerance that takes longer and is worse counts for nothing.
@@ -134,8 +134,7 @@ class WorkPrecision:
         ArgumentError
             If the quantity was not measured.
         """
-        if quantity not in self.error:
-            raise ArgumentError(unknown_name("Quantity", quantity, self.error, "Quantities"))
+        arguments.known("Quantity", quantity, self.error, "Quantities")
         return self.error[quantity]
 
     def __repr__(self) -> str:
@@ -232,19 +231,32 @@ def work_precision(
     >>> bool(found.error["state"].max() < 1e-5)
     True
     """
+    as_system("system", system)
+    x0 = arguments.state("x0", x0, system)
+    t_span = arguments.time_span("t_span", t_span)
+    if mode is not None:
+        system.mode_index(mode)
+    system.parameter_values(parameters)
+    tangent = arguments.flag("tangent", tangent)
     runs = {
         name: _run(name, method, system, x0, t_span, mode, parameters, tangent)
-        for name, method in methods.items()
+        for name, method in arguments.mapping("methods", methods, "map names to methods").items()
     }
     if not runs:
         raise ArgumentError("methods must hold at least one solver or function; got none.")
-    if not (len(tolerances) and all(tolerance > 0 for tolerance in tolerances)):
-        raise ArgumentError(f"tolerances must be positive and at least one; got {tuple(tolerances)!r}.")
-    check_count("repeats", repeats, 1)
-    for quantity in reference_error or ():
-        if quantity not in QUANTITIES:
-            raise ArgumentError(unknown_name("Quantity", quantity, QUANTITIES, "Quantities"))
-    n, span = system.dimension, float(t_span[1]) - float(t_span[0])
+    levels = arguments.numbers("tolerances", tolerances, "be positive numbers, one or more")
+    if levels.ndim != 1 or not levels.size or not np.all((levels > 0) & np.isfinite(levels)):
+        raise arguments.refusal("tolerances", "be positive and at least one", tolerances)
+    repeats = arguments.count("repeats", repeats, 1)
+    longest = arguments.positive("longest", longest, "be a positive number of seconds", infinite=True)
+    arguments.function("clock", clock, "no arguments")
+    known_errors = {
+        arguments.known("reference_error: Quantity", quantity, QUANTITIES, "Quantities"): (
+            arguments.not_negative(f"reference_error[{quantity!r}]", value)
+        )
+        for quantity, value in arguments.mapping("reference_error", reference_error).items()
+    }
+    n, span = system.dimension, t_span[1] - t_span[0]
     if reference is None:
         truth, check = (
             as_answer("reference", _own(solver, system, x0, t_span, mode, parameters, tangent), n, span)
@@ -253,11 +265,11 @@ def work_precision(
         floor = errors_of(check, truth)
     else:
         truth = as_answer("reference", reference, n, span)
-        floor = rounding_of(truth) | dict(reference_error or {})
+        floor = rounding_of(truth) | known_errors
     rows = []
     for name, run in runs.items():
         slow = False
-        for tolerance in sorted(tolerances, reverse=True):
+        for tolerance in sorted(levels.tolist(), reverse=True):
             if slow:
                 break
             row = _measured(name, run, tolerance, truth, (n, span), repeats, longest, clock)
@@ -357,7 +369,7 @@ def _measured(
     except Exception as error:  # another package's failure is a result of the comparison
         said = f"{type(error).__name__}: {error}".strip().splitlines()[0]
         return _Row(name, tolerance, seconds=clock() - begin, status=said)
-    answer = as_answer(name, result, *shape)
+    answer = as_answer(f"Method {name!r}: what it returns", result, *shape)
     seconds = float(np.median(times))
     return _Row(
         method=name,

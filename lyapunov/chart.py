@@ -15,13 +15,14 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode, compile_system
+from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode, arguments, compile_system
 from hybrid.kernels import codes
 from hybrid.load import load_kernels
 from hybrid.progress import progress_bar
-from hybrid.run import Trajectory, check_count, check_solver, check_state, plan_of, start
+from hybrid.run import Trajectory, check_solver, plan_of, start
 from hybrid.section import strobe
 from hybrid.solvers import RungeKutta
+from hybrid.system import as_system
 from lyapunov.spectrum import Estimate, first_vectors, interval_length
 
 UNTOUCHED = Status(
@@ -142,15 +143,18 @@ def chart(
     >>> bool((damping.exponents[:, 0] < 0).all())
     True
     """
+    as_system("system", system)
     axes = _axes(system, over, parameters)
     vectors = first_vectors(system, k)
-    check_count("intervals", intervals, 1)
-    check_count("transient", transient, 1 if continue_from else 0)
-    check_count("section", section, 0)
-    if threads is not None:
-        check_count("threads", threads, 1)
-    if continue_from not in (None, "previous"):
-        raise ArgumentError(f'continue_from must be None or "previous"; got {continue_from!r}.')
+    intervals = arguments.count("intervals", intervals, 1)
+    continue_from = arguments.one_of("continue_from", continue_from, (None, "previous"))
+    transient = arguments.count("transient", transient, 1 if continue_from else 0)
+    section = arguments.count("section", section, 0)
+    if interval is not None:
+        interval = arguments.positive("interval", interval, "be a positive time")
+    t0 = arguments.number("t0", t0)
+    threads = None if threads is None else arguments.count("threads", threads, 1)
+    progress = arguments.flag("progress", progress)
     if section and system.period is None:
         raise ArgumentError(
             "section= takes points once a forcing period, and the system declares none. Give HybridSystem a "
@@ -160,10 +164,10 @@ def chart(
         system.mode_index(mode)
     work = _Rows(
         system=system,
-        x0=check_state(system, x0),
+        x0=arguments.state("x0", x0, system),
         mode=mode,
         t0=t0,
-        parameters=dict(parameters or {}),
+        parameters=arguments.mapping("parameters", parameters),
         vectors=vectors,
         intervals=intervals,
         interval=interval,
@@ -182,18 +186,23 @@ def chart(
 def _axes(
     system: HybridSystem, over: Mapping[str, ArrayLike], parameters: Mapping[str, float] | None
 ) -> dict[str, np.ndarray]:
-    if not isinstance(over, Mapping) or not 1 <= len(over) <= 2:
-        raise ArgumentError(f"over must map one or two parameter names to values; got {over!r}.")
-    axes = {name: np.array(values, dtype=float) for name, values in over.items()}
-    for name, values in axes.items():
-        if values.ndim != 1 or values.size == 0 or not np.isfinite(values).all():
-            raise ArgumentError(
-                f"over[{name!r}] must be a list of finite numbers, one or more; got shape {values.shape}."
-            )
-        if name in (parameters or {}):
-            raise ArgumentError(f"Parameter {name!r} is given twice: in over and in parameters.")
-    if isinstance(system, HybridSystem):
-        system.parameter_values({**(parameters or {}), **{name: values[0] for name, values in axes.items()}})
+    wanted = "map one or two parameter names to values"
+    given = arguments.mapping("over", over, wanted)
+    if not 1 <= len(given) <= 2:
+        raise arguments.refusal("over", wanted, over)
+    others = arguments.mapping("parameters", parameters)
+    numbers = "be a list of finite numbers, one or more"
+    axes = {}
+    for name, each in given.items():
+        arguments.known("over: Parameter", name, system.parameters, "Parameters")
+        axes[name] = values = arguments.numbers(f"over[{name!r}]", each, numbers)
+        if values.ndim != 1 or values.size == 0:
+            raise ArgumentError(f"over[{name!r}] must {numbers}; got shape {values.shape}.")
+        if not np.isfinite(values).all():
+            raise arguments.refusal(f"over[{name!r}]", numbers, each)
+        if name in others:
+            raise ArgumentError(f"over: Parameter {name!r} is given twice: in over and in parameters.")
+    system.parameter_values(others)
     return axes
 
 
@@ -239,7 +248,7 @@ class _Rows:
             solver=self.solver,
             tangent=vectors,
         )
-        return trajectory, interval_length(trajectory, self.interval)
+        return trajectory, interval_length(trajectory, self.interval, self.transient + self.intervals)
 
     def carried(
         self, values: Mapping[str, float], state: np.ndarray, mode: str | None

@@ -8,11 +8,11 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status
-from hybrid.errors import unknown_name
+from hybrid import ArgumentError, HybridSystem, Status, arguments
 from hybrid.progress import progress_bar
 from hybrid.solvers import RungeKutta
 from hybrid.status import SUCCESS
+from hybrid.system import as_system
 from hybrid.text import table
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
 
@@ -60,8 +60,8 @@ class ModelComparison:
 
     def within(self, tolerance: float) -> tuple[str, ...]:
         """Names of the models within ``tolerance`` of the reference at every point, the cheapest first."""
-        if not tolerance >= 0:
-            raise ArgumentError(f"tolerance must be at least 0, in inverse units of time; got {tolerance!r}.")
+        wanted = "be at least 0, in inverse units of time"
+        tolerance = arguments.not_negative("tolerance", tolerance, wanted, infinite=True)
         return tuple(
             name
             for name in self.names
@@ -84,9 +84,7 @@ class ModelComparison:
         return self.within(tolerance)[0]
 
     def _of(self, name: str) -> tuple[LyapunovSpectrum, ...]:
-        if name not in self.spectra:
-            raise ArgumentError(unknown_name("Model", name, self.spectra, "Models"))
-        return self.spectra[name]
+        return self.spectra[arguments.known("Model", name, self.spectra, "Models")]
 
     def __repr__(self) -> str:
         return f"<ModelComparison of {', '.join(self.names)} at {len(self.points)} points>"
@@ -170,18 +168,33 @@ def compare_models(
     >>> found.cheapest(tolerance=0.02), found.cheapest(tolerance=1e-3)
     ('rigid', 'Hertz')
     """
-    if reference not in systems:
-        raise ArgumentError(unknown_name("Reference model", reference, systems, "Models"))
-    if not points:
+    models = {
+        name: as_system(f"systems[{name!r}]", system)
+        for name, system in arguments.mapping("systems", systems, "map names to models").items()
+    }
+    if not models:
+        raise ArgumentError("systems must hold at least one model; got none.")
+    arguments.known("Reference model", reference, models, "Models")
+    values = [
+        arguments.mapping(f"points[{i}]", point)
+        for i, point in enumerate(arguments.items("points", points, "be a list of mappings"))
+    ]
+    if not values:
         raise ArgumentError("points must hold at least one mapping of parameter values; got none.")
-    if len({system.state for system in systems.values()}) > 1:
-        states = ", ".join(f"{system.state} in {name!r}" for name, system in systems.items())
-        raise ArgumentError(f"The models must have the same states; got {states}.")
+    for i, point in enumerate(values):
+        for system in models.values():
+            for name, value in point.items():
+                arguments.known(f"points[{i}]: Parameter", name, system.parameters, "Parameters")
+                arguments.number(f"points[{i}]: Parameter {name!r}", value)
+    if len({system.state for system in models.values()}) > 1:
+        states = ", ".join(f"{system.state} in {name!r}" for name, system in models.items())
+        raise ArgumentError(f"systems must have the same states; got {states}.")
+    progress = arguments.flag("progress", progress)
     spectra: dict[str, tuple[LyapunovSpectrum, ...]] = {}
-    with progress_bar(len(systems) * len(points), "Spectra", progress) as bar:
-        for name, system in systems.items():
+    with progress_bar(len(models) * len(values), "Spectra", progress) as bar:
+        for name, system in models.items():
             found = []
-            for parameters in points:
+            for parameters in values:
                 found.append(
                     lyapunov_spectrum(
                         system,
@@ -198,7 +211,7 @@ def compare_models(
                 )
                 bar.update(1)
             spectra[name] = tuple(found)
-    return ModelComparison(spectra, reference, tuple(dict(point) for point in points))
+    return ModelComparison(spectra, reference, tuple(values))
 
 
 def _distance(spectrum: LyapunovSpectrum, reference: LyapunovSpectrum) -> float:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybrid import PeriodicOrbit
+from hybrid import PeriodicOrbit, arguments
 
 
 def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
@@ -38,5 +35,6 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     >>> floquet_exponents(orbit).round(5)
     array([-0.08551, -0.08551])
     """
+    arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
     with np.errstate(divide="ignore"):
         return np.log(np.abs(orbit.multipliers)) / orbit.period

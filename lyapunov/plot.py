@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid.arc import HybridArc
-from hybrid.errors import ArgumentError
+from hybrid import ArgumentError, HybridArc, arguments
+from hybrid.plot import as_axes, as_component
 from lyapunov.chart import Chart
 
 if TYPE_CHECKING:
@@ -77,13 +77,23 @@ def plot_convergence(
     points_label, truth_label
         What the legend calls them.
     """
-    points = points or {}
+    as_axes("ax", ax)
+    histories = {
+        label: _numbers(f"estimates[{label!r}]", estimate, 1)
+        for label, estimate in arguments.mapping("estimates", estimates, "map labels to histories").items()
+    }
+    points = {
+        label: _pair(f"points[{label!r}]", pair)
+        for label, pair in arguments.mapping("points", points, "map labels to numbers and values").items()
+    }
+    for name, text in (("points_label", points_label), ("truth_label", truth_label)):
+        arguments.instance(name, text, str)
+    truth = None if truth is None else arguments.number("truth", truth)
     # What comes later is drawn thinner, so that of two lines that coincide both are seen.
-    widths = (2.2, 0.9) if len(estimates) > 1 else (1.3,)
+    widths = (2.2, 0.9) if len(histories) > 1 else (1.3,)
     if truth is not None:
         ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
-    for i, (label, estimate) in enumerate(estimates.items()):
-        history = np.asarray(estimate, dtype=float)
+    for i, (label, history) in enumerate(histories.items()):
         at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
         at = at[at <= len(history)]
         width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
@@ -124,20 +134,57 @@ def plot_phase_portrait(
     labels
         Texts at the axes; by default the names.
     """
-    names = arc.system.state_names
-    i, j = names.index(x), names.index(y)
+    as_axes("ax", ax)
+    system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
+    i, j = as_component("x", system, x), as_component("y", system, y)
+    marks = None if section is None else _numbers("section", section, 2)
+    across, up = _labels(labels, system.state_names[i], system.state_names[j])
     orbit = _dense(arc)
     ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
-    if section is not None:
-        marks = np.asarray(section, dtype=float)
+    if marks is not None:
         # A fixed point must be seen and a cloud must not clot.
         size = 2.0 if np.ptp(marks, axis=0).max() > 1e-6 else 26.0
         ax.scatter(
             marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
         )
-    ax.set_xlabel((labels or (x, y))[0])
-    ax.set_ylabel((labels or (x, y))[1])
+    ax.set_xlabel(across)
+    ax.set_ylabel(up)
     return ax
+
+
+def _numbers(name: str, value: object, axes: int) -> np.ndarray:
+    """Numbers in a list or in rows."""
+    wanted = f"be an array of numbers of {axes} dimension{'s' if axes > 1 else ''}"
+    found = arguments.numbers(name, value, wanted)
+    if found.ndim != axes:
+        raise arguments.refusal(name, wanted, value)
+    return found
+
+
+def _pair(name: str, value: object) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of intervals, and values there."""
+    wanted = "be two lists of numbers of one length"
+    both = arguments.items(name, value, wanted)
+    if len(both) != 2:
+        raise arguments.refusal(name, wanted, value)
+    at, values = (_numbers(name, each, 1) for each in both)
+    if len(at) != len(values):
+        raise arguments.refusal(name, wanted, value)
+    return at, values
+
+
+def _labels(labels: object, *names: str) -> tuple[str, str]:
+    """Texts at two axes."""
+    if labels is None:
+        return names[0], names[1]
+    texts = arguments.items("labels", labels, "be a pair of texts")
+    if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
+        raise arguments.refusal("labels", "be a pair of texts", labels)
+    return texts[0], texts[1]
+
+
+def _as_chart(value: object) -> Chart:
+    return arguments.instance("chart", value, Chart, "Make one with lyapunov.chart.")
 
 
 def _dense(arc: HybridArc) -> np.ndarray:
@@ -173,10 +220,14 @@ def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, 
     """Small multiples, a column a regime: phase portrait, section, first exponent over the intervals."""
     import matplotlib.pyplot as plt
 
+    for i, panel in enumerate(arguments.items("panels", panels, "be a list of Panel objects")):
+        system = arguments.instance(f"panels[{i}]", panel, Panel).arc.system
+        x, y = (system.state_names[as_component(name, system, c)] for name, c in (("x", x), ("y", y)))
+    labels = _labels(labels, x, y)
     figure, axes = plt.subplots(3, len(panels), figsize=(3.2 * len(panels), 7.6), squeeze=False)
     for column, panel in zip(axes.T, panels, strict=True):
         plot_phase_portrait(column[0], panel.arc, x, y, section=panel.section, labels=labels)
-        _plot_section(column[1], panel, x, y, labels or (x, y))
+        _plot_section(column[1], panel, x, y, labels)
         plot_convergence(column[2], {"first exponent": panel.history}, truth=0.0)
         column[2].get_legend().remove()
         final = float(panel.history[-1]) if len(panel.history) else 0.0
@@ -216,7 +267,8 @@ def plot_exponents(ax: Axes, chart: Chart) -> Axes:
     chart
         From :func:`lyapunov.chart`, over one parameter.
     """
-    name, values = _only_axis(chart)
+    as_axes("ax", ax)
+    name, values = _only_axis(_as_chart(chart))
     ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     order = np.argsort(values)
     for i in range(chart.exponents.shape[-1]):
@@ -251,12 +303,13 @@ def plot_bifurcation(ax: Axes, chart: Chart, component: str | None = None) -> Ax
     ArgumentError
         If the chart is over two parameters or has no section.
     """
-    name, values = _only_axis(chart)
+    as_axes("ax", ax)
+    name, values = _only_axis(_as_chart(chart))
     points = chart.section.shape[1]
     if points == 0:
         raise ArgumentError("This chart has no points of a section. Make it with section=100, for instance.")
     names = chart.system.state_names
-    i = 0 if component is None else names.index(component)
+    i = 0 if component is None else as_component("component", chart.system, component)
     ax.plot(np.repeat(values, points), chart.section[:, :, i].ravel(), ",", color=COLOURS[0], rasterized=True)
     ax.set_xlabel(name)
     ax.set_ylabel(names[i])
@@ -280,6 +333,8 @@ def plot_map(ax: Axes, chart: Chart, exponent: int = 0) -> Axes:
     ArgumentError
         If the chart is over one parameter.
     """
+    as_axes("ax", ax)
+    exponent = arguments.count("exponent", exponent, 0, _as_chart(chart).exponents.shape[-1] - 1)
     if len(chart.over) != 2:
         raise ArgumentError("A map needs a chart over two parameters. Use plot_exponents for one.")
     (down, rows), (across, columns) = chart.over.items()
@@ -316,7 +371,9 @@ def plot_chart(chart: Chart, component: str | None = None) -> Figure:
     """
     import matplotlib.pyplot as plt
 
-    if len(chart.over) == 2:
+    if component is not None:
+        as_component("component", _as_chart(chart).system, component)
+    if len(_as_chart(chart).over) == 2:
         figure, ax = plt.subplots(figsize=(5.6, 4.4), layout="constrained")
         plot_map(ax, chart)
         return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -10,11 +11,11 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status, compile_system
+from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
-from hybrid.run import Trajectory, check_count, start
+from hybrid.run import Trajectory, start
 from hybrid.solvers import RungeKutta
 from lyapunov.statistics import (
     TaperedMean,
@@ -25,6 +26,8 @@ from lyapunov.statistics import (
     taper_inflation,
 )
 
+# An interval is known to this part of itself, at least.
+FINEST_INTERVAL = 2.0**-10
 # Intervals a call of the kernel: often enough for a progress bar and an interrupt.
 INTERVALS_AT_ONCE = 250
 
@@ -151,10 +154,11 @@ def lyapunov_spectrum(
     True
     """
     vectors = first_vectors(system, k)
-    check_count("intervals", intervals, 1)
-    check_count("transient", transient, 0)
+    intervals = arguments.count("intervals", intervals, 1)
+    transient = arguments.count("transient", transient, 0)
+    history, progress = arguments.flag("history", history), arguments.flag("progress", progress)
     trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
-    length = interval_length(trajectory, interval)
+    length = interval_length(trajectory, interval, transient + intervals)
     with progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
         return Estimate(trajectory, length).run(transient, intervals, history, bar)
 
@@ -162,22 +166,31 @@ def lyapunov_spectrum(
 def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
     """Tangent vectors ``(n, k)`` to start with; all ``n`` for None."""
     n = compile_system(system).system.dimension
-    k = n if k is None else k
-    if not (isinstance(k, int | np.integer) and 1 <= k <= n):
-        raise ArgumentError(f"k must be a whole number from 1 to {n}, the dimension of the state; got {k!r}.")
-    return generic_directions(n, int(k))
+    directions = n if k is None else arguments.count("k", k, 1, n, ", the dimension of the state")
+    return generic_directions(n, directions)
 
 
-def interval_length(trajectory: Trajectory, interval: float | None) -> float:
-    """The interval asked for, or the forcing period, or the reciprocal norm of the Jacobian at the start."""
+def interval_length(trajectory: Trajectory, interval: float | None, intervals: int) -> float:
+    """The interval asked for, or the forcing period, or the reciprocal norm of the Jacobian at the start.
+
+    It must be long enough to be told in the time of ``intervals`` of them.
+    """
+    period = float(trajectory.model.period)
     if interval is not None:
-        if not (np.isfinite(interval) and interval > 0):
-            raise ArgumentError(f"interval must be a positive time; got {interval!r}.")
-        return float(interval)
-    if trajectory.model.period > 0:
-        return float(trajectory.model.period)
-    norm = np.linalg.norm(trajectory.jacobian(), 2)
-    return 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
+        length = arguments.positive("interval", interval, "be a positive time")
+    elif period > 0:
+        return period
+    else:
+        norm = np.linalg.norm(trajectory.jacobian(), 2)
+        length = 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
+    latest = period or max(abs(trajectory.t), abs(trajectory.t + length * intervals))
+    if not math.ulp(latest) <= FINEST_INTERVAL * length:
+        where = f"a period of {period}" if period else f"t0 = {trajectory.t} and {intervals} intervals"
+        raise ArgumentError(
+            f"interval must be long enough to advance the clock; got {length}, and with {where} times are "
+            f"{math.ulp(latest):.2g} apart. Lengthen it, or begin nearer to time zero."
+        )
+    return length
 
 
 @cache

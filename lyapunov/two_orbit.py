@@ -10,12 +10,13 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status
+from hybrid import ArgumentError, HybridSystem, Status, arguments
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
-from hybrid.run import Trajectory, check_count, start
+from hybrid.run import Trajectory, start
 from hybrid.solvers import RungeKutta
+from hybrid.system import as_system
 from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
 from lyapunov.statistics import running_tapered_mean
 
@@ -173,13 +174,14 @@ def two_orbit_exponents(
     >>> round(result.renormalised_exponent, 3)
     -0.086
     """
-    check_count("intervals", intervals, 1)
-    check_count("transient", transient, 0)
-    if not (np.isfinite(separation) and separation > 0):
-        raise ArgumentError(f"separation must be a positive distance; got {separation!r}.")
+    as_system("system", system)
+    intervals = arguments.count("intervals", intervals, 1)
+    transient = arguments.count("transient", transient, 0)
+    separation = arguments.positive("separation", separation, "be a positive distance")
+    progress = arguments.flag("progress", progress)
     reference = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
     offset = separation * _unit_vector(direction, system)
-    length = interval_length(reference, interval)
+    length = interval_length(reference, interval, transient + intervals)
     with progress_bar(transient + intervals, "Two orbits", progress) as bar:
         code = _skip(reference, transient, length)
         bar.update(transient)
@@ -190,7 +192,7 @@ def two_orbit_exponents(
         distances, status = _follow(reference, companions, separation, length, intervals, bar)
     free, renormalised = distances.T
     growths = _log(renormalised / separation) / length
-    return TwoOrbitExponents(free.copy(), growths, float(separation), length, status)
+    return TwoOrbitExponents(free.copy(), growths, separation, length, status)
 
 
 def _log(ratios: np.ndarray) -> np.ndarray:
@@ -202,11 +204,11 @@ def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarra
     n = system.dimension
     if direction is None:
         return np.full(n, 1.0 / math.sqrt(n))
-    vector = np.array(direction, dtype=float)
+    vector = arguments.numbers("direction", direction, f"be a finite vector of shape ({n},), not zero")
     norm = np.linalg.norm(vector)
     if vector.shape != (n,) or not (np.isfinite(norm) and norm > 0):
         raise ArgumentError(
-            f"direction must be a finite vector of shape ({n},), not zero; got {direction!r}."
+            f"direction must be a finite vector of shape ({n},), not zero; got {arguments.shown(direction)}."
         )
     return vector / norm
 

@@ -11,14 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from math import cos, cosh, exp, expm1, gamma, log1p, pi, sin, sinh, sqrt, tan, tanh
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from hybrid import ArgumentError, Guard, Mode, Reset, Transition
+from hybrid import Guard, Mode, Reset, Transition, arguments
 
 # Restitution of a Kelvin-Voigt contact with critical damping; below it the damping is above critical.
 CRITICAL_RESTITUTION = exp(-2)
+RESTITUTION = "satisfy 0 < e <= 1 in a compliant contact (in a rigid one e may be 0)"
 # Between them the restitution takes every value there is, in floating point.
 LEAST_ANGLE, LARGEST_ANGLE = 1e-8, 350.0
 
@@ -42,6 +43,7 @@ class Bodies(NamedTuple):
     collided: Callable[..., Any]
 
 
+@runtime_checkable
 class ContactLaw(Protocol):
     """A law of contact: run-time parameters, and the part of the graph that it makes of two bodies.
 
@@ -77,6 +79,9 @@ class Rigid:
 
     e: float = 1.0
 
+    def __post_init__(self) -> None:
+        arguments.not_negative("e", self.e)
+
     @property
     def parameters(self) -> dict[str, float]:
         """``e``."""
@@ -106,6 +111,9 @@ class Hertz:
     """
 
     K: float
+
+    def __post_init__(self) -> None:
+        arguments.positive("K", self.K)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -138,6 +146,7 @@ class Hertz:
         K. L. Johnson, Contact Mechanics, Cambridge University Press 1985, section 11.4,
         doi:10.1017/CBO9781139171731.
         """
+        mass, speed = arguments.positive("mass", mass), arguments.positive("speed", speed)
         deepest = (5 * mass * speed**2 / (4 * self.K)) ** 0.4
         return 0.8 * sqrt(pi) * gamma(0.4) / gamma(0.9) * deepest / speed
 
@@ -165,6 +174,10 @@ class HuntCrossley:
     K: float
     alpha: float
 
+    def __post_init__(self) -> None:
+        arguments.positive("K", self.K)
+        arguments.not_negative("alpha", self.alpha)
+
     @classmethod
     def from_restitution(cls, e: float, K: float, speed: float) -> HuntCrossley:
         r"""The law with restitution ``e``, ``0 < e <= 1``, at one speed of impact.
@@ -185,6 +198,7 @@ class HuntCrossley:
             If ``e`` is out of its range.
         """
         _check_restitution(e)
+        K, speed = arguments.positive("K", K), arguments.positive("speed", speed)
         if e == 1:
             return cls(K, 0.0)
 
@@ -235,6 +249,10 @@ class KelvinVoigt:
     k: float
     c: float
 
+    def __post_init__(self) -> None:
+        arguments.positive("k", self.k)
+        arguments.not_negative("c", self.c)
+
     @classmethod
     def from_restitution(cls, e: float, mass: float, duration: float) -> KelvinVoigt:
         r"""The law with restitution ``e``, ``0 < e <= 1``, at any speed, and with one duration of contact.
@@ -257,6 +275,7 @@ class KelvinVoigt:
             If ``e`` is out of its range.
         """
         _check_restitution(e)
+        mass, duration = arguments.positive("mass", mass), arguments.positive("duration", duration)
         if e == 1:
             return cls(mass * (pi / duration) ** 2, 0.0)
         if e > CRITICAL_RESTITUTION:
@@ -319,6 +338,7 @@ def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[st
     >>> {name: sorted(law.parameters) for name, law in laws.items()}
     {'rigid': ['e'], 'Kelvin-Voigt': ['c', 'k'], 'Hunt-Crossley': ['K', 'alpha']}
     """
+    _check_restitution(e)
     hertz = Hertz(K)
     return {
         "rigid": Rigid(e),
@@ -358,10 +378,8 @@ def _hertz_force(penetration: Any, p: Any) -> Any:
 
 
 def _check_restitution(e: float) -> None:
-    if not 0 < e <= 1:
-        raise ArgumentError(
-            f"Restitution e of a compliant contact must satisfy 0 < e <= 1; got {e!r}. Use Rigid for e = 0."
-        )
+    if not 0 < arguments.not_negative("e", e, RESTITUTION) <= 1:
+        raise arguments.refusal("e", RESTITUTION, e)
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import HybridSystem, filippov
+from hybrid import HybridSystem, arguments, filippov
 
 
 def dry_friction_oscillator() -> HybridSystem:
@@ -75,6 +75,7 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
     float
         ``nan`` if there is no such motion.
     """
+    f, A, w = arguments.not_negative("f", f), arguments.number("A", A), arguments.positive("w", w)
     D = -f * np.tan(np.pi / (2 * w))
     X = np.sqrt(np.maximum((A / (1 - w**2)) ** 2 - (D / w) ** 2, 0.0))
     s = np.linspace(0.0, np.pi / w, 4001)[1:-1]

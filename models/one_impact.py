@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid import arguments
+
 
 class OneImpactOrbit(NamedTuple):
     """Speed before impact ``V``, forcing phase there ``theta`` in (-pi, pi], the two multipliers."""
@@ -38,6 +40,8 @@ def one_impact_orbits(
     list of OneImpactOrbit
         None, one or two orbits, the fastest first, stable or not.
     """
+    k, c, A, d = (arguments.number(*each) for each in (("k", k), ("c", c), ("A", A), ("d", d)))
+    w, r, n = arguments.positive("w", w), arguments.not_negative("r", r), arguments.count("n", n, 1)
     T = 2 * np.pi * n / w
     R = A / np.hypot(k - w**2, c * w)
     psi = np.arctan2(c * w, k - w**2)

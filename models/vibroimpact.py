@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import HybridSystem
+from hybrid import HybridSystem, arguments
 from models.contact import Bodies, ContactLaw, Hertz, after_collision
 
 
@@ -60,7 +60,10 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
     nonsmooth discontinuous vibroimpact system", 2017.
     """
-    contact = contact or Hertz(hertz_stiffness())
+    contact = Hertz(hertz_stiffness()) if contact is None else contact
+    if isinstance(contact, type) or not isinstance(contact, ContactLaw):
+        wanted = "be a law of contact from models.contact, Rigid(e=0.8) for instance"
+        raise arguments.refusal("contact", wanted, contact)
     bodies = Bodies(_field, lambda t, x, p: x.x1 - x.x2, lambda t, x, p: x.v1 - x.v2, _collided)
     return HybridSystem(
         name="vibro-impact",
@@ -89,6 +92,10 @@ def hertz_stiffness(
     A, B, q
         Curvatures of the contact in 1/m, and the coefficient that goes with them.
     """
+    E, q = arguments.positive("E", E), arguments.positive("q", q)
+    A, B = arguments.positive("A", A), arguments.positive("B", B)
+    if not abs(arguments.number("nu", nu)) < 1:
+        raise arguments.refusal("nu", "lie between -1 and 1", nu)
     d1 = d2 = (1 - nu**2) / (E * np.pi)
     return float(4 / 3 * q / ((d1 + d2) * np.sqrt(A + B)))
 

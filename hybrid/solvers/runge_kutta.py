@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import attrs
 
+from hybrid import arguments
 from hybrid.errors import ArgumentError
 
 if TYPE_CHECKING:
     from hybrid.solvers.tableau import Tableau
-
-
-def _positive(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> None:
-    if not value > 0:
-        raise ArgumentError(f"{type(instance).__name__}: {attribute.name} must be positive; got {value!r}.")
 
 
 @attrs.frozen
@@ -37,20 +33,30 @@ class RungeKutta:
     Raises
     ------
     ArgumentError
-        If a value is not positive, or ``rtol`` below 1e-15.
+        If a value is not positive, ``rtol`` is below 1e-15 or above 1, or ``max_steps`` is not whole.
     """
 
     tableau: ClassVar[Tableau]
 
-    rtol: float = attrs.field(default=1e-10, kw_only=True, converter=float, validator=_positive)
-    atol: float = attrs.field(default=1e-12, kw_only=True, converter=float, validator=_positive)
-    max_step: float = attrs.field(default=float("inf"), kw_only=True, converter=float, validator=_positive)
-    max_steps: int = attrs.field(default=1_000_000_000, kw_only=True, converter=int, validator=_positive)
+    rtol: float = attrs.field(default=1e-10, kw_only=True)
+    atol: float = attrs.field(default=1e-12, kw_only=True)
+    max_step: float = attrs.field(default=float("inf"), kw_only=True)
+    max_steps: int = attrs.field(default=1_000_000_000, kw_only=True)
 
-    @rtol.validator
-    def _check_rtol(self, attribute: attrs.Attribute[float], value: float) -> None:
-        if value < 1e-15:
+    def __attrs_post_init__(self) -> None:
+        name = type(self).__name__
+        rtol = arguments.positive(f"{name}: rtol", self.rtol)
+        if rtol < 1e-15:
             raise ArgumentError(
-                f"{type(self).__name__}: rtol = {value} is below what double precision can follow. "
-                "Use 1e-15 or more."
+                f"{name}: rtol = {rtol} is below what double precision can follow. Use 1e-15 or more."
             )
+        if rtol > 1:
+            raise ArgumentError(f"{name}: rtol = {rtol} allows errors larger than the state. Use 1 or less.")
+        checked = {
+            "rtol": rtol,
+            "atol": arguments.positive(f"{name}: atol", self.atol),
+            "max_step": arguments.positive(f"{name}: max_step", self.max_step, infinite=True),
+            "max_steps": arguments.count(f"{name}: max_steps", self.max_steps, 1),
+        }
+        for option, value in checked.items():
+            object.__setattr__(self, option, value)

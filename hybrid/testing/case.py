@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 from hypothesis.errors import UnsatisfiedAssumption
 
+from hybrid import arguments
 from hybrid.agreement import compiled_value
 from hybrid.arc import HybridArc, Jump
 from hybrid.compile import CompiledSystem, compile_system
@@ -37,6 +38,11 @@ class PropertyError(AssertionError):
 def discard(reason: str) -> NoReturn:
     """Give an example up that can be neither right nor wrong; Hypothesis draws another one."""
     raise UnsatisfiedAssumption(reason)
+
+
+def as_case(case: object) -> Case:
+    """A case, or an ArgumentError."""
+    return arguments.instance("case", case, Case, "Draw one with hybrid.testing.cases.")
 
 
 class Engine:

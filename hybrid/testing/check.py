@@ -13,10 +13,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis.errors import Unsatisfiable, UnsatisfiedAssumption
 from hypothesis.strategies import SearchStrategy
 
+from hybrid import arguments
 from hybrid.compile import compile_system
-from hybrid.run import check_count
 from hybrid.solvers import RungeKutta
-from hybrid.system import HybridSystem
+from hybrid.system import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
@@ -37,6 +37,7 @@ from hybrid.testing.invariance import (
     check_samples,
     check_scale,
     check_split,
+    turned,
 )
 from hybrid.testing.saltation import (
     CONTINUITY,
@@ -206,7 +207,8 @@ def check_system(
     >>> report.unchecked
     ('The saltation matrix is the identity ...', 'The order in which ...', 'An elastic system ...')
     """
-    check_count("examples", examples, 1)
+    as_system("system", system)
+    examples = arguments.count("examples", examples, 1)
     properties: dict[str, Callable[[Case], None]] = {
         DERIVATIVES: check_derivatives,
         COMPILED: check_compiled,
@@ -227,7 +229,7 @@ def check_system(
         CUT: check_cut,
     }
     if elastic is not None:
-        flip = elastic if callable(elastic) else tuple(elastic)
+        flip = turned("elastic", system, elastic)
         properties[ELASTIC] = lambda case: check_elastic(case, flip)
     tally = _Tally(system, properties)
     drawn = cases(

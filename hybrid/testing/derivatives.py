@@ -7,7 +7,7 @@ import numpy as np
 from hybrid.compile import compile_system
 from hybrid.derivative import derivative_fault, evaluate, reference_derivative
 from hybrid.roles import CONDITION, indexed_roles
-from hybrid.testing.case import Case, discard
+from hybrid.testing.case import Case, as_case, discard
 
 DERIVATIVES = "Given, traced and numerical derivatives agree"
 
@@ -23,6 +23,7 @@ def check_derivatives(case: Case) -> None:
     PropertyError
         If an entry is wrong.
     """
+    as_case(case)
     compile_system(case.system)
     x, seen = np.array(case.x0), 0
     for index, role in indexed_roles(case.system):

@@ -6,7 +6,7 @@ import numpy as np
 
 from hybrid.arc import Jump
 from hybrid.roles import guard_role
-from hybrid.testing.case import Case, discard, guard_beyond, mode_after
+from hybrid.testing.case import Case, as_case, discard, guard_beyond, mode_after
 from hybrid.testing.saltation import event_told
 
 JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
@@ -24,6 +24,7 @@ def check_jumps(case: Case) -> None:
     PropertyError
         If one of these is not so.
     """
+    as_case(case)
     run = case.run
     if not len(run.arc.jumps):
         discard("no event on the run")
@@ -84,6 +85,7 @@ def check_sides(case: Case) -> None:
     PropertyError
         If a mode goes on beyond a guard that ends it.
     """
+    as_case(case)
     run = case.run
     guards = [
         transition

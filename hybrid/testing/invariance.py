@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from hybrid import arguments
 from hybrid.arc import HybridArc
 from hybrid.compile import compile_system
-from hybrid.errors import ArgumentError, unknown_name
-from hybrid.testing.case import Case, Run, discard, matrix_told, mode_after
+from hybrid.system import HybridSystem
+from hybrid.testing.case import Case, Run, as_case, discard, matrix_told, mode_after
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
 
 CUT = "Cutting a flow by an identity transition changes nothing"
@@ -33,6 +34,7 @@ def check_cut(case: Case) -> None:
     PropertyError
         If the run changes, or a saltation matrix at the plane is not the identity.
     """
+    as_case(case)
     if case.passable:
         discard("in a second copy of a mode a passable transition would fire anew")
     run = case.run
@@ -85,6 +87,7 @@ def check_names(case: Case) -> None:
     PropertyError
         If the run changes.
     """
+    as_case(case)
     run, system = case.run, renamed(case.system)
     assert case.mode is not None
     start = (case.t0, case.x0, new_name(case.system.mode_names, case.mode))
@@ -101,6 +104,7 @@ def check_order(case: Case) -> None:
     PropertyError
         If the run changes.
     """
+    as_case(case)
     if len(case.system.transitions) < 2:
         discard("there are no two transitions")
     arc = case.simulate(case.run.t1, system=reordered(case.system))
@@ -116,6 +120,7 @@ def check_scale(case: Case) -> None:
     PropertyError
         If the run changes.
     """
+    as_case(case)
     variant = altered(case.system)
     if variant.resets_stay:
         discard("a model function cannot be traced, and so cannot be changed")
@@ -135,6 +140,7 @@ def check_split(case: Case) -> None:
     PropertyError
         If an event is lost or fires twice, or the end changes.
     """
+    as_case(case)
     run = case.run
     times = [case.t0 + case.fraction * (run.t1 - case.t0)]
     if len(run.arc.jumps) and case.the_jump().transition not in case.passable:
@@ -155,6 +161,7 @@ def check_samples(case: Case) -> None:
     PropertyError
         If they do not.
     """
+    as_case(case)
     run = case.run
     jumps = {jump.t: jump.x_plus for jump in run.arc.jumps}
     times = np.unique([case.t0 + case.fraction * (run.t1 - case.t0), *jumps, run.t1])
@@ -189,17 +196,17 @@ def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.nd
     ArgumentError
         If there is no such component.
     """
-    turned = flip if callable(flip) else _Flip(case, tuple(flip))
+    turn = turned("flip", as_case(case).system, flip)
     if not all(compile_system(case.system).emitted.autonomous):
         discard("a field depends on time")
     run = case.run
-    start = (case.t0, turned(run.arc.x[-1]), str(run.arc.mode[-1]))
+    start = (case.t0, turn(run.arc.x[-1]), str(run.arc.mode[-1]))
     arc = case.simulate(run.t1, start=start)
     other = case.simulate(run.t1, start=start, solver=case.looser)
     if not arc.status.ok or len(other.jumps) != len(arc.jumps):
         discard("the events of the run backwards hang on the tolerances")
-    back = turned(arc.x[-1])
-    error = np.abs(turned(other.x[-1]) - back)
+    back = turn(arc.x[-1])
+    error = np.abs(turn(other.x[-1]) - back)
     if not np.all(np.abs(back - np.array(case.x0)) <= run.tolerance + 100.0 * error):
         case.fail(
             ELASTIC,
@@ -209,18 +216,20 @@ def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.nd
         )
 
 
-class _Flip:
-    """Changes the sign of some components."""
-
-    def __init__(self, case: Case, names: tuple[str, ...]) -> None:
-        known = case.system.state_names
-        for name in names:
-            if name not in known:
-                raise ArgumentError(unknown_name("State component", name, known, "State components"))
-        self.signs = np.array([-1.0 if name in names else 1.0 for name in known])
-
-    def __call__(self, x: np.ndarray) -> np.ndarray:
-        return self.signs * x
+def turned(
+    name: str, system: HybridSystem, flip: Iterable[str] | Callable[[np.ndarray], np.ndarray]
+) -> Callable[[np.ndarray], np.ndarray]:
+    """The involution of the state that ``flip`` is, or that changes the sign of the components it names."""
+    if callable(flip):
+        return flip
+    known = system.state_names
+    wanted = "be names of components of the state, or a function of it"
+    names = [
+        arguments.known(f"{name}: State component", each, known, "State components")
+        for each in arguments.items(name, flip, wanted)
+    ]
+    signs = np.array([-1.0 if each in names else 1.0 for each in known])
+    return lambda x: signs * x
 
 
 def _mode_after(case: Case, j: int) -> str:

@@ -8,7 +8,7 @@ from hybrid.arc import Jump
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.roles import field_role, guard_role, reset_role
-from hybrid.testing.case import Case, discard, matrix_told, mode_after
+from hybrid.testing.case import Case, as_case, discard, matrix_told, mode_after
 from hybrid.testing.variants import altered
 
 SALTATION = "The saltation matrix is the derivative of the flow across the event"
@@ -33,6 +33,7 @@ def check_saltation(case: Case) -> None:
     PropertyError
         If an entry is wrong.
     """
+    as_case(case)
     jump = case.the_jump()
     window = _Window(case, jump)
     differences, tolerance = window.differences()
@@ -77,6 +78,7 @@ def check_extension(case: Case) -> None:
     PropertyError
         If one changes.
     """
+    as_case(case)
     jump = case.the_jump()
     transition = case.transition(jump)
     if transition.is_marker:
@@ -122,6 +124,7 @@ def check_continuity(case: Case) -> None:
     PropertyError
         If it is not.
     """
+    as_case(case)
     looked_at = 0
     for jump in case.run.arc.jumps:
         if case.transition(jump).reset is not None:
@@ -152,6 +155,7 @@ def check_flow_direction(case: Case) -> None:
     PropertyError
         If it is not so.
     """
+    as_case(case)
     looked_at = 0
     for jump in case.run.arc.jumps:
         transition = case.transition(jump)
@@ -187,6 +191,7 @@ def check_sum_rule(case: Case) -> None:
     PropertyError
         If they differ.
     """
+    as_case(case)
     run = case.run
     determinants = [np.linalg.det(jump.saltation) for jump in run.arc.jumps]
     arc = case.simulate(run.t1, tangent=True)

@@ -10,10 +10,12 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from hybrid import arguments
 from hybrid.derivative import evaluate
-from hybrid.errors import ArgumentError, unknown_name
+from hybrid.errors import ArgumentError
+from hybrid.run import check_solver
 from hybrid.solvers import RungeKutta
-from hybrid.system import HybridSystem, finite_number
+from hybrid.system import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
@@ -22,6 +24,7 @@ Ranges = Mapping[str, Range]
 
 # Values lie on a grid of this many steps to either side: they print short and shrink to the middle.
 GRID = 500
+RANGES = "map names to ranges, or be a strategy"
 STARTS_TRIED = 4
 
 
@@ -41,13 +44,22 @@ def states(
     Raises
     ------
     ArgumentError
-        If there is no such component, or a range is none.
+        If there is no such component, or a range is not one.
     """
+    return _states("ranges", system, ranges)
+
+
+def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tuple[float, ...]]:
+    """The strategy of states from the ranges in the argument ``name``."""
+    names = as_system("system", system).state_names
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda x: tuple(float(value) for value in x))
-    chosen = dict(ranges or {})
-    _check_names("State component", chosen, system.state_names)
-    return st.tuples(*(_values(name, chosen.get(name, (-2.0, 2.0))) for name in system.state_names))
+    chosen = arguments.mapping(name, ranges, RANGES)
+    for each in chosen:
+        arguments.known(f"{name}: State component", each, names, "State components")
+    return st.tuples(
+        *(_values(f"{name}: Range of {each!r}", chosen.get(each, (-2.0, 2.0))) for each in names)
+    )
 
 
 def parameters(
@@ -68,14 +80,22 @@ def parameters(
     ArgumentError
         If there is no such parameter, or a range is none.
     """
-    declared = dict(system.parameters)
+    return _parameters("ranges", system, ranges)
+
+
+def _parameters(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[dict[str, float]]:
+    """The strategy of parameter values from the ranges in the argument ``name``."""
+    declared = dict(as_system("system", system).parameters)
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda values: {**declared, **values})
-    chosen = dict(ranges or {})
-    _check_names("Parameter", chosen, declared)
+    chosen = arguments.mapping(name, ranges, RANGES)
+    for each in chosen:
+        arguments.known(f"{name}: Parameter", each, declared, "Parameters")
     drawn = {
-        name: _values(name, chosen[name]) if name in chosen else _grid(value, 0.2 * abs(value))
-        for name, value in declared.items()
+        each: _values(f"{name}: Range of {each!r}", chosen[each])
+        if each in chosen
+        else _grid(value, 0.2 * abs(value))
+        for each, value in declared.items()
     }
     return st.fixed_dictionaries(drawn)
 
@@ -117,12 +137,15 @@ def cases(
         If a name does not exist, or a range or the span is none.
     """
     if mode is not None:
-        system.mode_index(mode)
-    through = tuple(passable)
-    for name in through:
-        system.transition_index(name)
-    state, values = _states(system, states), _parameters(system, parameters)
+        as_system("system", system).mode_index(mode)
+    state, values = _states("states", system, states), _parameters("parameters", system, parameters)
+    through = tuple(
+        arguments.known("passable: Transition", name, system.transition_names, "Transitions")
+        for name in arguments.items("passable", passable, "be names of transitions")
+    )
     begin, end = _time_span(t_span) if t_span is not None else (0.0, None)
+    solver = check_solver(solver)
+    arguments.instance("engine", engine, Engine, "Subclass hybrid.testing.Engine.")
 
     @st.composite
     def drawn_case(draw: Any) -> Case:
@@ -141,10 +164,6 @@ def cases(
         return attrs.evolve(case, mode=None)
 
     return drawn_case()
-
-
-# Inside cases() the names states and parameters are its arguments.
-_states, _parameters = states, parameters
 
 
 def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float:
@@ -173,21 +192,17 @@ def _allowed(case: Case) -> list[str]:
     return [name for name in case.system.mode_names if name not in beyond]
 
 
-def _check_names(what: str, chosen: Mapping[str, Any], known: Any) -> None:
-    for name in chosen:
-        if name not in known:
-            raise ArgumentError(unknown_name(what, name, known, f"{what}s"))
-
-
 def _values(name: str, given: Any) -> SearchStrategy[float]:
     if isinstance(given, SearchStrategy):
         return given.map(float)
-    if not isinstance(given, tuple | list):
-        return st.just(finite_number(f"Range of {name!r}", given))
-    ends = [finite_number(f"Range of {name!r}: each end", value) for value in given]
-    if len(ends) != 2 or ends[0] > ends[1]:
-        raise ArgumentError(f"Range of {name!r} must be (low, high), a number or a strategy; got {given!r}.")
-    return _grid(0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]))
+    if np.ndim(given) == 0:
+        return st.just(arguments.number(name, given))
+    wanted = "be (low, high), a number or a strategy"
+    ends = arguments.numbers(name, given, wanted)
+    if ends.shape != (2,) or not np.isfinite(ends).all() or ends[0] > ends[1]:
+        raise arguments.refusal(name, wanted, given)
+    low, high = ends.tolist()
+    return _grid(0.5 * (low + high), 0.5 * (high - low))
 
 
 def _grid(centre: float, half: float) -> SearchStrategy[float]:
@@ -198,7 +213,7 @@ def _grid(centre: float, half: float) -> SearchStrategy[float]:
 
 
 def _time_span(t_span: Any) -> tuple[float, float]:
-    begin, end = (finite_number("t_span: each end", t) for t in t_span)
+    begin, end = arguments.time_span("t_span", t_span)
     if not begin < end:
         raise ArgumentError(f"t_span must be (t0, t1) with t0 < t1; got {t_span!r}.")
     return begin, end

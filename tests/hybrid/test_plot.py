@@ -59,7 +59,7 @@ def test_modes_have_colours_of_their_own_and_a_legend(contacts):
 def test_axes_may_be_given_one_a_component(bounces):
     _, given = plt.subplots(2, 1)
     assert list(plot_arc(bounces, ax=given)) == list(given)
-    with pytest.raises(ArgumentError, match="ax must hold 1 axes, one a component; got 2"):
+    with pytest.raises(ArgumentError, match="ax must hold 1 axes, one per component; got 2"):
         plot_arc(bounces, ["v"], ax=given)
 
 

@@ -197,7 +197,7 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("t", "x", "text"),
         [
-            (0.0, (0.0,), r"x0 has shape \(1,\); the state needs shape \(2,\)"),
+            (0.0, (0.0,), r"^x has shape \(1,\); the state needs shape \(2,\)"),
             (np.nan, (0.0, -1.0), "t must be finite; got nan"),
             ("now", (0.0, -1.0), "t must be a number; got 'now'"),
             (0.0, (0.0, np.inf), "component 'v' must be finite"),

@@ -391,9 +391,13 @@ class TestBadArguments:
             ({"parameters": {"g": "big"}}, "Parameter 'g' must be a number"),
             ({"solver": "DOP853"}, "solver must be a solver object; got 'DOP853'"),
             ({"tangent": np.eye(3)}, r"tangent must be True or a finite matrix of shape \(2, k\)"),
-            ({"samples": [1.0, 0.5]}, "samples must be increasing times"),
+            (
+                {"samples": [0.2, 1.0, 0.5]},
+                r"samples must be increasing times; got samples\[1\] = 1.0 before samples\[2\] = 0.5",
+            ),
+            ({"samples": [0.2, math.nan]}, r"samples must be finite; got samples\[1\] = nan"),
             ({"samples": [-1.0, 0.5]}, r"samples must lie in t_span, \[0.0, 1.0\]; they run from -1.0"),
-            ({"max_jumps": -1}, "max_jumps must be at least 0; got -1"),
+            ({"max_jumps": -1}, "max_jumps must be a whole number of at least 0; got -1"),
             ({"x0": (-1.0, 0.0)}, "violates every mode: mode 'flight' is left through 'bounce'"),
         ],
     )

@@ -1,0 +1,234 @@
+"""Checks of arguments: each returns the value as the library works with it, or raises an ArgumentError.
+
+Every text begins with the name of the argument and says what is allowed and what was given. Nothing is taken
+for a number that is none: no text, no truth value, no complex number.
+"""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Callable, Iterable, Mapping
+from math import inf, isfinite
+from numbers import Real
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from hybrid.errors import ArgumentError, unknown_name
+
+if TYPE_CHECKING:
+    from hybrid.system import HybridSystem
+
+Kind = TypeVar("Kind")
+LARGEST_COUNT = int(np.iinfo(np.int64).max)
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = 100
+
+
+def shown(value: object) -> str:
+    """A value as error texts show it: long ones are cut."""
+    return _short.repr(value)
+
+
+def refusal(name: str, wanted: str, value: object) -> ArgumentError:
+    """The error for an argument that must be something else."""
+    return ArgumentError(f"{name} must {wanted}; got {shown(value)}.")
+
+
+def number(name: str, value: object) -> float:
+    """A finite number."""
+    found = _as_float(value)
+    if found is None:
+        raise refusal(name, "be a number", value)
+    if not isfinite(found):
+        raise refusal(name, "be finite", found)
+    return found
+
+
+def positive(name: str, value: object, wanted: str = "be positive", *, infinite: bool = False) -> float:
+    """A number above zero, infinity only if it is allowed."""
+    found = _as_float(value)
+    if found is None or not found > 0 or not (infinite or isfinite(found)):
+        raise refusal(name, wanted, value)
+    return found
+
+
+def not_negative(name: str, value: object, wanted: str = "be at least 0", *, infinite: bool = False) -> float:
+    """A number of at least zero, infinity only if it is allowed."""
+    found = _as_float(value)
+    if found is None or not found >= 0 or not (infinite or isfinite(found)):
+        raise refusal(name, wanted, value)
+    return found
+
+
+def count(name: str, value: object, least: int, most: int = LARGEST_COUNT, of: str = "") -> int:
+    """A whole number from ``least`` to ``most``; ``of`` says what ``most`` is."""
+    whole = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else None
+    if whole is None or not least <= whole <= most:
+        bounded = most < LARGEST_COUNT or (whole is not None and whole > most)
+        allowed = f"from {least} to {most}{of}" if bounded else f"of at least {least}"
+        raise refusal(name, f"be a whole number {allowed}", value)
+    return whole
+
+
+def flag(name: str, value: object) -> bool:
+    """True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise refusal(name, "be True or False", value)
+    return bool(value)
+
+
+def numbers(name: str, value: object, wanted: str) -> np.ndarray:
+    """Numbers as a new array of floats, of the shape in which they come."""
+    found = _as_floats(value)
+    if found is None:
+        raise refusal(name, wanted, value)
+    return found
+
+
+def state(name: str, value: object, system: HybridSystem) -> np.ndarray:
+    """A finite state ``(n,)`` of a system."""
+    found = _as_floats(value)
+    if found is None:
+        raise ArgumentError(
+            f"{name} must hold {system.dimension} numbers; got {shown(value)}. "
+            f"The state is {', '.join(system.state_names)}."
+        )
+    if found.shape != (system.dimension,):
+        names = ", ".join(system.state_names)
+        raise ArgumentError(
+            f"{name} has shape {found.shape}; the state needs shape ({system.dimension},): {names}."
+        )
+    values = found.tolist()
+    if not all(map(isfinite, values)):
+        pairs = zip(system.state_names, values, strict=True)
+        component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
+        raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
+    return found
+
+
+def time_span(name: str, value: object) -> tuple[float, float]:
+    """A pair of finite times, the second not before the first."""
+    pair: Any = value
+    try:
+        begin, end = pair
+    except (TypeError, ValueError):
+        raise refusal(name, "be a pair (t0, t1)", value) from None
+    t0, t1 = _as_float(begin), _as_float(end)
+    if t0 is None or t1 is None:
+        raise refusal(name, "be a pair (t0, t1) of numbers", value)
+    if not (isfinite(t0) and isfinite(t1)):
+        raise ArgumentError(f"{name} must be finite; got ({t0}, {t1}).")
+    if t1 < t0:
+        raise ArgumentError(
+            f"{name} must not run backwards; got ({t0}, {t1}). Write ({t1}, {t0}), "
+            "or reverse the sign of the fields."
+        )
+    return t0, t1
+
+
+def increasing_times(name: str, value: object, t0: float, t1: float) -> np.ndarray:
+    """Times ``(N,)`` in order, within ``[t0, t1]``; equal ones may follow each other."""
+    times = numbers(name, value, "be increasing times of shape (N,)")
+    if times.ndim != 1:
+        raise ArgumentError(f"{name} must be increasing times of shape (N,); got shape {times.shape}.")
+    finite = np.isfinite(times)
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ArgumentError(f"{name} must be finite; got {name}[{i}] = {times[i]}.")
+    falls = np.flatnonzero(times[1:] < times[:-1])
+    if falls.size:
+        i = int(falls[0])
+        raise ArgumentError(
+            f"{name} must be increasing times; got {name}[{i}] = {times[i]} before "
+            f"{name}[{i + 1}] = {times[i + 1]}. Sort them, with numpy.sort for instance."
+        )
+    if times.size and not (times[0] >= t0 and times[-1] <= t1):
+        raise ArgumentError(
+            f"{name} must lie in t_span, [{t0}, {t1}]; they run from {times[0]} to {times[-1]}."
+        )
+    return times
+
+
+def mapping(name: str, value: object, wanted: str = "map names to numbers") -> dict[Any, Any]:
+    """A mapping as a new dictionary; empty for None."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise refusal(name, wanted, value)
+    return dict(value)
+
+
+def items(name: str, value: object, wanted: str) -> list[Any]:
+    """The items of a collection, which a text or a number is not."""
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+        raise refusal(name, wanted, value)
+    try:
+        return list(value)
+    except TypeError:  # an array of no dimension
+        raise refusal(name, wanted, value) from None
+
+
+def instance(name: str, value: object, kind: type[Kind], hint: str = "") -> Kind:
+    """An object of a class; ``hint`` says where it comes from."""
+    if isinstance(value, kind):
+        return value
+    article = "an" if kind.__name__[0] in "AEIO" else "a"
+    text = f"{name} must be {article} {kind.__name__}; got {shown(value)}."
+    raise ArgumentError(f"{text} {hint}" if hint else text)
+
+
+def function(name: str, value: object, signature: str) -> Callable[..., Any]:
+    """Something that can be called."""
+    if not callable(value):
+        raise refusal(name, f"be a function of {signature}", value)
+    return value
+
+
+def one_of(name: str, value: object, allowed: tuple[Any, ...]) -> Any:
+    """One of a few values."""
+    for each in allowed:
+        if value is each or (isinstance(value, str) and value == each):
+            return each
+    *others, last = (f'"{each}"' if isinstance(each, str) else repr(each) for each in allowed)
+    raise refusal(name, f"be {', '.join(others)} or {last}", value)
+
+
+def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
+    """A name that exists; ``what`` opens the text for one that does not and ``kind`` heads the list."""
+    names = list(allowed)
+    if not isinstance(value, str) or value not in names:
+        raise ArgumentError(unknown_name(what, value, names, kind))
+    return value
+
+
+def _as_float(value: object) -> float | None:
+    """A real number as a float, infinite if it is too large for one; None for all else."""
+    if type(value) is float:
+        return value
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return -inf if str(value).startswith("-") else inf
+
+
+def _as_floats(value: object) -> np.ndarray | None:
+    """Real numbers as a new array of floats; None if there is anything else among them."""
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind in "fiu" and not np.ma.is_masked(value):
+            return np.array(value, dtype=float)
+    elif isinstance(value, list | tuple) and all(type(each) is float for each in value):
+        return np.array(value, dtype=float)
+    try:
+        given = np.array(value, dtype=object)
+    except (TypeError, ValueError):
+        return None
+    found = [_as_float(each) for each in given.ravel()]
+    if any(each is None for each in found):
+        return None
+    return np.array(found, dtype=float).reshape(given.shape)
