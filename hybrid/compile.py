@@ -5,10 +5,9 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -46,6 +45,8 @@ GRADIENT = 3
 # Parameter vectors to remember.
 REMEMBERED = 10_000
 UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
+# Models whose machine code is kept in memory after their systems are gone.
+MOST_SOURCES = 64
 
 # Division by zero is infinite, not an error. The products of series may be fused into their sums; in a guard
 # that could make a difference of equal terms differ from zero.
@@ -122,6 +123,15 @@ class CompiledSystem:
         call = entry(vars(load_kernels("hybrid.kernels.evaluate"))[kernel])
         model = self._model.replace(parameters=np.array(parameters, dtype=float))
         call(model, number, index, float(t), np.array(x, dtype=float), out)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return compile_system, (self.system,)
+
+    def __copy__(self) -> CompiledSystem:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CompiledSystem:
+        return self
 
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
@@ -256,10 +266,6 @@ def _indices(values: Any) -> np.ndarray:
     return np.array([int(value) for value in values], dtype=np.int64)
 
 
-_COMPILED: WeakKeyDictionary[HybridSystem, CompiledSystem] = WeakKeyDictionary()
-_ROLES: dict[str, tuple[Any, ...]] = {}
-
-
 def compile_system(system: HybridSystem) -> CompiledSystem:
     """Trace, differentiate and compile a model; repeated calls return what the first one made.
 
@@ -272,14 +278,14 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
         If ``system`` is not a HybridSystem.
     """
     as_system("system", system)
-    compiled = _COMPILED.get(system)
+    compiled: CompiledSystem | None = system._compiled
     if compiled is None:
         load_kernels()
         emitted = traced_or_kept(system)
         with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
             compiled = CompiledSystem(system, emitted, _compiled_roles(emitted))
         check_agreement(compiled)
-        _COMPILED[system] = compiled
+        object.__setattr__(system, "_compiled", compiled)
     return compiled
 
 
@@ -291,13 +297,21 @@ def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
             return _decorated(own, cached=False)
         except Exception as error:
             raise refusal_of(emitted, own, error) from error
-    if emitted.source not in _ROLES:
-        # Series call a kernel, which becomes part of them.
-        folder = models_folder()
-        namespace = _imported(_written(emitted.source, folder))
+    return roles_of(emitted.source)
+
+
+@lru_cache(maxsize=MOST_SOURCES)
+def roles_of(source: str) -> tuple[Any, ...]:
+    """The compiled functions of a source text, shared by all systems that have it."""
+    # Series call a kernel, which becomes part of them.
+    folder = models_folder()
+    path = _written(source, folder)
+    try:
+        namespace = _imported(path)
         with compiled_into(folder):
-            _ROLES[emitted.source] = _decorated(namespace, cached=True)
-    return _ROLES[emitted.source]
+            return _decorated(namespace, cached=True)
+    finally:
+        sys.modules.pop(path.stem, None)
 
 
 def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:

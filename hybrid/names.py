@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Iterable
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,19 +16,21 @@ if TYPE_CHECKING:
 
 STATE = "State components"
 PARAMETERS = "Parameters"
+# Classes of named values that are kept for the next model of the same names.
+MOST_CLASSES = 256
 
 
 class UnknownComponentError(ModelError, AttributeError):
     """A model function asked for a state or a parameter that the system does not have."""
 
 
-@cache
+@lru_cache(MOST_CLASSES)
 def plain_class(kind: str, names: tuple[str, ...]) -> type[Any]:
     """A bare namedtuple class with the given fields, of the sort that compiled code understands."""
     return namedtuple(kind.title().replace(" ", ""), names)
 
 
-@cache
+@lru_cache(MOST_CLASSES)
 def _explaining_class(kind: str, names: tuple[str, ...]) -> type[Any]:
     def __getattr__(self: Any, name: str) -> Any:
         raise UnknownComponentError(unknown_name(kind.removesuffix("s"), name, names, kind))

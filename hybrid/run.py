@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from math import floor, ulp
 from typing import Any
 
@@ -27,11 +27,13 @@ ISOLATION_DEPTH = 64
 RECENT = 64
 # A time is known to this part of a forcing period, at least.
 FINEST_PHASE = 2.0**-10
+# Solvers, and shapes of memory, that are kept for the next run.
+MOST_LAYOUTS = 64
 UNLIMITED = np.iinfo(np.int64).max
 DEFAULT_SOLVER = Taylor()
 
 
-@cache
+@lru_cache(MOST_LAYOUTS)
 def kernel_method(solver: RungeKutta) -> Any:
     """The kernel's view of a solver: tableau and tolerances."""
     from hybrid.kernels.layout import Method
@@ -112,7 +114,7 @@ def _fresh_work(layout: Any, method: Any) -> Any:
     return work
 
 
-@cache
+@lru_cache(MOST_LAYOUTS)
 def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: int) -> Any:
     """Where the arrays of a workspace lie."""
     from hybrid.kernels.lanes import whole_registers
@@ -162,7 +164,7 @@ def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) ->
     return record
 
 
-@cache
+@lru_cache(MOST_LAYOUTS)
 def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
     """Where the arrays of a record lie."""
     from hybrid.kernels.layout import Record
@@ -185,7 +187,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
     return Layout(Record, shapes)
 
 
-@cache
+@lru_cache(MOST_LAYOUTS)
 def _run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
     from hybrid.kernels.layout import Run
     from hybrid.kernels.structure import Layout
@@ -431,6 +433,8 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
                 method, n, tangents, compiled.series_columns(tangents), compiled.emitted.programs.longest
             ),
         )
+        while len(compiled.plans) >= MOST_LAYOUTS:
+            compiled.plans.pop(next(iter(compiled.plans)), None)
         compiled.plans[solver, tangents] = plan
     return plan
 

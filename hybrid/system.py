@@ -14,6 +14,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.names import named_values
+from hybrid.portable import Portable
 from hybrid.probe import probe_system
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None
 
 
 @attrs.frozen
-class Guard:
+class Guard(Portable):
     """A scalar function ``g(t, x, p)``; its transition fires when it crosses zero in its direction.
 
     Parameters
@@ -106,7 +107,7 @@ class Guard:
 
 
 @attrs.frozen
-class Reset:
+class Reset(Portable):
     """The map ``R(t, x, p)`` applied at the crossing; it returns one value per state.
 
     Parameters
@@ -128,7 +129,7 @@ class Reset:
 
 
 @attrs.frozen
-class Mode:
+class Mode(Portable):
     """A smooth vector field ``f(t, x, p)``: a node of the graph.
 
     Parameters
@@ -169,7 +170,7 @@ def _as_reset(value: Any) -> Reset | None:
 
 
 @attrs.frozen
-class Transition:
+class Transition(Portable):
     """An edge of the graph: where it leaves from, where it leads, when it fires and what it does.
 
     A transition from a mode to itself without a reset changes nothing and only marks the crossing: a
@@ -287,7 +288,7 @@ def _as_period(value: Any) -> Any:
 
 
 @attrs.frozen(eq=False)
-class HybridSystem:
+class HybridSystem(Portable):
     """A hybrid (piecewise-smooth) dynamical system: modes joined by transitions.
 
     Model functions are plain Python on scalars, ``f(t, x, p)``, with ``x.q`` and ``p.e`` by name and
@@ -321,6 +322,8 @@ class HybridSystem:
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: float | ModelFunction | None = attrs.field(default=None, kw_only=True, converter=_as_period)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
+    # What compile_system makes of the system: it lives as long as the system, and is not part of it.
+    _compiled: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
         self._check_graph()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.system import Transition
-from hybrid.testing.case import Case, discard, mode_after
+from hybrid.testing.case import Case, as_case, discard, mode_after
 
 CROSSINGS = "Each change of sign of a guard in its direction fires once"
 
@@ -25,6 +25,7 @@ def check_crossings(case: Case) -> None:
     PropertyError
         If a crossing does not fire, or fires twice.
     """
+    as_case(case)
     run = case.run
     guards = [each for each in case.system.transitions if each.guard.when is None]
     if not guards:

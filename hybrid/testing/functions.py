@@ -8,7 +8,7 @@ from hybrid.agreement import disagreement
 from hybrid.compile import compile_system
 from hybrid.periodicity import period_fault_at
 from hybrid.roles import indexed_roles
-from hybrid.testing.case import Case, discard
+from hybrid.testing.case import Case, as_case, discard
 
 COMPILED = "The compiled functions equal the Python functions"
 PERIOD = "The declared period is a period of every function"
@@ -22,6 +22,7 @@ def check_compiled(case: Case) -> None:
     PropertyError
         If a value of a field, guard, condition, reset or given derivative differs.
     """
+    as_case(case)
     compiled = compile_system(case.system)
     x = np.array(case.x0)
     for index, role in indexed_roles(case.system):
@@ -43,6 +44,7 @@ def check_period(case: Case) -> None:
     PropertyError
         If one has not.
     """
+    as_case(case)
     system, x = case.system, np.array(case.x0)
     period = system.forcing_period(case.parameters)
     if period is None:

@@ -1,0 +1,71 @@
+"""Pickling and copying of models: a model never changes, so a copy is the model itself."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import sys
+from collections.abc import Callable
+from types import FrameType, MappingProxyType
+from typing import Any, Self
+
+import attrs
+
+from hybrid.arguments import shown
+from hybrid.errors import ModelError
+
+# The pickler in C and the one in Python.
+PICKLERS = (pickle.Pickler, pickle._Pickler)  # type: ignore[attr-defined]
+
+
+class Portable:
+    """Base of the classes that a model is made of: frozen attrs classes that may hold functions."""
+
+    __slots__ = ()
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        names = [field.name for field in attrs.fields(type(self)) if field.init]  # type: ignore[arg-type]
+        return _made_again, (type(self), {name: self._stored(name) for name in names})
+
+    def _stored(self, name: str) -> Any:
+        value = getattr(self, name)
+        if isinstance(value, MappingProxyType):
+            return dict(value)
+        if callable(value) and not _can_store(_pickler_at_work(), value):
+            own = getattr(self, "name", "")
+            raise ModelError(
+                f"{type(self).__name__}{f' {own!r}' if own else ''}: {name} cannot be pickled: {shown(value)} "
+                "cannot be imported by its name. Define it with def at the top level of a module, or pickle "
+                "with cloudpickle."
+            )
+        return value
+
+
+def _made_again(kind: type[Any], fields: dict[str, Any]) -> Any:
+    """An object from its fields, validated like any other."""
+    return kind(**fields)
+
+
+def _pickler_at_work() -> type[Any]:
+    """Class of the pickler that called: that of the C functions of ``pickle`` leaves no trace on the stack."""
+    frame: FrameType | None = sys._getframe()
+    while frame is not None:
+        caller = frame.f_locals.get("self")
+        if isinstance(caller, PICKLERS):
+            return type(caller)
+        frame = frame.f_back
+    return pickle.Pickler
+
+
+def _can_store(pickler: type[Any], function: Callable[..., Any]) -> bool:
+    try:
+        pickler(io.BytesIO()).dump(function)
+    except Exception:  # of any kind, as each pickler and each callable has its own
+        return False
+    return True
