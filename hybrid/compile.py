@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
-from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -14,7 +13,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.agreement import check_agreement
-from hybrid.cache import announced, compiled_into, source_key, write_whole
+from hybrid.cache import announced, compiled_into, keep_text, kept_text, source_key
 from hybrid.errors import ArgumentError
 from hybrid.kept import models_folder, traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
@@ -305,13 +304,18 @@ def roles_of(source: str) -> tuple[Any, ...]:
     """The compiled functions of a source text, shared by all systems that have it."""
     # Series call a kernel, which becomes part of them.
     folder = models_folder()
-    path = _written(source, folder)
+    path = folder / f"hybrid_model_{source_key(source)}.py"
+    # A file that is damaged is not what it should be.
+    if kept_text(path) != source and not keep_text(path, source):
+        return _decorated(_executed(source), cached=False)
+    # Numba finds the globals of a cached function again through the name of its module.
+    sys.modules[path.stem] = module = ModuleType(path.stem)
     try:
-        namespace = _imported(path)
+        exec(compile(source, str(path), "exec"), vars(module))
         with compiled_into(folder):
-            return _decorated(namespace, cached=True)
+            return _decorated(vars(module), cached=True)
     finally:
-        sys.modules.pop(path.stem, None)
+        del sys.modules[path.stem]
 
 
 def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
@@ -326,20 +330,8 @@ def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
     )
 
 
-def _written(source: str, folder: Path) -> Path:
-    """The file that holds ``source``."""
-    path = folder / f"hybrid_model_{source_key(source)}.py"
-    if not path.exists():
-        write_whole(path, source)
-    return path
-
-
-def _imported(path: Path) -> dict[str, Any]:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    # Numba finds the globals of a cached function again through the name of its module.
-    sys.modules[path.stem] = module
-    spec.loader.exec_module(module)
-    return vars(module)
+def _executed(source: str) -> dict[str, Any]:
+    """Roles that are compiled in this process and not kept, as there is no room for them."""
+    namespace: dict[str, Any] = {}
+    exec(compile(source, "<hybrid model>", "exec"), namespace)
+    return namespace

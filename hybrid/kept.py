@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from hybrid.cache import cache_directory, write_whole
+from hybrid.cache import cache_folder, keep_text, kept_text
 from hybrid.emitted import Emitted, Programs, Propagator
 from hybrid.load import kernels_key
 from hybrid.roles import roles
@@ -63,13 +63,14 @@ def traced_or_kept(system: HybridSystem) -> Emitted:
         return kept
     emitted = _traced(system)
     if not emitted.opaque:
-        write_whole(path, json.dumps(attrs.asdict(emitted), default=int))
+        text = json.dumps(attrs.asdict(emitted), default=int)
+        keep_text(path, f"{_checksum(text)}\n{text}")
     return emitted
 
 
 def models_folder() -> Path:
     """Folder of what is kept of models. Series call a kernel, which becomes part of them."""
-    return cache_directory() / f"models-{kernels_key()}"
+    return cache_folder(f"models-{kernels_key()}")
 
 
 def operations_of(system: HybridSystem) -> str | None:
@@ -153,8 +154,11 @@ def _traced(system: HybridSystem) -> Emitted:
 
 
 def _read(path: Path) -> Emitted | None:
+    checksum, _, text = (kept_text(path) or "").partition("\n")
+    if checksum != _checksum(text):
+        return None
     try:
-        kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        kept: dict[str, Any] = json.loads(text)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
         for name in (*of_transitions, "affine_mode", "autonomous", "discontinuities", "timed_guard"):
             kept[name] = tuple(kept[name])
@@ -164,5 +168,9 @@ def _read(path: Path) -> Emitted | None:
             each["statements"], each["guards"] = tuple(each["statements"]), tuple(each["guards"])
         kept["propagators"] = tuple(Propagator(**each) for each in kept["propagators"])
         return Emitted(**kept)
-    except (OSError, ValueError, LookupError, TypeError):
+    except (ValueError, LookupError, TypeError):
         return None
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

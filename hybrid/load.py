@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
+import importlib.util
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
@@ -10,7 +12,7 @@ from types import ModuleType
 from typing import Any
 
 from hybrid import beside
-from hybrid.cache import announced, cache_directory, compiled_into, source_key
+from hybrid.cache import announced, cache_folder, compiled_into, source_key
 
 DRIVER = "hybrid.kernels.drive"
 # What every run needs besides: a second process compiles them meanwhile.
@@ -28,7 +30,7 @@ def load_kernels(module: str = DRIVER) -> ModuleType:
         if module in EVENTS:
             beside.finish()
         _import_numba()
-        with compiled_into(_folder()):
+        with compiled_into(_folder(module)):
             return importlib.import_module(module)
 
 
@@ -50,19 +52,38 @@ def _import_numba() -> None:
     vars(arraymath)["ensure_blas"] = look
 
 
-def _folder() -> Path:
-    return cache_directory() / f"kernels-{kernels_key()}"
+def _folder(module: str) -> Path:
+    return cache_folder(f"kernels-{kernels_key(module)}")
 
 
 def _kept(module: str) -> bool:
-    return any(_folder().rglob(f"{module.rpartition('.')[2]}.*.nbi"))
+    return any(_folder(module).rglob(f"{module.rpartition('.')[2]}.*.nbi"))
 
 
 @cache
-def kernels_key() -> str:
-    """Key of all kernel sources together, read once for all modules that are loaded."""
+def kernels_key(module: str = DRIVER) -> str:
+    """Key of all sources that go into a module of kernels: ours, and those of the package that it is from."""
     sources = sorted((Path(__file__).parent / "kernels").glob("*.py"))
+    if not module.startswith("hybrid."):
+        sources += sorted(_own_sources(module))
     return source_key(*(path.read_text(encoding="utf-8") for path in sources))
+
+
+def _own_sources(module: str) -> set[Path]:
+    """Files of a module and of what it imports from its own package, and so on."""
+    package, found, left = module.partition(".")[0], set[Path](), [module]
+    while left:
+        spec = importlib.util.find_spec(left.pop())
+        path = Path(spec.origin) if spec is not None and spec.origin else None
+        if path is None or path in found or path.name == "__init__.py":
+            continue
+        found.add(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == package:
+                left += [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]
+            elif isinstance(node, ast.Import):
+                left += [alias.name for alias in node.names if alias.name.partition(".")[0] == package]
+    return found
 
 
 @cache

@@ -15,7 +15,7 @@ from hybrid.arguments import shown
 from hybrid.errors import ModelError
 
 # The pickler in C and the one in Python.
-PICKLERS = (pickle.Pickler, pickle._Pickler)  # type: ignore[attr-defined]
+PICKLERS = (pickle.Pickler, pickle._Pickler)
 
 
 class Portable:
@@ -30,8 +30,9 @@ class Portable:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        names = [field.name for field in attrs.fields(type(self)) if field.init]  # type: ignore[arg-type]
-        return _made_again, (type(self), {name: self._stored(name) for name in names})
+        kind: Any = type(self)
+        names = [field.name for field in attrs.fields(kind) if field.init]
+        return _made_again, (kind, {name: self._stored(name) for name in names})
 
     def _stored(self, name: str) -> Any:
         value = getattr(self, name)
@@ -39,10 +40,10 @@ class Portable:
             return dict(value)
         if callable(value) and not _can_store(_pickler_at_work(), value):
             own = getattr(self, "name", "")
+            owner = f"{type(self).__name__} {own!r}" if own else type(self).__name__
             raise ModelError(
-                f"{type(self).__name__}{f' {own!r}' if own else ''}: {name} cannot be pickled: {shown(value)} "
-                "cannot be imported by its name. Define it with def at the top level of a module, or pickle "
-                "with cloudpickle."
+                f"{owner}: {name} cannot be pickled: {shown(value)} cannot be imported by its name. "
+                "Define it with def at the top level of a module, or pickle with cloudpickle."
             )
         return value
 
@@ -53,7 +54,7 @@ def _made_again(kind: type[Any], fields: dict[str, Any]) -> Any:
 
 
 def _pickler_at_work() -> type[Any]:
-    """Class of the pickler that called: that of the C functions of ``pickle`` leaves no trace on the stack."""
+    """Class of the pickler that called; the usual one leaves no trace on the stack."""
     frame: FrameType | None = sys._getframe()
     while frame is not None:
         caller = frame.f_locals.get("self")

@@ -1,6 +1,8 @@
 """Compiled code kept between processes, and what is said while it is made."""
 
+import errno
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -8,8 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from hybrid.cache import announced, cache_directory, compiled_into, source_key
-from hybrid.load import load_kernels
+import hybrid
+from hybrid import cache, kept
+from hybrid.cache import announced, cache_directory, cache_folder, compiled_into, keep_text, source_key
+from hybrid.compile import roles_of
+from hybrid.load import kernels_key, load_kernels
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
@@ -115,3 +120,195 @@ def test_linear_algebra_is_loaded_when_a_compiled_function_needs_it(shared_kerne
         [sys.executable, "-c", LINEAR_ALGEBRA], cwd=ROOT, env=environment, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def new_process(monkeypatch, tmp_path):
+    """Nothing is known of any folder yet, and the private one lies in a folder of this test."""
+    monkeypatch.setattr(cache, "_SAID", set())
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    known = (cache._usable, cache._private_folder, roles_of)
+    for each in known:
+        each.cache_clear()
+    yield tmp_path
+    for each in known:
+        each.cache_clear()
+
+
+def not_a_folder(path):
+    path.write_text("")
+
+
+def below_a_file(path):
+    path.parent.joinpath("file").write_text("")
+    path.symlink_to(path.parent / "file" / "below")
+
+
+def open_to_all(path):
+    path.mkdir()
+    path.chmod(0o777)
+
+
+def open_to_the_group(path):
+    path.mkdir()
+    path.chmod(0o770)
+
+
+OBJECTIONS = {
+    not_a_folder: "File exists",
+    below_a_file: "",
+    open_to_all: "others can write to it",
+    open_to_the_group: "others can write to it",
+}
+
+
+@pytest.mark.parametrize("made", OBJECTIONS)
+def test_a_folder_that_cannot_be_trusted_or_used_is_replaced(new_process, monkeypatch, capsys, made):
+    chosen = new_process / "chosen"
+    made(chosen)
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(chosen))
+    private = cache_directory()
+    assert private.parent == new_process / "temporary"
+    assert private.stat().st_mode & 0o077 == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"hybrid: compiled code is kept in {private}, not in {chosen}: ")
+    assert OBJECTIONS[made] in line
+    assert cache_directory() == private
+    assert capsys.readouterr().err == ""
+
+
+def test_so_is_one_of_another_user(new_process, monkeypatch, capsys):
+    chosen = new_process / "chosen"
+    chosen.mkdir()
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(chosen))
+    owner = os.geteuid()
+    monkeypatch.setattr("os.geteuid", lambda: owner + 1)
+    assert cache_directory().parent == new_process / "temporary"
+    assert "it belongs to another user" in capsys.readouterr().err
+
+
+def test_so_is_a_part_of_it(new_process, monkeypatch, capsys):
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(new_process))
+    open_to_all(new_process / "models-1")
+    assert cache_folder("models-1").parent.parent == new_process / "temporary"
+    assert cache_folder("models-2") == new_process / "models-2"
+    assert "models-1: others can write to it" in capsys.readouterr().err
+
+
+def test_a_private_folder_that_another_user_has_made_is_not_used(new_process, monkeypatch):
+    lasting = new_process / "temporary" / f"hybrid-systems-{os.geteuid()}"
+    open_to_all(lasting)
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(lasting))
+    assert cache_directory() != lasting
+    assert cache_directory().stat().st_mode & 0o077 == 0
+
+
+def test_folders_are_made_for_the_user_alone(new_process, monkeypatch):
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(new_process / "not" / "yet"))
+    assert cache_directory() == new_process / "not" / "yet"
+    assert cache_directory().stat().st_mode & 0o077 == 0
+
+
+def decay(rate):
+    return hybrid.HybridSystem(state=("x",), modes=[hybrid.Mode("a", lambda t, x, p: (-rate * x.x,))])
+
+
+def ends_well(system):
+    arc = hybrid.simulate(system, (1.0,), (0.0, 1.0), samples=[1.0])
+    return arc.status.ok and 0.0 < arc.x[-1, 0] < 1.0
+
+
+def truncate(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("damage", [truncate, empty, flip])
+@pytest.mark.parametrize("pattern", ["hybrid_model_*.py", "emitted_*.json", "*.nbi", "*.nbc"])
+def test_what_is_damaged_is_made_again(new_process, monkeypatch, capsys, damage, pattern):
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(new_process))
+    assert ends_well(decay(0.7))
+    files = sorted(kept.models_folder().rglob(pattern))
+    assert files
+    before = {path: path.read_bytes() for path in files}
+    for path in files:
+        damage(path)
+    roles_of.cache_clear()
+    capsys.readouterr()
+    assert ends_well(decay(0.7))
+    said = [line for line in capsys.readouterr().err.splitlines() if "compiling" not in line]
+    assert len(said) <= 1
+    if pattern != "*.nbi" or damage is not flip:
+        assert all(path.stat().st_size > 0.9 * len(before[path]) for path in files)
+    roles_of.cache_clear()
+    assert ends_well(decay(0.7))
+    assert capsys.readouterr().err == ""
+
+
+def test_a_full_disk_stops_nothing(new_process, monkeypatch, capsys):
+    def full(*arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(new_process))
+    kept.models_folder()
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile._open_for_write", full)
+    assert ends_well(decay(0.6))
+    monkeypatch.setattr(Path, "write_text", full)
+    assert ends_well(decay(0.5))
+    lines = [line for line in capsys.readouterr().err.splitlines() if "compiling" not in line]
+    assert lines == ["hybrid: compiled code cannot be kept: No space left on device."]
+    assert [path for path in kept.models_folder().iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_draft_that_was_not_finished_is_removed(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(cache, "_SAID", set())
+    monkeypatch.setattr(Path, "replace", lambda *_: (_ for _ in ()).throw(OSError(errno.EIO, "broken")))
+    assert not keep_text(tmp_path / "a.txt", "a")
+    assert list(tmp_path.iterdir()) == []
+    assert "broken" in capsys.readouterr().err
+
+
+def test_kernels_of_another_package_depend_on_what_they_are_made_of(tmp_path, monkeypatch):
+    package = tmp_path / "otherpackage"
+    package.mkdir()
+    for name in ("__init__", "aside", "parts"):
+        (package / f"{name}.py").write_text("")
+    (package / "kernels.py").write_text("from otherpackage import parts\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    keys = []
+    for changed in (None, "aside", "parts", "kernels"):
+        if changed:
+            path = package / f"{changed}.py"
+            path.write_text(path.read_text() + "# changed\n")
+        keys.append(kernels_key.__wrapped__("otherpackage.kernels"))
+    assert keys[0] == keys[1]
+    assert len(set(keys[1:])) == 3
+    assert kernels_key("lyapunov.kernels") != kernels_key()
+
+
+def test_damaged_kernels_are_compiled_again(tmp_path):
+    load_kernels("hybrid.kernels.dense")
+    for folder in cache_directory().glob("kernels-*"):
+        shutil.copytree(folder, tmp_path / folder.name)
+    for path in tmp_path.rglob("dense.*"):
+        truncate(path)
+    program = "import hybrid, models; print(hybrid.simulate(models.bouncing_ball(), (1, 0), (0, 1))(0.25)[0])"
+    environment = os.environ | {"HYBRID_CACHE_DIR": str(tmp_path)}
+    for lines in (1, 0):
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=ROOT, env=environment, capture_output=True, text=True
+        )
+        assert float(done.stdout) == pytest.approx(1 - 9.81 / 32, rel=1e-14), done.stderr
+        said = [line for line in done.stderr.splitlines() if "compiling" not in line]
+        assert len(said) == lines
+        assert all("is damaged and is made again" in line for line in said)
