@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid.arc import HybridArc
+from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.interrupt import CTRL_C, interrupted_status
 from hybrid.run import check_solver
 from hybrid.simulate import simulate
 from hybrid.solvers import RungeKutta
@@ -117,6 +119,14 @@ def global_error(
             system, start, t_span, mode=mode, parameters=parameters, solver=at, max_jumps=max_jumps
         )
 
+    compile_system(system)
+    with CTRL_C:
+        return _estimated(system, solver, run, x0, mode)
+
+
+def _estimated(
+    system: HybridSystem, solver: RungeKutta, run: Callable[..., HybridArc], x0: ArrayLike, mode: str | None
+) -> GlobalError:
     arc = run(solver, x0, mode)
     rungs = [_tightened(solver, factor) for factor in TIGHTER]
     aside = ROUNDING * EPSILON * np.sqrt(1 + arc.steps) * np.abs(arc.x).max(axis=0)
@@ -134,7 +144,10 @@ def global_error(
         near = (other for other in others if _starts_alike(arc, other))
         return next(near, None) or run(rung, arc.x[0], begin)
 
-    return _compare(arc, *map(moved, rungs, signs))
+    found = _compare(arc, *map(moved, rungs, signs))
+    if not CTRL_C.is_set():
+        return found
+    return attrs.evolve(found, status=interrupted_status("the run as far as it came, and no estimate"))
 
 
 def _tightened(solver: RungeKutta, factor: float) -> RungeKutta:

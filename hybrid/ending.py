@@ -58,6 +58,9 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
 
 
 def _status(trajectory: Trajectory, code: int) -> Status:
+    where = f"at t = {trajectory.t:.12g} in mode {trajectory.mode!r}"
+    if code == StatusCode.INTERRUPTED:
+        return run_status(code, where, None, bare_time=False)
     count, jumps = trajectory.run.count.tolist(), trajectory.jumps
     singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
     grazed = count[codes.ILL_CONDITIONED] if trajectory.tangents else 0
@@ -82,7 +85,6 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code == codes.DONE and grazed:
         return _grazed(trajectory, grazed)
     names = trajectory.system.transition_names
-    where = f"at t = {trajectory.t:.12g} in mode {trajectory.mode!r}"
     if code == codes.STUCK:
         fired = _round(trajectory)
         transitions = [trajectory.system.transitions[i] for i in fired]

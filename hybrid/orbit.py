@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.arc import HybridArc
+from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.interrupt import CTRL_C, interrupted_status
 from hybrid.run import check_solver, start
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta
@@ -151,11 +153,22 @@ def periodic_orbit(
                 f"period is for autonomous systems; this one has the forcing period {forcing}. Use periods=."
             )
         point = _Point(guess, t0, periods * forcing)
-        return shooting.newton(point, None, tolerance, max_iterations)
+        compile_system(system)
+        with CTRL_C:
+            return _kept(shooting.newton(point, None, tolerance, max_iterations))
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
-    return shooting.autonomous(_Point(guess, t0, length), tolerance, max_iterations)
+    compile_system(system)
+    with CTRL_C:
+        return _kept(shooting.autonomous(_Point(guess, t0, length), tolerance, max_iterations))
+
+
+def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """The orbit, with a status that says so if the search was interrupted."""
+    if not CTRL_C.is_set():
+        return orbit
+    return attrs.evolve(orbit, status=interrupted_status("the best point so far"))
 
 
 @attrs.frozen(eq=False)

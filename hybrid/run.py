@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache, lru_cache
-from math import floor, ulp
 from typing import Any
 
 import attrs
@@ -15,8 +14,10 @@ from hybrid.compile import CompiledSystem, compile_system
 from hybrid.ending import status_of
 from hybrid.errors import ArgumentError
 from hybrid.first_mode import choose_mode
+from hybrid.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
+from hybrid.periods import check_time, split_time
 from hybrid.solvers import RungeKutta, Taylor
 from hybrid.status import Status
 from hybrid.system import HybridSystem
@@ -25,8 +26,6 @@ from hybrid.system import HybridSystem
 ISOLATION_DEPTH = 64
 # Transitions remembered in the order in which they fired: enough to see which go round without end.
 RECENT = 64
-# A time is known to this part of a forcing period, at least.
-FINEST_PHASE = 2.0**-10
 # Solvers, and shapes of memory, that are kept for the next run.
 MOST_LAYOUTS = 64
 UNLIMITED = np.iinfo(np.int64).max
@@ -227,24 +226,6 @@ def check_solver(solver: object) -> RungeKutta:
     )
 
 
-def check_time(name: str, t: float, period: float) -> None:
-    """ArgumentError if the phase of ``t`` within the period, if there is one, is lost in rounding."""
-    if period > 0.0 and not ulp(t) <= FINEST_PHASE * period:
-        raise ArgumentError(
-            f"{name} must be small enough to have a phase: floating-point numbers near {t} are {ulp(t):.2g} "
-            f"apart, and the forcing period is {period:.6g}. Take whole periods off."
-        )
-
-
-def split_time(t: float, period: float) -> tuple[int, float]:
-    """Time as whole periods and a phase in ``[0, period)``; without a period (0) all of it is phase."""
-    if period <= 0.0:
-        return 0, float(t)
-    cycle = floor(t / period)
-    phase = t - cycle * period
-    return (cycle + 1, 0.0) if phase >= period else (cycle, max(phase, 0.0))
-
-
 @attrs.frozen(eq=False)
 class Trajectory:
     """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed.
@@ -261,6 +242,7 @@ class Trajectory:
     max_steps: int
     phase0: float
     beyond: tuple[str, ...] = ()
+    stop: Stop = CTRL_C
 
     @property
     def method(self) -> Any:
@@ -299,6 +281,11 @@ class Trajectory:
         return int(self.run.count[codes.JUMPS])
 
     @property
+    def steps(self) -> int:
+        """Steps tried so far."""
+        return int(self.run.count.item(codes.STEPS))
+
+    @property
     def tangent_matrix(self) -> np.ndarray:
         """Tangent vectors as columns ``(n, k)``, a copy."""
         n = self.model.dimension
@@ -333,7 +320,26 @@ class Trajectory:
         max_steps: int | None = None,
         max_jumps: int = UNLIMITED,
     ) -> int:
-        """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run."""
+        """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run.
+
+        The code is INTERRUPTED if the run was asked to stop. A run of few steps does not ask.
+        """
+        limit = self.max_steps if max_steps is None else max_steps
+        most = min(limit, self.steps + FIRST_BURST)
+        code = self._burst(cycle, phase, record, most, max_jumps)
+        if code != codes.MAX_STEPS or most == limit:
+            return code
+        bursts = Bursts([self])
+        code = codes.GO_ON
+        with self.stop:
+            while code == codes.GO_ON:
+                most = min(limit, bursts.most())
+                code = self._burst(cycle, phase, record, most, max_jumps)
+                if code == codes.MAX_STEPS and most < limit:
+                    code = bursts.judged(code)
+        return code
+
+    def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
         return int(
             entry(load_kernels().advance)(
                 self.plan.parts,
@@ -345,7 +351,7 @@ class Trajectory:
                 False,
                 cycle,
                 phase,
-                self.max_steps if max_steps is None else max_steps,
+                max_steps,
                 max_jumps,
                 self.work,
             )
@@ -375,11 +381,12 @@ def start(
     solver: RungeKutta | None = None,
     tangent: np.ndarray | None = None,
     time: str = "t0",
+    stop: Stop = CTRL_C,
 ) -> Trajectory:
     """A trajectory at its start, everything about the call checked.
 
     ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
-    name of the argument that ``t0`` comes from.
+    name of the argument that ``t0`` comes from, ``stop`` who may end the run early.
     """
     compiled = compile_system(system)
     state = arguments.state("x0", x0, system)
@@ -394,7 +401,7 @@ def start(
     run, phase0 = _fresh_run(plan.run_layout, model, state, tangent, t0)
     work = _fresh_work(plan.work_layout, plan.method)
     run.count[codes.MODE], beyond = choose_mode(system, plan.parts, model, run, work, mode)
-    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond)
+    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond, stop)
 
 
 @attrs.frozen(eq=False)

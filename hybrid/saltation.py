@@ -12,7 +12,8 @@ from hybrid import arguments
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.load import entry, load_kernels
-from hybrid.run import check_time, kernel_method, split_time, workspace
+from hybrid.periods import check_time, split_time
+from hybrid.run import kernel_method, workspace
 from hybrid.solvers import Tsit5
 from hybrid.system import HybridSystem, Transition
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
+from hybrid.interrupt import Bursts
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import progress_bar
@@ -104,7 +105,7 @@ def stroboscopic_section(
         )
     chunks = [(np.empty((0, system.dimension)), np.empty((0, 3), dtype=np.int64))]
     code, before = codes.DONE, 0
-    with progress_bar(transient + periods, "Section", progress, "period") as bar:
+    with trajectory.stop, progress_bar(transient + periods, "Section", progress, "period") as bar:
         for kept, left in ((False, transient), (True, periods)):
             while left > 0 and code == codes.DONE:
                 states, places, code = strobe(trajectory, min(left, POINTS_AT_ONCE))
@@ -132,21 +133,35 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     """
     states = np.empty((count, trajectory.model.dimension))
     places = np.empty((count, 3), dtype=np.int64)
-    done, code = entry(load_kernels("hybrid.kernels.sections").strobe)(
-        address(load_kernels().advance),
-        trajectory.parts,
-        trajectory.model,
-        trajectory.method,
-        trajectory.run,
-        trajectory.no_record(),
-        trajectory.work,
-        trajectory.phase0,
-        trajectory.max_steps,
-        UNLIMITED,
-        states,
-        places,
-    )
-    return states[:done], places[:done], code
+    kernel = entry(load_kernels("hybrid.kernels.sections").strobe)
+    record, bursts = trajectory.no_record(), Bursts([trajectory])
+    first, total, code = int(trajectory.run.count[codes.CYCLE]) + 1, 0, codes.GO_ON
+    while code == codes.GO_ON:
+        done, code = kernel(
+            address(load_kernels().advance),
+            trajectory.parts,
+            trajectory.model,
+            trajectory.method,
+            trajectory.run,
+            record,
+            trajectory.work,
+            trajectory.phase0,
+            bursts.most(),
+            UNLIMITED,
+            states[total:],
+            places[total:],
+        )
+        total += done
+        code = bursts.judged(code)
+        if code == codes.GO_ON:
+            # The burst has ended within a period, which the kernel would begin anew.
+            code = trajectory.advance_to(first + total, trajectory.phase0, record)
+            if code == codes.DONE:
+                places[total] = trajectory.run.count[[codes.CYCLE, codes.MODE, codes.JUMPS]]
+                states[total] = trajectory.x
+                total += 1
+                code = codes.GO_ON if total < count else codes.DONE
+    return states[:total], places[:total], code
 
 
 def poincare_section(
@@ -201,7 +216,7 @@ def poincare_section(
     arguments.instance("section", section, Guard, "Write Guard(function, direction=...).")
     marked = with_section(as_system("system", system), section)
     trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
-    with progress_bar(transient + points, "Section", progress, "point") as bar:
+    with trajectory.stop, progress_bar(transient + points, "Section", progress, "point") as bar:
         return _collect(trajectory, len(system.modes), transient, points, bar)
 
 

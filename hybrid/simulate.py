@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.kernels import codes
-from hybrid.run import Trajectory, check_time, empty_record, record_layout, start
+from hybrid.periods import check_time
+from hybrid.run import Trajectory, empty_record, record_layout, start
 from hybrid.solvers import RungeKutta
+from hybrid.status import StatusCode
 from hybrid.system import HybridSystem, as_system
 
 # Room of the record that kernels fill before Python empties it: large enough that the crossing costs nothing.
@@ -60,7 +62,8 @@ def simulate(
     Returns
     -------
     HybridArc
-        With a status; a run that ends early keeps what it has.
+        With a status; a run that ends early keeps what it has. Ctrl-C ends a run that takes longer than some
+        milliseconds with the status ``INTERRUPTED``.
 
     Raises
     ------
@@ -121,12 +124,13 @@ class _Recorder:
 
     def run(self, t1: float, max_jumps: int) -> HybridArc:
         trajectory, run = self.trajectory, self.trajectory.run
-        code = codes.RECORD_FULL
-        while code == codes.RECORD_FULL:
-            record = self.layout.unwritten()
-            record.used[:] = 0
-            code = trajectory.advance(t1, record, max_jumps)
-            self._file(record)
+        code = self._advance(t1, max_jumps)
+        if code == codes.RECORD_FULL:
+            with trajectory.stop:
+                while code == codes.RECORD_FULL:
+                    code = (
+                        StatusCode.INTERRUPTED if trajectory.stop.is_set() else self._advance(t1, max_jumps)
+                    )
         model, system, count = trajectory.model, trajectory.system, run.count.tolist()
         columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
         jumps = Jumps(system, model.parameters, model.period, *columns)
@@ -156,6 +160,14 @@ class _Recorder:
             count[codes.REJECTED],
             pieces,
         )
+
+    def _advance(self, t1: float, max_jumps: int) -> int:
+        """Run until the record is full or the run ends; the code."""
+        record = self.layout.unwritten()
+        record.used[:] = 0
+        code = self.trajectory.advance(t1, record, max_jumps)
+        self._file(record)
+        return code
 
     def _file(self, record: Any) -> None:
         period = self.trajectory.model.period

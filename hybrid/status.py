@@ -30,6 +30,7 @@ class StatusCode(IntEnum):
     NOT_CONVERGED = 101
     NOT_RUN = 102
     DISCONTINUOUS_FIELD = 103
+    INTERRUPTED = 104
 
 
 @attrs.frozen
@@ -94,6 +95,10 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
             f"After {last} the state rests on its guard {where} and is pushed through it: jumps of "
             "length zero accumulate.",
             NAME_THE_LIMIT,
+        ),
+        StatusCode.INTERRUPTED: (
+            f"Interrupted {where}.",
+            "What was computed so far is in the result. Go on from that time, state and mode, or call again.",
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",

@@ -17,6 +17,7 @@ from hybrid.arc import HybridArc
 from hybrid.errors import ArgumentError
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta, Taylor, Tsit5
+from hybrid.status import StatusCode
 from hybrid.system import HybridSystem, as_system
 from hybrid.text import table
 
@@ -267,13 +268,18 @@ def work_precision(
         truth = as_answer("reference", reference, n, span)
         floor = rounding_of(truth) | known_errors
     rows = []
-    for name, run in runs.items():
+    while runs:
+        name = next(iter(runs))
+        run = runs.pop(name)
         slow = False
         for tolerance in sorted(levels.tolist(), reverse=True):
             if slow:
                 break
             row = _measured(name, run, tolerance, truth, (n, span), repeats, longest, clock)
             rows.append(row)
+            if row.status == StatusCode.INTERRUPTED.name:
+                runs = {}
+                break
             slow = row.seconds > longest
     quantities = [name for name in QUANTITIES if name in floor]
     return WorkPrecision(
@@ -322,7 +328,7 @@ def _own(
     parameters: Mapping[str, float] | None,
     tangent: bool,
 ) -> HybridArc:
-    return simulate(
+    arc = simulate(
         system,
         x0,
         t_span,
@@ -332,6 +338,9 @@ def _own(
         tangent=tangent,
         samples=[t_span[1]],
     )
+    if arc.status.code == StatusCode.INTERRUPTED:
+        raise KeyboardInterrupt
+    return arc
 
 
 def _measured(
@@ -351,12 +360,12 @@ def _measured(
         own = result.seconds if isinstance(result, Answer) else None
         return result, seconds if own is None else own
 
-    first = float("nan")
+    first, begin = float("nan"), clock()
     # If the first run fails, so does the second, which tells how long that takes without compiling.
-    with suppress(Exception):
-        first = timed()[1]
-    begin = clock()
     try:
+        with suppress(Exception):
+            first = timed()[1]
+        begin = clock()
         result, seconds = timed()
         times = [seconds]
         most = repeats if repeats == 1 else max(repeats, MOST_REPEATS)
@@ -366,6 +375,8 @@ def _measured(
             times.append(timed()[1])
     except ArgumentError:
         raise
+    except KeyboardInterrupt:
+        return _Row(name, tolerance, seconds=clock() - begin, status=StatusCode.INTERRUPTED.name)
     except Exception as error:  # another package's failure is a result of the comparison
         said = f"{type(error).__name__}: {error}".strip().splitlines()[0]
         return _Row(name, tolerance, seconds=clock() - begin, status=said)

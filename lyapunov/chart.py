@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
-from threading import Event
 from typing import Any, Literal
 
 import attrs
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode, arguments, compile_system
+from hybrid.interrupt import Told
 from hybrid.kernels import codes
 from hybrid.load import load_kernels
 from hybrid.progress import progress_bar
@@ -228,6 +228,7 @@ class _Rows:
     transient: int
     solver: RungeKutta
     points: int
+    stop: Told = attrs.field(factory=Told)
 
     def load(self) -> None:
         """Load all kernels that rows need, before threads do so at once."""
@@ -247,6 +248,7 @@ class _Rows:
             parameters={**self.parameters, **values},
             solver=self.solver,
             tangent=vectors,
+            stop=self.stop,
         )
         return trajectory, interval_length(trajectory, self.interval, self.transient + self.intervals)
 
@@ -291,6 +293,12 @@ class _Sheet:
 
     def fill(self, row: int, trajectory: Trajectory, spectrum: Any, points: int) -> None:
         """Enter a spectrum, and as many points of the section as its trajectory goes on for."""
+        states = np.empty((0, len(spectrum.x)))
+        if points and spectrum.status.ok:
+            states, _, code = strobe(trajectory, points)
+            if code == StatusCode.INTERRUPTED:
+                return
+        self.section[row, : len(states)] = states
         self.numbers[row] = np.concatenate(
             [
                 spectrum.exponents,
@@ -299,9 +307,6 @@ class _Sheet:
             ]
         )
         self.x[row], self.mode[row] = spectrum.x, spectrum.mode
-        if points and spectrum.status.ok:
-            states, _, _ = strobe(trajectory, points)
-            self.section[row, : len(states)] = states
         self.status[row] = spectrum.status
 
     def chart(self, system: HybridSystem) -> Chart:
@@ -335,7 +340,7 @@ class _Sweep:
         self.work = work
         self.sheet = sheet
         self.chained = chained
-        self.stop = Event()
+        self.stop = work.stop
         self.ended: SimpleQueue[BaseException | None] = SimpleQueue()
 
     def run(self, threads: int, done: Callable[[], object]) -> None:
@@ -388,5 +393,6 @@ class _Sweep:
         work = self.work
         trajectory, length = work.start(self.sheet.values(row), state, mode, work.vectors)
         spectrum = Estimate(trajectory, length).run(work.transient, work.intervals, False, self)
+        self.update()
         self.sheet.fill(row, trajectory, spectrum, work.points)
         self.ended.put(None)

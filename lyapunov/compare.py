@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status, arguments
+from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
+from hybrid.interrupt import CTRL_C
 from hybrid.progress import progress_bar
 from hybrid.solvers import RungeKutta
 from hybrid.status import SUCCESS
@@ -191,7 +192,9 @@ def compare_models(
         raise ArgumentError(f"systems must have the same states; got {states}.")
     progress = arguments.flag("progress", progress)
     spectra: dict[str, tuple[LyapunovSpectrum, ...]] = {}
-    with progress_bar(len(models) * len(values), "Spectra", progress) as bar:
+    for system in models.values():
+        compile_system(system)
+    with CTRL_C, progress_bar(len(models) * len(values), "Spectra", progress) as bar:
         for name, system in models.items():
             found = []
             for parameters in values:

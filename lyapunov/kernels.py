@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, int64, njit, types
+from numba import boolean, float64, int64, njit, types
 
 from hybrid.kernels.codes import (
     DIVERGENCE,
@@ -17,6 +17,7 @@ from hybrid.kernels.codes import (
     PREVIOUS_MODE,
     READY,
     STALE,
+    STEPS,
     STRAIN,
 )
 from hybrid.kernels.layout import (
@@ -67,6 +68,7 @@ def later(period, cycle, phase, interval):
         VECTOR,
         float64,
         int64,
+        boolean,
         MATRIX,
         MATRIX,
         INDICES,
@@ -86,6 +88,7 @@ def growth_rates(
     phase,
     interval,
     max_steps,
+    resumed,
     rates,
     batches,
     batch_state,
@@ -94,14 +97,16 @@ def growth_rates(
 
     The last column is the other side of the sum rule: the integral of div f plus the log-determinants of the
     saltation matrices, per unit time. ``cycle (1,)`` and ``phase (1,)`` hold the end of the last interval.
-    Each row also goes to ``batches``. Returns how many intervals were completed, and the driver's code.
+    Each row also goes to ``batches``. Returns how many intervals were completed, and the driver's code. After
+    ``MAX_STEPS`` the interval that was not completed is ``resumed`` by the next call.
     """
     n = model.dimension
     for done in range(rates.shape[0]):
-        for c in range(tangents):
-            run.growth[c] = 0.0
-        run.clock[DIVERGENCE], run.clock[LOG_DETERMINANT] = 0.0, 0.0
-        cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
+        if done > 0 or not resumed:
+            for c in range(tangents):
+                run.growth[c] = 0.0
+            run.clock[DIVERGENCE], run.clock[LOG_DETERMINANT] = 0.0, 0.0
+            cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
         code = advance(
             parts, model, method, run, record, tangents, True, cycle[0], phase[0], max_steps, UNLIMITED, work
         )
@@ -160,6 +165,8 @@ def rescale(run, other, n, factor):
         float64,
         float64,
         int64,
+        int64,
+        boolean,
         MATRIX,
     ),
     **ENTRY,
@@ -181,19 +188,25 @@ def distances(
     interval,
     separation,
     max_steps,
+    burst,
+    resumed,
     out,
 ):
     """Distances ``(M, 2)`` of two companions from an orbit at the ends of ``M`` intervals.
 
     The first companion runs freely; the second is brought back to ``separation`` after each interval
-    (Benettin, Galgani, Strelcyn 1976). Returns how many intervals were completed, and the driver's code.
+    (Benettin, Galgani, Strelcyn 1976). Returns how many intervals were completed, and the driver's code. Each
+    run takes ``burst`` steps at most; after ``MAX_STEPS`` the interval that was not completed is ``resumed``
+    by the next call.
     """
     n = model.dimension
+    most = min(max_steps, run.count[STEPS] + burst)
+    free_most = min(max_steps, free.count[STEPS] + burst)
+    renormalised_most = min(max_steps, renormalised.count[STEPS] + burst)
     for done in range(out.shape[0]):
-        cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
-        code = advance(
-            parts, model, method, run, record, 0, False, cycle[0], phase[0], max_steps, UNLIMITED, work
-        )
+        if done > 0 or not resumed:
+            cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
+        code = advance(parts, model, method, run, record, 0, False, cycle[0], phase[0], most, UNLIMITED, work)
         if code == DONE:
             code = advance(
                 parts,
@@ -205,7 +218,7 @@ def distances(
                 False,
                 cycle[0],
                 phase[0],
-                max_steps,
+                free_most,
                 UNLIMITED,
                 free_work,
             )
@@ -220,7 +233,7 @@ def distances(
                 False,
                 cycle[0],
                 phase[0],
-                max_steps,
+                renormalised_most,
                 UNLIMITED,
                 renormalised_work,
             )

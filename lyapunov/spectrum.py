@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
+from hybrid.interrupt import Bursts
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
@@ -159,7 +160,8 @@ def lyapunov_spectrum(
     history, progress = arguments.flag("history", history), arguments.flag("progress", progress)
     trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
     length = interval_length(trajectory, interval, transient + intervals)
-    with progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
+    load_kernels("lyapunov.kernels")
+    with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
         return Estimate(trajectory, length).run(transient, intervals, history, bar)
 
 
@@ -254,29 +256,36 @@ class Estimate:
         kernel = entry(load_kernels("lyapunov.kernels").growth_rates)
         advance = address(load_kernels().advance)
         kept = [np.empty((0, trajectory.tangents))]
-        code = codes.DONE
+        bursts, code = Bursts([trajectory]), codes.DONE
         while mean.count < intervals and code == codes.DONE:
+            # Means are taken of whole blocks, so that their rounding does not depend on where bursts end.
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), trajectory.tangents + 1))
-            done, code = kernel(
-                advance,
-                trajectory.parts,
-                trajectory.model,
-                trajectory.method,
-                trajectory.run,
-                self.record,
-                trajectory.work,
-                trajectory.tangents,
-                self.cycle,
-                self.phase,
-                self.interval,
-                trajectory.max_steps,
-                rates,
-                *batches,
-            )
-            mean.add(rates[:done])
-            bar.update(done)
+            filled, resumed = 0, False
+            while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
+                done, code = kernel(
+                    advance,
+                    trajectory.parts,
+                    trajectory.model,
+                    trajectory.method,
+                    trajectory.run,
+                    self.record,
+                    trajectory.work,
+                    trajectory.tangents,
+                    self.cycle,
+                    self.phase,
+                    self.interval,
+                    bursts.most(),
+                    resumed,
+                    rates[filled:],
+                    *batches,
+                )
+                filled += done
+                bar.update(done)
+                code = bursts.judged(code)
+                resumed = code == codes.GO_ON
+            mean.add(rates[:filled])
             if history:
-                kept.append(rates[:done, :-1])
+                kept.append(rates[:filled, :-1])
         return np.concatenate(kept), code
 
     def _replace_annihilated(self) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments
+from hybrid.interrupt import Bursts
 from hybrid.kernels import codes
 from hybrid.load import address, entry, load_kernels
 from hybrid.progress import Progress, progress_bar
@@ -182,7 +183,8 @@ def two_orbit_exponents(
     reference = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
     offset = separation * _unit_vector(direction, system)
     length = interval_length(reference, interval, transient + intervals)
-    with progress_bar(transient + intervals, "Two orbits", progress) as bar:
+    load_kernels("lyapunov.kernels")
+    with reference.stop, progress_bar(transient + intervals, "Two orbits", progress) as bar:
         code = _skip(reference, transient, length)
         bar.update(transient)
         if code != codes.DONE:
@@ -258,7 +260,9 @@ def _follow(
     cycle = reference.run.count[codes.CYCLE : codes.CYCLE + 1].copy()
     phase = reference.run.clock[codes.PHASE : codes.PHASE + 1].copy()
     kept, total, code = [np.empty((0, 2))], 0, codes.DONE
-    while total < intervals and code == codes.DONE:
+    bursts = Bursts(runs)
+    while total < intervals and code in (codes.DONE, codes.GO_ON):
+        bursts.most()
         out = np.empty((min(INTERVALS_AT_ONCE, intervals - total), 2))
         done, code = kernel(
             advance,
@@ -273,8 +277,11 @@ def _follow(
             interval,
             separation,
             reference.max_steps,
+            bursts.steps,
+            code == codes.GO_ON,
             out,
         )
+        code = bursts.judged(code)
         kept.append(out[:done])
         total += done
         bar.update(done)

@@ -20,6 +20,7 @@ from hybrid.roles import Role
 from hybrid.saltation import saltation_matrix
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta
+from hybrid.status import StatusCode
 from hybrid.system import HybridSystem, Transition
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
@@ -208,7 +209,7 @@ class Case:
     ) -> HybridArc:
         """The run of this case, or of a changed system, from its start or from another one, to ``t1``."""
         t0, x0, mode = start or (self.t0, self.x0, self.mode)
-        return self.engine.simulate(
+        arc = self.engine.simulate(
             system or self.system,
             x0,
             (t0, t1),
@@ -216,6 +217,9 @@ class Case:
             parameters={**self.parameters, **(extra or {})},
             **{"solver": self.solver, **options},
         )
+        if arc.status.code == StatusCode.INTERRUPTED:
+            raise KeyboardInterrupt
+        return arc
 
     @cached_property
     def run(self) -> Run:
