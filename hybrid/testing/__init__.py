@@ -28,6 +28,7 @@ from hybrid.testing.saltation import (
 )
 from hybrid.testing.small import small_systems
 from hybrid.testing.strategies import cases, parameters, states
+from hybrid.testing.units import check_units
 
 __all__ = [
     "Case",
@@ -56,6 +57,7 @@ __all__ = [
     "check_split",
     "check_sum_rule",
     "check_system",
+    "check_units",
     "discard",
     "parameters",
     "small_systems",

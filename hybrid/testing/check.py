@@ -52,6 +52,7 @@ from hybrid.testing.saltation import (
     check_sum_rule,
 )
 from hybrid.testing.strategies import Ranges, cases
+from hybrid.testing.units import UNITS, check_units
 
 # A property that was judged on fewer of its examples than this was hardly checked.
 HARDLY = 0.1
@@ -226,6 +227,7 @@ def check_system(
         NAMES: check_names,
         ORDER: check_order,
         SCALE: check_scale,
+        UNITS: check_units,
         CUT: check_cut,
     }
     if elastic is not None:

@@ -76,7 +76,7 @@ def check_cut(case: Case) -> None:
             )
     fired = [variant.original[name] for name in _fired(arc) if name not in variant.cuts]
     hint = "events that act on what they should not."
-    _compare(case, CUT, arc, fired, variant.original[str(arc.mode[-1])], hint)
+    compare(case, CUT, arc, fired, variant.original[str(arc.mode[-1])], hint)
 
 
 def check_names(case: Case) -> None:
@@ -93,7 +93,7 @@ def check_names(case: Case) -> None:
     start = (case.t0, case.x0, new_name(case.system.mode_names, case.mode))
     arc = case.simulate(run.t1, system=system, start=start)
     fired = [name.split(" ", 1)[1] for name in _fired(arc)]
-    _compare(case, NAMES, arc, fired, str(arc.mode[-1]).split(" ", 1)[1], "something looks modes up by name.")
+    compare(case, NAMES, arc, fired, str(arc.mode[-1]).split(" ", 1)[1], "something looks modes up by name.")
 
 
 def check_order(case: Case) -> None:
@@ -109,7 +109,7 @@ def check_order(case: Case) -> None:
         discard("there are no two transitions")
     arc = case.simulate(case.run.t1, system=reordered(case.system))
     hint = "the first guard listed wins, not the first one reached; or two guards overlap."
-    _compare(case, ORDER, arc, _fired(arc), str(arc.mode[-1]), hint)
+    compare(case, ORDER, arc, _fired(arc), str(arc.mode[-1]), hint)
 
 
 def check_scale(case: Case) -> None:
@@ -127,7 +127,7 @@ def check_scale(case: Case) -> None:
     factor = 10.0 ** (6.0 * case.fraction - 3.0)
     arc = case.simulate(case.run.t1, system=variant.system, extra=variant.scaled(factor))
     hint = f"events found by an absolute tolerance on the guard; here all guards are times {factor:.3g}."
-    _compare(case, SCALE, arc, _fired(arc), str(arc.mode[-1]), hint)
+    compare(case, SCALE, arc, _fired(arc), str(arc.mode[-1]), hint)
 
 
 def check_split(case: Case) -> None:
@@ -150,7 +150,7 @@ def check_split(case: Case) -> None:
         second = case.simulate(run.t1, start=(t, first.x[-1], str(first.mode[-1])))
         fired = [*_fired(first), *_fired(second)]
         hint = f"events that fire twice or are lost near a start; the run was split at t = {t:.17g}."
-        _compare(case, SPLIT, second, fired, str(second.mode[-1]), hint)
+        compare(case, SPLIT, second, fired, str(second.mode[-1]), hint)
 
 
 def check_samples(case: Case) -> None:
@@ -167,7 +167,7 @@ def check_samples(case: Case) -> None:
     times = np.unique([case.t0 + case.fraction * (run.t1 - case.t0), *jumps, run.t1])
     arc = case.simulate(run.t1, samples=times)
     hint = "samples that steer the steps, or are taken on the wrong side of an event."
-    _compare(case, SAMPLES, arc, _fired(arc), str(arc.mode[-1]), hint)
+    compare(case, SAMPLES, arc, _fired(arc), str(arc.mode[-1]), hint)
     for t, x in zip(arc.t, arc.x, strict=True):
         wanted = jumps.get(float(t), run.arc(t))
         if not np.all(np.abs(x - wanted) <= run.tolerance):
@@ -242,7 +242,7 @@ def _fired(arc: HybridArc) -> list[str]:
     return [jump.transition for jump in arc.jumps]
 
 
-def _compare(case: Case, property_name: str, arc: HybridArc, fired: list[str], mode: str, hint: str) -> None:
+def compare(case: Case, property_name: str, arc: HybridArc, fired: list[str], mode: str, hint: str) -> None:
     """Fail unless a run has the events, the mode and the state at the end that the run of the case has."""
     run: Run = case.run
     wanted = _fired(run.arc)

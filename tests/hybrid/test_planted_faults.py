@@ -35,6 +35,7 @@ from hybrid.testing import (
     check_split,
     check_sum_rule,
     check_system,
+    check_units,
 )
 from hybrid.testing.invariance import ELASTIC
 from tests.cases import systems
@@ -213,6 +214,14 @@ class Displaced(Engine):
         return hybrid.simulate(system, np.array(x0) + NUDGE, t_span, **options)
 
 
+class ToleranceWithAUnit(Engine):
+    """The absolute tolerance is the same number in all units."""
+
+    def simulate(self, system, x0, t_span, **options):
+        solver = attrs.evolve(options.pop("solver"), rtol=1e-14, atol=1e-12)
+        return hybrid.simulate(system, x0, t_span, solver=solver, **options)
+
+
 class SampledBefore(Engine):
     """A sample at an event is the state before it."""
 
@@ -314,6 +323,8 @@ def test_wrong_saltation_matrices(check, system, fault, text):
         (check_crossings, BALL, Distorted(lambda s: with_transitions(s, deaf)), "and nothing fires"),
         (check_crossings, BALL, EventsTwice(), "and again at"),
         (check_split, BALL, Displaced(), "was split at"),
+        (check_units, BALL, Displaced(), "a threshold that has a unit"),
+        (check_units, TABLE, ToleranceWithAUnit(), "a threshold that has a unit"),
         (check_samples, BALL, SampledBefore(), "wrong side of an event"),
         (check_sum_rule, BALL, TangentsLost(), "miss a jump"),
         (check_saltation, BALL, TangentsLost(), "simulate(tangent=True)"),

@@ -1,0 +1,142 @@
+"""The same system with its state and its time measured in other units: a run must be the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import attrs
+
+from hybrid.compile import compile_system
+from hybrid.names import PARAMETERS, STATE, named_values
+from hybrid.system import Guard, HybridSystem, Reset
+from hybrid.testing.case import Case, discard
+from hybrid.testing.invariance import compare
+
+UNITS = "The units of the state and of the time do not matter"
+
+# Units are powers of two up to this exponent: they change no rounding.
+LARGEST_EXPONENT = 40
+
+
+@attrs.frozen(eq=False)
+class Measured:
+    """A system whose units are parameters.
+
+    Attributes
+    ----------
+    system
+        The system; with its own parameters as declared it is the original one.
+    state, time
+        Names of the parameters that hold the units of the state and of the time.
+    """
+
+    system: HybridSystem
+    state: str
+    time: str
+
+
+_MEASURED: WeakKeyDictionary[HybridSystem, Measured] = WeakKeyDictionary()
+
+
+def measured(system: HybridSystem) -> Measured:
+    """The system with the freedom to choose its units, made once."""
+    if system not in _MEASURED:
+        _MEASURED[system] = _measured(system)
+    return _MEASURED[system]
+
+
+def check_units(case: Case) -> None:
+    """Other units of the state and of the time, with the absolute tolerance in these, lead to the same run.
+
+    Raises
+    ------
+    PropertyError
+        If the run changes.
+    """
+    if compile_system(case.system).emitted.opaque:
+        discard("a model function cannot be traced, and so cannot be changed")
+    run, variant = case.run, measured(case.system)
+    exponent = round(LARGEST_EXPONENT * (2.0 * case.fraction - 1.0))
+    state, time = 2.0**exponent, 2.0 ** (-exponent // 2)
+    solver = attrs.evolve(case.solver, atol=state * case.solver.atol, max_step=time * case.solver.max_step)
+    start = time * case.t0, [state * value for value in case.x0], case.mode
+    arc = case.simulate(
+        time * run.t1,
+        system=variant.system,
+        start=start,
+        extra={variant.state: state, variant.time: time},
+        solver=solver,
+    )
+    compare(
+        case,
+        UNITS,
+        attrs.evolve(arc, x=arc.x / state),
+        [jump.transition for jump in arc.jumps],
+        str(arc.mode[-1]),
+        f"a threshold that has a unit; here lengths are times {state:.3g} and times are times {time:.3g}.",
+    )
+
+
+def _measured(system: HybridSystem) -> Measured:
+    names = tuple(system.parameters)
+    state, time = _free_name(system, "unit_of_state"), _free_name(system, "unit_of_time")
+    n = system.dimension
+
+    def original(function: Callable[..., Any]) -> Callable[..., Any]:
+        """A model function of the state and the time in other units."""
+
+        def called(t: Any, x: Any, p: Any) -> Any:
+            unit = getattr(p, state)
+            if isinstance(system.state, int):
+                place = x / unit
+            else:
+                place = named_values(STATE, system.state, [x[i] / unit for i in range(n)])
+            return function(t / getattr(p, time), place, named_values(PARAMETERS, names, p[: len(names)]))
+
+        return called
+
+    def faster(field: Callable[..., Any]) -> Callable[..., Any]:
+        rates = original(field)
+        return lambda t, x, p: [rate * (getattr(p, state) / getattr(p, time)) for rate in rates(t, x, p)]
+
+    def longer(reset: Callable[..., Any]) -> Callable[..., Any]:
+        values = original(reset)
+        return lambda t, x, p: [value * getattr(p, state) for value in values(t, x, p)]
+
+    def period(p: Any) -> Any:
+        declared = system.period
+        if callable(declared):
+            declared = declared(named_values(PARAMETERS, names, p[: len(names)]))
+        return getattr(p, time) * declared
+
+    transitions = [
+        attrs.evolve(
+            transition,
+            guard=Guard(
+                original(transition.guard.function),
+                transition.guard.direction,
+                when=None if transition.guard.when is None else original(transition.guard.when),
+                at_entry=transition.guard.at_entry,
+            ),
+            reset=None if transition.reset is None else Reset(longer(transition.reset.function)),
+        )
+        for transition in system.transitions
+    ]
+    modes = [attrs.evolve(mode, field=faster(mode.field), jacobian=None) for mode in system.modes]
+    parameters = {**system.parameters, state: 1.0, time: 1.0}
+    changed = attrs.evolve(
+        system,
+        parameters=parameters,
+        modes=modes,
+        transitions=transitions,
+        period=None if system.period is None else period,
+    )
+    return Measured(changed, state, time)
+
+
+def _free_name(system: HybridSystem, name: str) -> str:
+    while name in system.parameters:
+        name += "_"
+    return name
