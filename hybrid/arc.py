@@ -236,8 +236,8 @@ class HybridArc:
         if they were asked for.
     propagators
         How each mode was advanced, by its name: ``"exact"``, ``"Taylor series"``, ``"Taylor series,
-        desingularised"`` or ``"Runge-Kutta pair"``. Where every mode is exact no crossing was missed that
-        rounding does not hide.
+        desingularised"``, ``"Taylor series, with the root of a guard"`` or ``"Runge-Kutta pair"``. Where
+        every mode is exact no crossing was missed that rounding does not hide.
     steps, rejected
         Steps tried, and how many of them the error control rejected.
     """

@@ -27,7 +27,8 @@ class Taylor(RungeKutta):
       the series allows: **exact**. Where the solutions are polynomials a step is a whole flight.
     - A mode whose field has half-integer powers of a guard, such as a Hertz contact, is advanced on a clock
       of its own, ``dt = w ds`` with ``w`` the square root of the guard. Everything is smooth there, entry
-      and exit included: **desingularised**.
+      and exit included: **desingularised**. Where the rate of the guard has ``w`` as a factor too,
+      such as the level of a tank that empties, ``h' = -sqrt(h)``, the root is smooth in time and is followed.
     - Any other mode with an analytic field is advanced by its **Taylor series**, of an order and with steps
       that follow from the tolerances (Jorba and Zou 2005, section 3).
     - What is left, fields that cannot be traced or have kinks inside the mode, by the **Runge-Kutta pair**

@@ -86,7 +86,7 @@ def test_multipliers_with_two_stops(motion):
     orbit = hybrid.periodic_orbit(
         SYSTEM, (motion["amplitude"], 0.0), parameters=parameters_of(motion), t0=middle
     )
-    np.testing.assert_allclose(sorted(np.abs(orbit.multipliers))[::-1], motion["multipliers"], atol=1e-8)
+    np.testing.assert_allclose(np.sort_complex(orbit.multipliers)[::-1], motion["multipliers"], atol=1e-8)
 
 
 @two_stops
