@@ -52,7 +52,7 @@ def test_a_tank_empties_when_it_should(field, guard, direction, time):
 
 
 def test_two_tanks_and_their_derivatives():
-    """``k' = w - k`` with ``w = 1 - t/2`` until 2; a higher start fills the second tank by ``1/(2 w)`` more."""
+    """``k' = w - k`` with ``w = 1 - t/2`` until 2; a higher start fills the second tank by ``1/(2 w)``."""
     system = HybridSystem(
         state=("h", "k"),
         parameters={"c": 1.0},
