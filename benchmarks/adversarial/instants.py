@@ -1,0 +1,325 @@
+"""Random systems in which many things happen at one instant, and what the library makes of them.
+
+A structure fixes fields, guards, directions, targets and the form of resets; thresholds, reset values and starts are
+drawn. All numbers are small multiples of a half, so that every state and time is exact.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from fractions import Fraction
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.adversarial.rules import Affine, Edge, Open, Rules, Run, simulate_exactly
+from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
+
+STATES = ("y", "z", "w", "v", "n", "m")
+END = 6.3
+# Share of the draws without two events at one instant that is kept.
+APART_SHARE = 0.1
+# Jumps at one instant that are taken for without end; the library allows more.
+MOST_AT_ONCE = 300
+# What is within this of the exact numbers is right.
+CLOSE = 1e-9
+# Draws per case: most are thinned out.
+MOST_DRAWS = 20
+SOLVERS: dict[str, Any] = {"Taylor": Taylor(), "DOP853": DOP853()}
+# Sums that guards are made of.
+FORMS = (
+    "x.y",
+    "x.z",
+    "x.w",
+    "x.n",
+    "x.m",
+    "x.y - x.z",
+    "x.y + x.z",
+    "x.y - x.w",
+    "t",
+    "x.y - t",
+    "x.w - x.z",
+)
+SPEEDS = (1.0, 1.0, 1.0, 1.0, -1.0, 2.0, -2.0, 0.5, 0.0)
+VALUES = np.arange(-4, 5) / 2
+LEVELS = np.arange(-2, 5) / 2
+# Thresholds of conditions, which no state of the lattice meets.
+BETWEEN = np.arange(-3, 4) + 0.328125
+
+
+class Form(NamedTuple):
+    """A transition as text: what the library and the exact rules both read."""
+
+    source: int
+    target: int | None
+    guard: str
+    direction: int
+    reset: tuple[str, ...] | None
+    when: str | None
+
+
+class Instant(NamedTuple):
+    """A structure, as text and as the library's system, with how its parameters are drawn."""
+
+    fields: tuple[tuple[str, ...], ...]
+    edges: tuple[Form, ...]
+    parameters: dict[str, np.ndarray]
+    system: HybridSystem
+
+
+def instant(seed: int, index: int) -> Instant:
+    rng = np.random.default_rng([seed, index, 1])
+    modes = int(rng.choice((1, 1, 2, 2, 3)))
+    parameters: dict[str, np.ndarray] = {}
+
+    def named(prefix: str, values: np.ndarray) -> str:
+        name = f"{prefix}{len(parameters)}"
+        parameters[name] = values
+        return f"p.{name}"
+
+    fields = tuple(
+        (f"{rng.choice(SPEEDS)}", f"{rng.choice(SPEEDS)}", "x.v", "0.0", "0.0", "0.0") for _ in range(modes)
+    )
+    surfaces = [
+        f"{form} - {named('c', LEVELS)}" for form in rng.choice(FORMS, int(rng.integers(2, 5)), replace=False)
+    ]
+    # A surface is watched both ways by one transition, or one way by each.
+    both = {surface for surface in surfaces if rng.random() < 0.15}
+    edges = []
+    for source in range(modes):
+        for _ in range(int(rng.integers(1, 5))):
+            edges.append(_edge(rng, named, surfaces, both, source, modes))
+    for mode in range(1, modes):
+        # Every mode can be reached.
+        if not any(edge.source == mode - 1 and edge.target == mode for edge in edges):
+            edge = _edge(rng, named, surfaces, both, mode - 1, modes)
+            edges.append(edge._replace(target=mode))
+    edges = [edge if edge.target is not None else edge._replace(reset=None) for edge in edges]
+    order = rng.permutation(len(edges))
+    edges = [edges[i] for i in order]
+    return Instant(fields, tuple(edges), parameters, _system(fields, edges, parameters))
+
+
+def _edge(
+    rng: np.random.Generator,
+    named: Callable[[str, np.ndarray], str],
+    surfaces: list[str],
+    both: set[str],
+    source: int,
+    modes: int,
+) -> Form:
+    surface = str(rng.choice(surfaces))
+    # Most forms grow with time.
+    direction = 0 if surface in both else int(rng.choice((-1, 1, 1)))
+    if direction and rng.random() < 0.1:
+        surface, direction = f"{rng.choice((-1.0, 2.0, -0.5))}*({surface})", direction
+    draw = rng.random()
+    target: int | None = source
+    if draw < 0.04:
+        target = None
+    elif draw < 0.45 and modes > 1:
+        target = int(rng.choice([mode for mode in range(modes) if mode != source]))
+    reset = None if rng.random() < 0.2 else tuple(_part(rng, named, name) for name in STATES)
+    when = None
+    if rng.random() < 0.25:
+        name, way = rng.choice(("y", "z", "n", "m", "v")), rng.choice(("", "-"))
+        when = f"{way}(x.{name} - {named('h', BETWEEN)})"
+    return Form(source, target, surface, direction, reset, when)
+
+
+def _part(rng: np.random.Generator, named: Callable[[str, np.ndarray], str], name: str) -> str:
+    """One state of a reset."""
+    draw = rng.random()
+    if draw < 0.6:
+        return f"x.{name}"
+    if name == "v":
+        return str(rng.choice(("-x.v", "0.0*x.v", "1.0 + 0.0*x.v", "-1.0 + 0.0*x.v")))
+    if draw < 0.75:
+        return f"{named('r', VALUES)}"
+    if draw < 0.9:
+        return f"x.{name} + {named('s', VALUES)}"
+    other = {"y": "z", "z": "y", "n": "m", "m": "n", "w": "y"}[name]
+    return f"x.{other}" if draw < 0.97 else f"-x.{name}"
+
+
+def _function(text: str) -> Callable[..., Any]:
+    return eval(compile(f"lambda t, x, p: {text}", "<instant>", "eval"), {"np": np})
+
+
+def _system(
+    fields: tuple[tuple[str, ...], ...], edges: list[Form], parameters: dict[str, np.ndarray]
+) -> HybridSystem:
+    def tuple_of(texts: tuple[str, ...]) -> Callable[..., Any]:
+        return _function("(" + ", ".join(texts) + ")")
+
+    return HybridSystem(
+        name="instant",
+        state=STATES,
+        parameters=dict.fromkeys(parameters, 0.0),
+        modes=[Mode(f"m{i}", tuple_of(texts)) for i, texts in enumerate(fields)],
+        transitions=[
+            Transition(
+                f"m{edge.source}",
+                None if edge.target is None else f"m{edge.target}",
+                Guard(
+                    _function(edge.guard),
+                    edge.direction,
+                    when=None if edge.when is None else _function(f"{edge.when} > 0"),
+                ),
+                None if edge.reset is None else Reset(tuple_of(edge.reset)),
+                name=str(i),
+            )
+            for i, edge in enumerate(edges)
+        ],
+    )
+
+
+def affine(text: str, values: dict[str, Fraction]) -> Affine:
+    """The exact function that a text is, found from its values at zero and at the unit vectors."""
+    code, p = _function(text), SimpleNamespace(**values)
+
+    def at(t: int, place: int | None) -> Fraction:
+        x = {name: Fraction(int(i == place)) for i, name in enumerate(STATES)}
+        value = code(Fraction(t), SimpleNamespace(**x), p)
+        return value if isinstance(value, Fraction) else Fraction(value)
+
+    constant = at(0, None)
+    coefficients = tuple(at(0, i) - constant for i in range(len(STATES)))
+    return Affine(coefficients, at(1, None) - constant, constant)
+
+
+def exact_rules(made: Instant, values: dict[str, Fraction]) -> Rules:
+    return Rules(
+        tuple(tuple(affine(text, values) for text in texts) for texts in made.fields),
+        tuple(
+            Edge(
+                edge.source,
+                edge.target,
+                affine(edge.guard, values),
+                edge.direction,
+                None if edge.reset is None else tuple(affine(text, values) for text in edge.reset),
+                None if edge.when is None else affine(edge.when, values),
+            )
+            for edge in made.edges
+        ),
+    )
+
+
+class Case(NamedTuple):
+    """One draw: parameters, start and mode, and what is true."""
+
+    parameters: dict[str, float]
+    x0: list[float]
+    mode: int
+    truth: Run
+
+
+def case(made: Instant, seed: int, index: int, number: int) -> Case | None:
+    """A draw on which the rules leave nothing open, or None; those without two events at once are thinned out."""
+    rng = np.random.default_rng([seed, index, 2, number])
+    parameters = {name: float(rng.choice(values)) for name, values in made.parameters.items()}
+    x0 = [float(value) for value in rng.choice(VALUES, len(STATES))]
+    x0[STATES.index("v")] = float(rng.choice((-1.0, 0.0, 1.0)))
+    mode = int(rng.integers(len(made.fields)))
+    rules = exact_rules(made, {name: Fraction(value) for name, value in parameters.items()})
+    limit = MOST_AT_ONCE
+    try:
+        truth = simulate_exactly(rules, tuple(map(Fraction, x0)), mode, Fraction(END), limit)
+    except Open:
+        return None
+    times = [t for t, _ in truth.fired]
+    together = any(a == b for a, b in zip(times, times[1:], strict=False))
+    if not together and rng.random() > APART_SHARE:
+        return None
+    return Case(parameters, x0, mode, truth)
+
+
+ENDINGS = {"SUCCESS": "end", "STUCK": "stuck", "TERMINAL": "terminal"}
+
+
+def difference(made: Instant, drawn: Case, solver: Any) -> tuple[str, str]:
+    """How the library's run differs from the truth, or two empty texts."""
+    arc = simulate(
+        made.system, drawn.x0, (0.0, END), mode=f"m{drawn.mode}", parameters=drawn.parameters, solver=solver
+    )
+    truth = drawn.truth
+    ending = ENDINGS.get(arc.status.code.name, arc.status.code.name)
+    fired = arc.jumps.transition.tolist()
+    expected = [i for _, i in truth.fired]
+    times = [float(t) for t, _ in truth.fired]
+    if truth.ending == ending == "stuck":
+        # The last of many rounds may be cut anywhere.
+        shortest = min(len(fired), len(expected))
+        if shortest >= 100 and fired[:shortest] == expected[:shortest]:
+            return "", ""
+    said = (
+        f"{ending} {list(zip(arc.jumps.t.round(9).tolist(), fired, strict=True))[:12]}, truth {truth.ending} "
+        f"{list(zip(times, expected, strict=True))[:12]}"
+    )
+    if ending != truth.ending:
+        return f"ended {ending}, not {truth.ending}", said
+    if fired != expected:
+        for one, other in zip(fired, expected, strict=False):
+            if one != other:
+                return "another transition", said
+        return ("missed" if len(fired) < len(expected) else "invented"), said
+    if np.abs(arc.jumps.t - times).max(initial=0.0) > CLOSE:
+        return "another time", said
+    if np.abs(arc.x[-1] - np.array(truth.x, dtype=float)).max() > CLOSE:
+        return "another state", f"{arc.x[-1]} for {[float(a) for a in truth.x]}; {said}"
+    if arc.mode[-1] != f"m{truth.mode}":
+        return "another mode", said
+    return "", ""
+
+
+def text_of(made: Instant, drawn: Case) -> str:
+    lines = [f"x0 = {drawn.x0}, mode m{drawn.mode}"]
+    for i, texts in enumerate(made.fields):
+        lines.append(f"m{i}: " + ", ".join(texts))
+    for i, edge in enumerate(made.edges):
+        lines.append(
+            f"{i}: m{edge.source} -> {edge.target}, {edge.guard}, {edge.direction:+d}, "
+            f"reset {edge.reset}, when {edge.when}"
+        )
+    text = "\n  ".join(lines)
+    for name, value in drawn.parameters.items():
+        text = text.replace(f"p.{name},", f"({value}),").replace(f"p.{name})", f"({value}))")
+        text = text.replace(f"p.{name}'", f"({value})'")
+    return text
+
+
+class Tested(NamedTuple):
+    """What came of one structure: draws tried, cases compared, differences by method, firings at one instant."""
+
+    index: int
+    cases: int
+    open: int
+    together: int
+    differences: dict[str, list[tuple[int, str, str]]]
+    seconds: float
+
+
+def tested(
+    seed: int, index: int, cases: int, begin: Callable[[str, int], None] = lambda method, run: None
+) -> Tested:
+    began = time.perf_counter()
+    made = instant(seed, index)
+    differences: dict[str, list[tuple[int, str, str]]] = {method: [] for method in SOLVERS}
+    done = given_up = together = number = 0
+    while done < cases and number < MOST_DRAWS * cases:
+        drawn = case(made, seed, index, number)
+        number += 1
+        if drawn is None:
+            given_up += 1
+            continue
+        done += 1
+        times = [t for t, _ in drawn.truth.fired]
+        together += any(a == b for a, b in zip(times, times[1:], strict=False))
+        for method, solver in SOLVERS.items():
+            begin(method, number - 1)
+            kind, said = difference(made, drawn, solver)
+            if kind:
+                differences[method].append((number - 1, kind, said))
+    return Tested(index, done, given_up, together, differences, time.perf_counter() - began)
