@@ -1,7 +1,7 @@
 """What fires at one instant, in exact arithmetic: slow, plain, and written apart from the library.
 
-Fields are constant between events, guards and resets are affine, all numbers are fractions. The rules are those of
-``docs/instant.md``. A case that the rules leave open, or whose times are not dyadic, is given up as `Open`.
+Fields are constant between events, guards and resets are affine, all numbers are fractions. The rules are
+those of ``docs/instant.md``. A case that the rules leave open, or whose times are not dyadic, is `Open`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Affine(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """A transition; modes are numbers, ``target`` is None at the end of the run, ``reset`` is None for none."""
+    """A transition; modes are numbers, ``target`` is None if the run ends, ``reset`` is None for none."""
 
     source: int
     target: int | None
@@ -77,8 +77,8 @@ class Run(NamedTuple):
 class Watch:
     """What is remembered of one guard: on which side the state is taken to be, and whether it is due.
 
-    ``way`` is the sign that turns the guard's near side into the negative one. With direction 0 the near side is the
-    side on which the state was.
+    ``way`` is the sign that turns the guard's near side into the negative one. With direction 0 the near side
+    is the side on which the state was.
     """
 
     def __init__(self, edge: Edge, way: int) -> None:
