@@ -7,9 +7,9 @@ starts are drawn. All numbers are small multiples of a half, so that every state
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -291,38 +291,50 @@ def text_of(made: Instant, drawn: Case) -> str:
     return text
 
 
-class Tested(NamedTuple):
-    """What came of one structure: cases compared, draws given up, cases with several at one instant."""
+class Compared(NamedTuple):
+    """What came of one method on one structure: cases, and those that differ with the kind and both sides."""
 
     index: int
+    method: str
     cases: int
-    open: int
-    together: int
-    differences: dict[str, list[tuple[int, str, str]]]
+    # Draws that the rules leave open, or without two events at one instant.
+    left: int
+    firings: int
+    differences: list[tuple[int, str, str]]
     seconds: float
 
 
-def ignored(method: str, run: int) -> None:
-    """Nobody watches."""
-
-
-def compared(seed: int, index: int, cases: int, begin: Callable[[str, int], None] = ignored) -> Tested:
-    began = time.perf_counter()
-    made = instant(seed, index)
-    differences: dict[str, list[tuple[int, str, str]]] = {method: [] for method in SOLVERS}
-    done = given_up = together = number = 0
+def drawn_cases(made: Instant, seed: int, index: int, cases: int) -> Iterator[tuple[int, Case | None]]:
+    """Numbered draws until there are enough cases."""
+    done = number = 0
     while done < cases and number < MOST_DRAWS * cases:
         drawn = case(made, seed, index, number)
+        yield number, drawn
+        done += drawn is not None
         number += 1
-        if drawn is None:
-            given_up += 1
-            continue
-        done += 1
-        times = [t for t, _ in drawn.truth.fired]
-        together += len(set(times)) < len(times)
-        for method, solver in SOLVERS.items():
-            begin(method, number - 1)
-            kind, said = difference(made, drawn, solver)
+
+
+def compared(
+    seed: int,
+    index: int,
+    cases: int,
+    methods: Iterable[str],
+    begin: Callable[[str, int], None] = lambda method, run: None,
+    left_out: Mapping[str, set[int]] = MappingProxyType({}),
+) -> Iterator[Compared]:
+    """One part per method; ``begin`` is told of each run, and some may be left out."""
+    made = instant(seed, index)
+    draws = list(drawn_cases(made, seed, index, cases))
+    good = {number: drawn for number, drawn in draws if drawn is not None}
+    firings = sum(len(drawn.truth.fired) for drawn in good.values() if drawn.truth.ending != "stuck")
+    for method in methods:
+        began, differences = time.perf_counter(), []
+        for number, drawn in good.items():
+            if number in left_out.get(method, ()):
+                continue
+            begin(method, number)
+            kind, said = difference(made, drawn, SOLVERS[method])
             if kind:
-                differences[method].append((number - 1, kind, said))
-    return Tested(index, done, given_up, together, differences, time.perf_counter() - began)
+                differences.append((number, kind, said))
+        seconds = time.perf_counter() - began
+        yield Compared(index, method, len(good), len(draws) - len(good), firings, differences, seconds)

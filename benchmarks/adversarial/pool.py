@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import multiprocessing
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
-
-from benchmarks.adversarial.trial import METHODS, Part, trial
 
 # Seconds after which a run is taken never to end; runs take milliseconds.
 LIMIT = 20.0
 # After so many such runs the rest of a structure's is left out.
 MOST_HUNG = 3
 POLL = 0.05
+# Children have the kernels that their parent has loaded.
 CONTEXT = multiprocessing.get_context("fork")
+Begin = Callable[[str, int], None]
+# From a structure and methods to one part per method.
+Work = Callable[[int, Iterable[str], Begin, Mapping[str, set[int]]], Iterator[Any]]
 
 
 class Hung(NamedTuple):
@@ -28,8 +30,8 @@ class Hung(NamedTuple):
 class _Job:
     """One structure in a process of its own."""
 
-    def __init__(self, seed: int, index: int, samples: int, methods: tuple[str, ...]) -> None:
-        self.seed, self.index, self.samples = seed, index, samples
+    def __init__(self, work: Work, index: int, methods: tuple[str, ...]) -> None:
+        self.work, self.index, self.names = work, index, methods
         self.methods = list(methods)
         self.left_out: dict[str, set[int]] = {}
         self.launch()
@@ -38,12 +40,20 @@ class _Job:
         self.reader, writer = CONTEXT.Pipe(duplex=False)
         # Place of the method, run, and when the run began; zero where none is under way.
         self.beat = CONTEXT.Array("d", 3, lock=False)
-        arguments = (self.seed, self.index, self.samples, self.methods, self.left_out, self.beat, writer)
-        self.process = CONTEXT.Process(target=_work, args=arguments, daemon=True)
+        self.process = CONTEXT.Process(target=self._inside, args=(writer,), daemon=True)
         self.process.start()
         writer.close()
 
-    def news(self) -> Iterator[Part | Hung]:
+    def _inside(self, writer: Any) -> None:
+        def begin(method: str, run: int) -> None:
+            self.beat[:] = self.names.index(method), run, time.monotonic()
+
+        for part in self.work(self.index, tuple(self.methods), begin, self.left_out):
+            self.beat[2] = 0.0
+            writer.send(part)
+        writer.close()
+
+    def news(self) -> Iterator[Any]:
         while self.reader.poll():
             try:
                 part = self.reader.recv()
@@ -55,7 +65,7 @@ class _Job:
         if self.process.is_alive() and began and time.monotonic() - began > LIMIT:
             self.process.kill()
             self.process.join()
-            name = METHODS[int(method)]
+            name = self.names[int(method)]
             hung = self.left_out.setdefault(name, set())
             hung.add(int(run))
             yield Hung(self.index, name, int(run))
@@ -66,7 +76,7 @@ class _Job:
 
     @property
     def done(self) -> bool:
-        if self.process.is_alive() or self.reader.poll():
+        if self.process.is_alive():
             return False
         if self.process.exitcode:
             raise RuntimeError(
@@ -76,41 +86,22 @@ class _Job:
         return True
 
 
-def _work(
-    seed: int,
-    index: int,
-    samples: int,
-    methods: list[str],
-    left_out: dict[str, set[int]],
-    beat: Any,
-    writer: Any,
-) -> None:
-    def begin(method: str, run: int) -> None:
-        beat[:] = METHODS.index(method), run, time.monotonic()
-
-    for part in trial(seed, index, samples, tuple(methods), begin, left_out):
-        beat[2] = 0.0
-        writer.send(part)
-    writer.close()
-
-
 def parts(
-    seed: int,
-    indices: list[int],
-    samples: int,
-    processes: int,
-    methods: tuple[str, ...],
-    finished: Callable[[int], None],
-) -> Iterator[Part | Hung]:
-    """What comes of some structures, as it comes."""
-    waiting, active = list(indices), []
+    work: Work, indices: list[int], methods: tuple[str, ...], processes: int, title: str
+) -> Iterator[Any]:
+    """What comes of some structures, as it comes: one part per method, and what hung."""
+    waiting, active, done, began = list(indices), [], 0, time.perf_counter()
     while waiting or active:
         while waiting and len(active) < processes:
-            active.append(_Job(seed, waiting.pop(0), samples, methods))
+            active.append(_Job(work, waiting.pop(0), methods))
         for job in list(active):
             yield from job.news()
             if job.done:
+                # What was sent in between.
                 yield from job.news()
                 active.remove(job)
-                finished(job.index)
+                done += 1
+                if done % 10 == 0 or done == len(indices):
+                    seconds = time.perf_counter() - began
+                    print(f"{title}: {done} of {len(indices)}, {seconds:.0f} s", flush=True)
         time.sleep(POLL)

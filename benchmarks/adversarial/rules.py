@@ -300,7 +300,11 @@ class _Runner:
             if any(watch.edge.direction for watch, _ in same):
                 raise Open("direction 0 beside another direction")
             alike = [watch for watch, _ in same]
-            watch = Watch(edge, same[0][0].way * same[0][1])
+            way = same[0][0].way * same[0][1]
+            # A crossing that has fired is over: the state was on the other side already.
+            crossed = any(other.fired for other in alike)
+            watch = Watch(edge, -way if crossed else way)
+            alike = [] if crossed else alike
         before = watch.value(self.t, old_x)
         if alike:
             watch.beyond = any(other.beyond for other in alike)

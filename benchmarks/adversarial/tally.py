@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 import numpy as np
 
 from benchmarks.adversarial.compare import Outcome
+from benchmarks.adversarial.instants import Compared
 from benchmarks.adversarial.pool import Hung
 from benchmarks.adversarial.trial import Part
 
@@ -38,6 +39,38 @@ class Tally:
 
     def of(self, method: str) -> list[Outcome]:
         return [outcome for outcomes in self.outcomes[method].values() for outcome in outcomes]
+
+
+class InstantTally:
+    """All comparisons with the exact rules, by method."""
+
+    def __init__(self) -> None:
+        self.compared: dict[str, list[Compared]] = defaultdict(list)
+        self.hung: dict[str, int] = defaultdict(int)
+
+    def add(self, part: Compared) -> None:
+        self.compared[part.method].append(part)
+
+    def hang(self, hung: Hung) -> None:
+        self.hung[hung.method] += hung.run >= 0
+
+
+def instant_rows(tally: InstantTally) -> Table:
+    rows = []
+    for method, every in tally.compared.items():
+        kinds = Counter(kind for one in every for _, kind, _ in one.differences)
+        said = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common())
+        rows.append(
+            [
+                method,
+                str(sum(one.cases for one in every)),
+                str(sum(one.firings for one in every)),
+                str(kinds.total()),
+                str(tally.hung[method]),
+                said or "-",
+            ]
+        )
+    return ["method", "systems", "transitions fired", "runs that differ", "hung", "how"], rows
 
 
 def counts(outcomes: list[Outcome]) -> list[str]:

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from benchmarks.adversarial.compare import Found, Outcome, compare
 from benchmarks.adversarial.flows import FLOWS, Flow, draw
 from benchmarks.adversarial.guards import FAMILIES, RandomGuard, random_guard
+from benchmarks.adversarial.pool import Begin
 from benchmarks.adversarial.truth import Composed, Roots, Scalar, all_roots
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
 
@@ -190,9 +191,6 @@ class Part(NamedTuple):
     seconds: dict[str, float]
     # Runs whose changes of sign do not alternate: the truth itself would be wrong.
     doubts: int
-
-
-Begin = Callable[[str, int], None]
 
 
 def trial(
