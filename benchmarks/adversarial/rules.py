@@ -83,7 +83,7 @@ class Watch:
 
     def __init__(self, edge: Edge, way: int) -> None:
         self.edge, self.way = edge, way
-        self.beyond = self.due = self.fired = False
+        self.beyond = self.due = self.fired = self.resting = False
 
     def value(self, t: Fraction, x: Vector) -> Fraction:
         return self.way * self.edge.guard(t, x)
@@ -216,6 +216,8 @@ class _Runner:
 
     def _jump(self, first: int, edge: Edge) -> None:
         before = {i: watch.value(self.t, self.x) for i, watch in self.watches.items()}
+        for i, watch in self.watches.items():
+            watch.resting = before[i] == 0 and watch.speed(self.velocity) == 0
         old_x, old_mode = self.x, self.mode
         own = self.watches[first]
         own.due, own.fired = False, True
@@ -310,6 +312,8 @@ class _Runner:
             watch.beyond = any(other.beyond for other in alike)
             watch.due = any(other.due for other in alike) and not any(other.fired for other in alike)
             watch.fired = any(other.fired for other in alike)
+        elif before == 0 and any(other.resting for other, _ in same):
+            raise Open("at rest on a guard that was watched the other way")
         else:
             watch.beyond = before > 0
         due = watch.due
