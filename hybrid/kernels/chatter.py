@@ -31,6 +31,8 @@ SHALLOW = 1e6
 # Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
 SHORT = 1e-5
 LONG = 1.0
+# The same where the drift is that of the mean field, which is followed to second order.
+BRIEF = 1e-4
 # Largest relative change of the limit that rounding may be blamed for.
 ROUGH = 1e-6
 # Where its time still changes by more than this share, the limit is not looked for.
@@ -252,11 +254,47 @@ def chatter_matrix(model, run, transition, work):
 
 
 @njit(**KERNEL)
+def along_mean(model, run, transition, t, x, direction, out, work):
+    """Derivative of the mean field at ``x (n,)`` in a direction, into ``out (n,)``, by a difference."""
+    n, place, below = model.dimension, work.reset_jacobian[0], work.new
+    size, length = 1e-3, 0.0
+    for i in range(n):
+        size, length = max(size, abs(x[i])), max(length, abs(direction[i]))
+    step = 6e-6 * size / length if length > 0.0 else 1.0
+    for i in range(n):
+        place[i] = x[i] + step * direction[i]
+    mean_field(model, run, transition, t, place, out, work)
+    for i in range(n):
+        place[i] = x[i] - step * direction[i]
+    mean_field(model, run, transition, t, place, below, work)
+    for i in range(n):
+        out[i] = (out[i] - below[i]) / (2.0 * step)
+
+
+@njit(**KERNEL)
+def drift_with_mean(model, run, transition, span, work):
+    """Carry the columns of ``work.saltation`` along the mean field for a short time, to its second order."""
+    n, t = model.dimension, run.clock[PHASE] + 0.5 * span
+    middle, column, image = work.trial, work.error, work.second_error
+    for i in range(n):
+        middle[i] = 0.5 * (run.y[i] + work.settled[i])
+    for j in range(n):
+        for i in range(n):
+            column[i] = work.saltation[i, j]
+        for order in range(1, 3):
+            along_mean(model, run, transition, t, middle, column, image, work)
+            for i in range(n):
+                column[i] = image[i] * span / order
+                work.saltation[i, j] += column[i]
+
+
+@njit(**KERNEL)
 def add_change_of_duration(model, method, run, target, span, work):
-    """Add to ``work.saltation`` what a change of the chatter's duration does.
+    """Add to ``work.saltation`` what a change of the chatter's duration does; says whether that is anything.
 
     A state that chatters longer drifts longer with the mean field of the chatter, and shorter with that of
     the limit mode; where the two agree, up to what the error of the limit makes of them, nothing is added.
+    Where they do not, the matrix is made that of the whole chatter, from its beginning to its end.
     The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the height
     through its energy; its derivative, that of the instant of the limit, goes to ``run.instant``. To be
     called after ``chatter_matrix``, whose slope and gradient it uses.
@@ -272,17 +310,25 @@ def add_change_of_duration(model, method, run, target, span, work):
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
     for j in range(n):
         run.instant[j] = by_speed * work.error[j] + by_height * work.gradient[j]
+    apart, excess = False, work.field_after
     for i in range(n):
-        excess = mean[i] - work.field_after[i]
         # Rounding of the fields and of the impulse, a quotient by the speed, and the error of the limit.
         blurred = abs(work.field[i]) + abs(work.field_after[i]) + pull * run.scale[i] / speed
         blurred *= 16.0 * EPSILON
         for j in range(n):
             steepness = abs(work.jacobian[i, j]) + abs(work.reset_jacobian[i, j])
             blurred += steepness * (method.atol + method.rtol * run.scale[j])
-        if abs(excess) > blurred:
+        excess[i] = mean[i] - excess[i]
+        if abs(excess[i]) > blurred:
+            apart = True
+        else:
+            excess[i] = 0.0
+    if apart:
+        drift_with_mean(model, run, transition, span, work)
+        for i in range(n):
             for j in range(n):
-                work.saltation[i, j] += excess * run.instant[j]
+                work.saltation[i, j] += excess[i] * run.instant[j]
+    return apart
 
 
 @njit(**KERNEL)

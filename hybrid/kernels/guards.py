@@ -85,8 +85,7 @@ def sides_at(model, run, t, work):
     """Bring the sides of the mode's guards to the state of the run, which it has at the time ``t``.
 
     A guard that is zero there has not been crossed yet: it keeps the side it had before, and has none if the
-    next step has to show it. One that fires both ways is followed no further than that: its side is 0 away
-    from the guard.
+    next step has to show it.
     """
     mode = run.count[MODE]
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -94,9 +93,8 @@ def sides_at(model, run, t, work):
         direction = model.direction[transition]
         value = guard_value(model, transition, t, run.y, work.scalar)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        beyond = value * direction > 0.0
         if abs(value) > rounding_band(model, run, transition, t, run.y, work):
-            run.side[transition] = direction if beyond else -direction
+            run.side[transition] = 1 if value > 0.0 else -1
         elif direction != 0 and run.side[transition] != 0:
             run.side[transition] = -direction
 

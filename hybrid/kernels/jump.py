@@ -5,12 +5,14 @@ import math
 from numba import boolean, float64, int64, njit, void
 
 from hybrid.kernels.chatter import (
+    BRIEF,
     accumulation,
     add_change_of_duration,
     chatter_matrix,
     drift,
     drift_is_known,
     remember_impulse,
+    size_of,
 )
 from hybrid.kernels.clock import forward
 from hybrid.kernels.codes import (
@@ -324,21 +326,27 @@ def follow_impacts(model, method, run, record, transition, remaining, tangents, 
         return False
     limit_mode = model.accumulates_to[transition]
     target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
-    if tangents > 0 and not drift_is_known(model, run, target, span, work):
-        return False
+    steep = 0.0
+    if tangents > 0:
+        if not drift_is_known(model, run, target, span, work):
+            return False
+        steep = span * size_of(work.jacobian, model.dimension)
     x_limit = work.settled
-    remember_flight(run, record, model.dimension, span, x_limit)
     chatter_matrix(model, run, transition, work)
-    add_change_of_duration(model, method, run, target, span, work)
+    apart = add_change_of_duration(model, method, run, target, span, work)
+    if apart and steep > BRIEF:
+        return False
+    remember_flight(run, record, model.dimension, span, x_limit)
     begin_instant(run, model.dimension, tangents, work)
     forward(run, model.period, span)
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
     if tangents > 0:
         n = model.dimension
         carry_tangents(model, run, tangents, orthonormal, False, work)
-        model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
-        drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
-        drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
+        if not apart:
+            model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
+            drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
+            drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
     run.count[ROUND] = 1
     move(model, run, transition, target, x_limit)
     return True

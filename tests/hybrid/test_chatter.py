@@ -3,6 +3,7 @@
 import math
 from functools import cache
 
+import attrs
 import numpy as np
 import pytest
 
@@ -125,6 +126,14 @@ def braked(brake):
             )
         ],
     )
+
+
+@cache
+def braked_by_its_square():
+    """The same ball on ground whose friction grows with the square of the speed."""
+    flight, _ = braked(0.0).modes
+    slide = Mode("slide", lambda t, x, p: (0.0, 0.0, x.u, -(x.u**2)))
+    return attrs.evolve(braked(0.0), modes=[flight, slide])
 
 
 def limit_time(e):
@@ -365,7 +374,25 @@ class TestTangents:
         arc = simulate(system, x0, (0.0, end), mode="flight", tangent=True)
         np.testing.assert_allclose(arc.x[-1], exact(x0), rtol=0, atol=1e-11)
         derivative = np.column_stack([exact(x0 + 1e-30j * d).imag / 1e-30 for d in np.eye(4)])
-        np.testing.assert_allclose(arc.fundamental, derivative, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(arc.fundamental, derivative, rtol=0, atol=1e-9)
+
+    @pytest.mark.parametrize("solver", [None, TIGHT], ids=["default", "tight"])
+    def test_into_a_mode_whose_jacobian_varies(self, solver):
+        """``u' = 2`` in flight and ``u' = -u^2`` on the ground, against the closed form."""
+        end, system = 4.0, braked_by_its_square()
+
+        def exact(x0):
+            q, v, s, u = x0
+            impact = np.sqrt(v * v + 20 * q)
+            limit = (impact + v) / 10 + 2 * 0.5 * impact / (10 * (1 - 0.5))
+            s, u = s + u * limit + limit**2, u + 2 * limit
+            return np.array([0 * q, 0 * q, s + np.log(1 + u * (end - limit)), u / (1 + u * (end - limit))])
+
+        x0 = np.array([1.0, 0.2, 0.1, 0.3])
+        arc = simulate(system, x0, (0.0, end), mode="flight", tangent=True, solver=solver)
+        np.testing.assert_allclose(arc.x[-1], exact(x0), rtol=0, atol=1e-11)
+        derivative = np.column_stack([exact(x0 + 1e-30j * d).imag / 1e-30 for d in np.eye(4)])
+        np.testing.assert_allclose(arc.fundamental, derivative, rtol=0, atol=1e-9)
 
     def test_it_is_singular_in_two_directions(self):
         arc = simulate(incline(), (0.1, 1.0, 0.2, -0.3), (0.0, 4.0), mode="flight", tangent=True)

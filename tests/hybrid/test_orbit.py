@@ -129,7 +129,7 @@ class TestNoOrbit:
 
     def test_a_ball_that_loses_energy_has_none(self):
         orbit = periodic_orbit(bouncing_ball(), (1.0, 0.0), period=1.0)
-        assert not orbit.status.ok
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
 
     @pytest.mark.parametrize(
         ("system", "arguments", "text"),
