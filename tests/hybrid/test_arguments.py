@@ -310,6 +310,7 @@ def table(made):
             {
                 "function": [None, *FUNCTION],
                 "direction": [None, "up", 2, 0.5, True, False, math.nan, [1], 1j],
+                "at_entry": FLAG,
                 "gradient": FUNCTION,
                 "when": FUNCTION,
             },
@@ -616,8 +617,8 @@ NOT_CALLED = {
     "discard",
     "Panel",
 }
-# What an engine or a case does is for properties, which get them from the library.
-WITHOUT_METHODS = {"Case", "Engine", "Run"}
+# Their methods are for the library and its properties.
+WITHOUT_METHODS = {"Case", "CompiledSystem", "Engine", "Run"}
 # Where the argument of a method is called otherwise in the functions that it serves.
 ALSO_CALLED = {"overrides": "parameters", "name": "mode", "flip": "elastic"}
 
