@@ -12,8 +12,11 @@ from hybrid import arguments
 from hybrid.arc import HybridArc
 from hybrid.compile import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.factors import fundamental_factors
 from hybrid.interrupt import CTRL_C, interrupted_status
-from hybrid.run import check_solver, start
+from hybrid.kernels import codes
+from hybrid.periodic_schur import ProductEigenvalues, product_eigenvalues
+from hybrid.run import Trajectory, check_solver, start
 from hybrid.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta
 from hybrid.status import SUCCESS, Status, StatusCode
@@ -25,6 +28,20 @@ SHORTEST_STEP = 1 / 64
 SHORTEST_PERIOD = 1e-3
 # Jumps of a guess that are looked at in the search for a point away from them.
 MOST_JUMPS_LOOKED_AT = 10_000
+# Points at which an orbit is looked at to see how far it moves, besides the solver's own.
+SAMPLES = 65
+EPSILON = float(np.finfo(float).eps)
+# Rounding of the end of an orbit, in units in the last place of its largest states: what Newton's method can
+# hope for, and what is accepted where it can do no better.
+FINEST_GAP, ROUNDING_OF_GAP = 4, 100
+# An autonomous orbit moves by more than this many times what is accepted as rounding.
+LEAST_MOTION = 1e3
+# Share of its states by which a point that hardly moves may still be wrong.
+POINT_ERROR = 1e-8
+# Where Newton's method cannot tell which of many orbits it is at, that is one only if it closes up to this
+# share of its motion, and is at most so many times larger than the solution through the guess.
+DRIFT = 1e-3
+FARTHEST = 1e3
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -40,11 +57,16 @@ class PeriodicOrbit:
     period
         Time until the orbit closes: for a forced system ``periods`` forcing periods.
     multipliers
-        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1.
+        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1. Each has its own
+        relative accuracy, however small: they come from the factors of the fundamental matrix along the
+        orbit.
+    log_moduli
+        Natural logarithms of the moduli of the multipliers ``(n,)``, also of those out of the range of
+        floating-point numbers; minus infinity for a multiplier of zero.
     fundamental
-        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues they are; for an
-        autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the orbit
-        it is a similar matrix).
+        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues the multipliers are; for
+        an autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the
+        orbit it is a similar matrix).
     residual
         Distance between the two ends over the period, in the units of the state.
     iterations
@@ -62,6 +84,7 @@ class PeriodicOrbit:
     t0: float
     period: float
     multipliers: np.ndarray
+    log_moduli: np.ndarray
     fundamental: np.ndarray
     residual: float
     iterations: int
@@ -112,14 +135,16 @@ def periodic_orbit(
     solver
         By default ``DOP853(rtol=1e-12, atol=1e-14)``.
     tolerance
-        Newton's method stops where the residual is below ``tolerance`` times the size of the state.
+        Newton's method stops where the residual of each component is below ``tolerance`` times how far that
+        component moves over the period, or is rounding.
     max_iterations
         Most Newton steps.
 
     Returns
     -------
     PeriodicOrbit
-        With a status that says how far it got if it did not converge.
+        With a status that says how far it got if it did not converge. An equilibrium is no orbit of an
+        autonomous system; of a forced one it is, since it repeats after each forcing period.
 
     Raises
     ------
@@ -155,7 +180,7 @@ def periodic_orbit(
         point = _Point(guess, t0, periods * forcing)
         compile_system(system)
         with CTRL_C:
-            return _kept(shooting.newton(point, None, tolerance, max_iterations))
+            return _kept(shooting.newton(point, False, tolerance, max_iterations))
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
@@ -182,7 +207,10 @@ class _Point:
 
 @attrs.frozen(eq=False)
 class _Shot:
-    """What one integration over the period gives."""
+    """What one integration over the period gives.
+
+    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value.
+    """
 
     point: _Point
     mode: str
@@ -191,6 +219,8 @@ class _Shot:
     fundamental: np.ndarray
     field: np.ndarray
     end_field: np.ndarray
+    extent: np.ndarray
+    magnitude: np.ndarray
     status: Status
 
     @property
@@ -198,10 +228,17 @@ class _Shot:
         return self.end - self.point.x
 
     @property
-    def size(self) -> float:
-        """The residual, infinite where the two ends are in different modes."""
-        whole = self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
-        return float(np.linalg.norm(self.gap)) if whole else np.inf
+    def whole(self) -> bool:
+        """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
+        return self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
+
+    def size(self, scale: np.ndarray) -> float:
+        """The residual in units of ``scale (n,)``, infinite where there is none."""
+        return float(np.linalg.norm(self.gap / scale)) if self.whole else np.inf
+
+    def closes(self, tolerance: float, rounding: np.ndarray) -> bool:
+        """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component."""
+        return self.whole and bool(np.all(np.abs(self.gap) <= np.maximum(tolerance * self.extent, rounding)))
 
 
 @attrs.frozen(eq=False)
@@ -212,18 +249,11 @@ class _Shooting:
     solver: RungeKutta
 
     def shoot(self, point: _Point) -> _Shot:
-        n = self.system.dimension
-        trajectory = start(
-            self.system,
-            point.x,
-            point.t,
-            mode=self.mode,
-            parameters=self.parameters,
-            solver=self.solver,
-            tangent=np.eye(n),
-        )
+        trajectory = self._trajectory(point, self.mode)
         mode, field = trajectory.mode, trajectory.field()
         code = trajectory.advance(point.t + point.period, trajectory.no_record())
+        arc = self._follow(point, point.period, mode)
+        states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
         return _Shot(
             point,
             mode,
@@ -232,48 +262,49 @@ class _Shooting:
             trajectory.tangent_matrix,
             field,
             trajectory.field(),
+            np.ptp(states, axis=0),
+            np.abs(states).max(axis=0),
             trajectory.status(code),
         )
 
+    def _trajectory(self, point: _Point, mode: str | None) -> Trajectory:
+        """A run from a point that carries the columns of the identity."""
+        return start(
+            self.system,
+            point.x,
+            point.t,
+            mode=mode,
+            parameters=self.parameters,
+            solver=self.solver,
+            tangent=np.eye(self.system.dimension),
+        )
+
     def newton(
-        self, point: _Point, plane: np.ndarray | None, tolerance: float, max_iterations: int
+        self, point: _Point, free_period: bool, tolerance: float, max_iterations: int
     ) -> PeriodicOrbit:
-        """Newton's method from ``point``; the period is unknown too if ``plane``, a normal, is given."""
-        anchor = point.x
+        """Newton's method from ``point``; the period may be unknown too."""
         shot, iterations = self.shoot(point), 0
-        while iterations < max_iterations and not self._closed(shot, tolerance):
-            if not np.isfinite(shot.size):
+        newton = _Newton.begin(shot, self.solver.atol, free_period)
+        while iterations < max_iterations and shot.whole:
+            if shot.closes(tolerance, FINEST_GAP * EPSILON * shot.magnitude):
                 break
-            step = self._step(shot, plane, anchor)
+            better = self._along(shot, newton)
             iterations += 1
-            better = self._along(shot, step)
             if better is None:
                 break
             shot = better
-        return self._result(shot, iterations, tolerance)
+            newton = attrs.evolve(newton, scale=np.maximum(newton.scale, shot.magnitude))
+        return self._result(shot, iterations, self._status(shot, newton, iterations, tolerance))
 
-    def _closed(self, shot: _Shot, tolerance: float) -> bool:
-        return shot.size <= tolerance * max(float(np.linalg.norm(shot.point.x)), 1e-300)
-
-    def _step(self, shot: _Shot, plane: np.ndarray | None, anchor: np.ndarray) -> tuple[np.ndarray, float]:
-        """Newton step of the state and of the period."""
-        n = len(anchor)
-        matrix = shot.fundamental - np.eye(n)
-        if plane is None:
-            return np.linalg.lstsq(matrix, -shot.gap, rcond=None)[0], 0.0
-        bordered = np.block([[matrix, shot.end_field[:, None]], [plane[None, :], np.zeros((1, 1))]])
-        right = np.append(-shot.gap, -plane @ (shot.point.x - anchor))
-        step = np.linalg.lstsq(bordered, right, rcond=None)[0]
-        return step[:n], float(step[n])
-
-    def _along(self, shot: _Shot, step: tuple[np.ndarray, float]) -> _Shot | None:
+    def _along(self, shot: _Shot, newton: _Newton) -> _Shot | None:
         """The first shot along the step, halved as often as allowed, that closes better; else None."""
+        step, longer = newton.step(shot)
         part = 1.0
         while part >= SHORTEST_STEP:
-            period = shot.point.period + part * step[1]
+            period = shot.point.period + part * longer
             if period > 0:
-                trial = self._tried(attrs.evolve(shot.point, x=shot.point.x + part * step[0], period=period))
-                if trial is not None and trial.size < shot.size:
+                trial = self._tried(attrs.evolve(shot.point, x=shot.point.x + part * step, period=period))
+                if trial is not None and trial.size(newton.scale) < shot.size(newton.scale):
                     return trial
             part /= 2
         return None
@@ -292,8 +323,7 @@ class _Shooting:
         """
         shift = self._quiet_time(guess)
         shooting, moved = self._moved(guess, shift)
-        normal = shooting.shoot(moved).field
-        orbit = shooting.newton(moved, normal, tolerance, max_iterations)
+        orbit = shooting.newton(moved, True, tolerance, max_iterations)
         if orbit.status.ok and orbit.period < SHORTEST_PERIOD * guess.period:
             # Every point closes after no time at all.
             status = Status(
@@ -328,10 +358,8 @@ class _Shooting:
         i = int(np.argmin(np.linalg.norm(arc.x - guess.x, axis=1)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
-    def _result(self, shot: _Shot, iterations: int, tolerance: float) -> PeriodicOrbit:
-        finite = bool(np.all(np.isfinite(shot.fundamental)))
-        values = np.linalg.eigvals(shot.fundamental) if finite else np.full(len(shot.end), np.nan)
-        values = values[np.argsort(-np.abs(values), kind="stable")]
+    def _result(self, shot: _Shot, iterations: int, status: Status) -> PeriodicOrbit:
+        eigenvalues = self._eigenvalues(shot)
         return PeriodicOrbit(
             system=self.system,
             parameters=dict(self.parameters or {}),
@@ -339,13 +367,23 @@ class _Shooting:
             mode=shot.mode,
             t0=shot.point.t,
             period=shot.point.period,
-            multipliers=values,
+            multipliers=eigenvalues.values,
+            log_moduli=eigenvalues.log_moduli,
             fundamental=shot.fundamental,
             residual=float(np.linalg.norm(shot.gap)),
             iterations=iterations,
             signature=self._signature(shot),
-            status=self._status(shot, iterations, tolerance),
+            status=status,
         )
+
+    def _eigenvalues(self, shot: _Shot) -> ProductEigenvalues:
+        """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
+        trajectory = self._trajectory(shot.point, shot.mode)
+        factors, code = fundamental_factors(trajectory, shot.point.t + shot.point.period)
+        if code != codes.DONE or not all(np.all(np.isfinite(factor)) for factor in factors):
+            unknown = np.full(len(shot.end), np.nan)
+            return ProductEigenvalues(unknown, unknown.astype(complex))
+        return product_eigenvalues(factors)
 
     def _signature(self, shot: _Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)
@@ -363,17 +401,81 @@ class _Shooting:
             max_jumps=max_jumps,
         )
 
-    def _status(self, shot: _Shot, iterations: int, tolerance: float) -> Status:
-        if self._closed(shot, tolerance):
-            return SUCCESS
+    def _status(self, shot: _Shot, newton: _Newton, iterations: int, tolerance: float) -> Status:
+        """How Newton's method ended: with an orbit, or why there is none."""
         if not shot.status.ok:
             return shot.status
-        if shot.end_mode != shot.mode:
-            reason = f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
-        else:
-            reason = f"the residual is {np.linalg.norm(shot.gap):.3g} after {iterations} iterations"
+        reason = self._objection(shot, newton, iterations, tolerance)
+        if reason is None:
+            return SUCCESS
         return Status(
             StatusCode.NOT_CONVERGED,
             f"Newton's method did not converge: {reason}.",
             "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations.",
         )
+
+    def _objection(self, shot: _Shot, newton: _Newton, iterations: int, tolerance: float) -> str | None:
+        """Why the last shot is no periodic orbit, or None if it is one.
+
+        The ends agree; the orbit moves, if nothing but its motion has a period; and what is left of Newton's
+        step is small. At infinity, or where a solution drifts, the ends may agree and that step is large. It
+        is arbitrary where orbits come in families: then the orbit has to be near to the guess, and to close.
+        """
+        if shot.end_mode != shot.mode:
+            return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
+        rounding = ROUNDING_OF_GAP * EPSILON * (shot.magnitude + np.abs(shot.fundamental) @ shot.magnitude)
+        # A component that is below the solver's absolute tolerance throughout counts as zero.
+        nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
+        if not shot.closes(tolerance, np.maximum(rounding, nothing)):
+            return f"the residual is {np.linalg.norm(shot.gap):.3g} after {iterations} iterations"
+        noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
+        if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
+            return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
+        step, _ = newton.step(shot)
+        enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
+        if np.all(np.abs(step) <= np.maximum(enough, nothing)):
+            return None
+        near = np.all(shot.extent <= FARTHEST * newton.first)
+        if near and np.all(np.abs(shot.gap) <= DRIFT * shot.extent):
+            return None
+        return (
+            f"the ends agree to {np.linalg.norm(shot.gap):.3g}, but the next step would move the start by "
+            f"{np.linalg.norm(step):.3g}: the solution drifts, or no orbit is near"
+        )
+
+
+@attrs.frozen(eq=False)
+class _Newton:
+    """Newton's step in units of ``scale (n,)``, so that the units of the states do not matter.
+
+    ``first (n,)`` is the scale of the first shot; where the period is unknown too the state stays in the
+    plane ``plane (n,)`` through ``anchor (n,)``, across the field there.
+    """
+
+    scale: np.ndarray
+    first: np.ndarray
+    free_period: bool
+    anchor: np.ndarray
+    plane: np.ndarray
+
+    @classmethod
+    def begin(cls, shot: _Shot, atol: float, free_period: bool) -> _Newton:
+        """From the first shot; sizes below the solver's absolute tolerance count as that."""
+        scale = np.maximum(shot.magnitude, max(atol, np.finfo(float).tiny))
+        return cls(scale, scale, free_period, shot.point.x, shot.field / scale**2)
+
+    def step(self, shot: _Shot) -> tuple[np.ndarray, float]:
+        """Newton step of the state and of the period."""
+        n, scale, period = len(shot.end), self.scale, shot.point.period
+        matrix = (shot.fundamental - np.eye(n)) / scale[:, None] * scale
+        gap = shot.gap / scale
+        if not self.free_period:
+            return np.linalg.lstsq(matrix, -gap, rcond=None)[0] * scale, 0.0
+        row = self.plane * scale
+        size = max(float(np.linalg.norm(row)), np.finfo(float).tiny)
+        bordered = np.block(
+            [[matrix, (shot.end_field / scale * period)[:, None]], [row[None, :] / size, np.zeros((1, 1))]]
+        )
+        right = np.append(-gap, -row @ ((shot.point.x - self.anchor) / scale) / size)
+        step = np.linalg.lstsq(bordered, right, rcond=None)[0]
+        return step[:n] * scale, float(step[n]) * period

@@ -291,6 +291,12 @@ class Trajectory:
         n = self.model.dimension
         return self.run.y[n:].reshape(self.tangents, n).T.copy()
 
+    def replace_tangents(self, matrix: np.ndarray) -> None:
+        """Go on with other tangent vectors, the columns of ``(n, k)``."""
+        self.run.y[self.model.dimension :] = matrix.T.ravel()
+        if self.run.count[codes.PHASE_OF_RUN] == codes.READY:
+            self.run.count[codes.PHASE_OF_RUN] = codes.STALE
+
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
         from hybrid.kernels.step import flow_jacobian

@@ -15,7 +15,8 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     Parameters
     ----------
     orbit
-        From :func:`hybrid.periodic_orbit`: its multipliers :math:`\rho_i` and its period :math:`T`.
+        From :func:`hybrid.periodic_orbit`: the logarithms of its multipliers :math:`\rho_i`, which are known
+        however small these are, and its period :math:`T`.
 
     Returns
     -------
@@ -36,5 +37,4 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     array([-0.08551, -0.08551])
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
-    with np.errstate(divide="ignore"):
-        return np.log(np.abs(orbit.multipliers)) / orbit.period
+    return orbit.log_moduli / orbit.period

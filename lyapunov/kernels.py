@@ -8,6 +8,7 @@ from hybrid.kernels.codes import (
     DIVERGENCE,
     DONE,
     ENTERING,
+    INDISTINCT,
     LAST_FIRED,
     LOG_DETERMINANT,
     MODE,
@@ -112,7 +113,7 @@ def growth_rates(
         )
         if code != DONE:
             return done, code
-        orthonormalise(run.y, n, tangents, run.growth, 0.0)
+        run.count[INDISTINCT] += orthonormalise(run.y, n, tangents, run.growth, 0.0)
         run.clock[STRAIN] = 0.0
         if run.count[PHASE_OF_RUN] == READY:
             run.count[PHASE_OF_RUN] = STALE

@@ -33,12 +33,14 @@ from hybrid.kernels.codes import (
     SINCE_ENTRY,
     STALE,
     STEPS,
+    STEPS_AT_ENTRY,
     STUCK,
     TERMINAL,
 )
 from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, widen_scale
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.series import series_step
+from hybrid.kernels.tangent import CLOSE_AT_ENTRY, keep_apart, keep_apart_after_step
 
 # More jumps than this at one instant, in all or per transition, are not going to end.
 MOST_JUMPS_AT_ONCE = 1000
@@ -153,6 +155,9 @@ def advance(
                 run.first_step[mode] = 0.0
             run.clock[LAST_STEP] = 0.0
             run.count[PHASE_OF_RUN] = STALE
+            run.count[STEPS_AT_ENTRY] = run.count[STEPS]
+            if orthonormal:
+                keep_apart(run, model.dimension, tangents, CLOSE_AT_ENTRY, work.jacobian)
         remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
             fired = arrived(model, run, work)
@@ -168,7 +173,7 @@ def advance(
             return MAX_STEPS
         if model.propagator[mode] == RUNGE_KUTTA:
             code, span = parts.runge_kutta_step(
-                parts.attempts, model, method, run, record, tangents, remaining, work
+                parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
             )
         else:
             code, span = series_step(model, method, run, record, tangents, remaining, work)
@@ -176,6 +181,8 @@ def advance(
             return int(code)
         forward(run, model.period, span)
         run.clock[SINCE_ENTRY] += span
+        if orthonormal and span > 0.0:
+            keep_apart_after_step(model, run, mode, tangents, work.jacobian)
         fired = run.count[PENDING]
         past = time_left(model, run, stop_cycle, stop_phase) < 0.0
         if past or (span >= remaining and fired == NO_TRANSITION):

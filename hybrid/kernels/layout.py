@@ -264,7 +264,7 @@ class Parts(Structure):
 
     attempts: ATTEMPTS
     runge_kutta_step: types.FunctionType(
-        types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK)
+        types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK)
     )
     enter: types.FunctionType(int64(MODEL, RUN, WORK))
     jump: types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK))

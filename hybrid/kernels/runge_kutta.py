@@ -1,6 +1,8 @@
 """One step of a Runge-Kutta method: attempt, error control, first event, and landing on that."""
 
-from numba import float64, int64, njit, types
+import math
+
+from numba import boolean, float64, int64, njit, types
 
 from hybrid.kernels.clock import measured_time
 from hybrid.kernels.codes import (
@@ -37,6 +39,7 @@ from hybrid.kernels.step import (
     rates,
     starting_step,
 )
+from hybrid.kernels.tangent import independence
 
 SAFETY = 0.9
 SHRINK = 0.2
@@ -44,6 +47,9 @@ GROW = 6.0
 # An event resets the pace: a flight that is a polynomial has no error to hold its steps back, and one step
 # across many bounces, each much shorter than it, would drown them in its rounding.
 LONGEST_AFTER_EVENT = 100.0
+# Logarithm of how close together the tangent vectors may be at the end of a step. An implicit step can be as
+# long as it likes where they shrink fast: what it makes of them is then no exponential.
+CLOSEST = math.log(1e3)
 
 
 @njit(**INLINE)
@@ -165,11 +171,26 @@ def growth_factor(method, run, h, ratio):
     return min(GROW, max(SHRINK, SAFETY * factor))
 
 
+@njit(**INLINE)
+def alignment_ratio(method, n, tangents, work):
+    """Error ratio that stands for the tangent vectors at the end of the attempted step.
+
+    It makes the logarithm of the product of their sines a limit of the step's length. Above 1 they are too
+    close together for the solver's error, which is relative to whole vectors.
+    """
+    product = independence(work.new, n, tangents, work.jacobian)
+    if product < 0.0 or product >= 1.0:
+        return 0.0
+    if product == 0.0:
+        return math.inf
+    return (-0.5 * math.log(product) / CLOSEST) ** (1.0 / method.exponent)
+
+
 @njit(
-    types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK),
+    types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK),
     **PART,
 )
-def runge_kutta_step(parts, model, method, run, record, tangents, remaining, work):
+def runge_kutta_step(parts, model, method, run, record, tangents, orthonormal, remaining, work):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
     An event is left in ``PENDING``. A step that the error control rejects has the length zero.
@@ -187,6 +208,8 @@ def runge_kutta_step(parts, model, method, run, record, tangents, remaining, wor
     last = proposed >= remaining
     h = remaining if last else proposed
     ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
+    if orthonormal and method.implicit != 0 and ratio <= 1.0:
+        ratio = max(ratio, alignment_ratio(method, model.dimension, tangents, work))
     run.count[STEPS] += 1
     if not ratio <= 1.0:
         run.count[REJECTED] += 1

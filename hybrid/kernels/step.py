@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, int64, njit, types, void
+from numba import boolean, float64, int64, njit, types, void
 
 from hybrid.kernels.layout import (
     ATTEMPTS,
@@ -199,8 +199,8 @@ def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
     return attempt(parts, model, method, mode, t, h, y, tangents, work)
 
 
-@njit(types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, float64, WORK), **PART)
-def no_step(parts, model, method, run, record, tangents, remaining, work):
+@njit(types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK), **PART)
+def no_step(parts, model, method, run, record, tangents, orthonormal, remaining, work):
     """Stands in for the step of a Runge-Kutta method where every mode has a series."""
     return math.nan, 0.0
 

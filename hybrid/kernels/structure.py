@@ -87,6 +87,14 @@ class Structure:
         known[name] = view = np.ndarray(shape, dtype, known["_memory"], known["_begin"] + offset)
         return view
 
+    def saved(self):
+        """A copy of what the arrays hold, for ``restore``; the structure came from a layout."""
+        return self._memory.copy()
+
+    def restore(self, saved):
+        """Put back what the arrays held."""
+        self._memory[:] = saved
+
     def __setattr__(self, name, value):
         raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
 

@@ -4,6 +4,18 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.codes import (
+    DESINGULARISED,
+    EXACT,
+    INDISTINCT,
+    PHASE_OF_RUN,
+    READY,
+    RUNGE_KUTTA,
+    STALE,
+    STEPS,
+    STEPS_AT_ENTRY,
+    STRAIN,
+)
 from hybrid.kernels.layout import KERNEL
 
 # Below this length a unit vector's image is rounding: the map that produced it is singular.
@@ -11,6 +23,18 @@ COLLAPSED = 1e-13
 # Strain of all jumps since the tangent vectors were last orthonormalised from which on it is done again: a
 # condition number of a thousand costs three digits of the vectors that grow less.
 STRAINED = math.log(1e3)
+# Tangent vectors are orthonormalised between steps as soon as the product of their sines (see
+# ``independence``) is below one of these, squared here. The solver's error is relative to a whole vector, and
+# what counts is the vector's part orthogonal to the vectors before it: that part loses as many digits as the
+# product has. An exact step has an error of rounding alone; the step of a Runge-Kutta method has to evaluate
+# the rates once more afterwards.
+CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-5**2, 1e-1**2, 1e-2**2
+CLOSE_AT_ENTRY = 1e-3**2
+# A stiff contact stretches all vectors along the speed, and shrinks them again before it ends: no sign of
+# exponents that are far apart. A longer stay on the clock of a contact is looked at from this step on.
+STEPS_OF_CONTACT = 16
+# Tangent vectors are also orthonormalised where a square of their length leaves this range.
+SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 
 
 @njit(**KERNEL)
@@ -20,16 +44,17 @@ def orthonormalise(y, n, k, growth, threshold):
     The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt, twice, which
     is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold`` times the longest image
     has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of vectors
-    that collapsed now.
+    of which only rounding is left, though none had to collapse.
     """
-    collapsed = 0
+    indistinct = 0
     longest = 0.0
     for c in range(k):
         start = n * (1 + c)
         square = 0.0
         for i in range(start, start + n):
             square += y[i] * y[i]
-        longest = max(longest, math.sqrt(square))
+        whole = math.sqrt(square)
+        longest = max(longest, whole)
         for _ in range(2):
             for other in range(n, start, n):
                 dot = 0.0
@@ -43,14 +68,72 @@ def orthonormalise(y, n, k, growth, threshold):
         length = math.sqrt(square)
         if length > threshold * longest and length > 0.0:
             growth[c] += math.log(length)
+            indistinct += 1 if length < COLLAPSED * whole else 0
             for i in range(start, start + n):
                 y[i] /= length
         else:
-            collapsed += 1 if growth[c] != -math.inf else 0
             growth[c] = -math.inf
             for i in range(start, start + n):
                 y[i] = 0.0
-    return collapsed
+    return indistinct
+
+
+@njit(**KERNEL)
+def independence(y, n, k, gram):
+    """Square of the product of the sines between each of ``k`` tangent vectors and the span of those before.
+
+    It is 1 if they are orthogonal, 0 if they are linearly dependent, and -1 if the length of one is near the
+    limits of floating-point numbers. Zero vectors count for nothing. ``gram``, at least ``(k, k)``, is
+    scratch for the Cholesky factorisation of the Gram matrix, without square roots: the quotients are below
+    its diagonal, the numerators above.
+    """
+    product = 1.0
+    for c in range(k):
+        start = n * (1 + c)
+        square = 0.0
+        for i in range(start, start + n):
+            square += y[i] * y[i]
+        if square != 0.0 and not SHORTEST_SQUARE < square < LONGEST_SQUARE:
+            return -1.0
+        rest = square
+        for d in range(c):
+            other = n * (1 + d) - start
+            numerator = 0.0
+            for i in range(start, start + n):
+                numerator += y[i] * y[other + i]
+            for e in range(d):
+                numerator -= gram[c, e] * gram[e, d]
+            quotient = numerator / gram[d, d] if gram[d, d] > 0.0 else 0.0
+            gram[c, d], gram[d, c] = quotient, numerator
+            rest -= quotient * numerator
+        gram[c, c] = rest
+        if square > 0.0:
+            product *= max(rest, 0.0) / square
+    return product
+
+
+@njit(**KERNEL)
+def keep_apart(run, n, tangents, closest, gram):
+    """Orthonormalise the tangent vectors of a run where ``independence`` is not above ``closest``."""
+    if independence(run.y, n, tangents, gram) > closest:
+        return
+    run.count[INDISTINCT] += orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    run.clock[STRAIN] = 0.0
+    if run.count[PHASE_OF_RUN] == READY:
+        run.count[PHASE_OF_RUN] = STALE
+
+
+@njit(**KERNEL)
+def keep_apart_after_step(model, run, mode, tangents, gram):
+    """``keep_apart`` after a step, with the limit that fits its propagator."""
+    kind, closest = model.propagator[mode], CLOSE_IN_TAYLOR
+    if kind == EXACT:
+        closest = CLOSE_IN_EXACT
+    elif kind == RUNGE_KUTTA:
+        closest = CLOSE_IN_RUNGE_KUTTA
+    elif kind == DESINGULARISED and run.count[STEPS] - run.count[STEPS_AT_ENTRY] < STEPS_OF_CONTACT:
+        return
+    keep_apart(run, model.dimension, tangents, closest, gram)
 
 
 @njit(**KERNEL)
