@@ -324,7 +324,7 @@ class _Shooting:
         shift = self._quiet_time(guess)
         shooting, moved = self._moved(guess, shift)
         orbit = shooting.newton(moved, True, tolerance, max_iterations)
-        if orbit.status.ok and orbit.period < SHORTEST_PERIOD * guess.period:
+        if orbit.period < SHORTEST_PERIOD * guess.period:
             # Every point closes after no time at all.
             status = Status(
                 StatusCode.NOT_CONVERGED,
