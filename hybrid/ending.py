@@ -74,6 +74,13 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
         jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
         return discontinuous_status({mode: where for mode, where in jumping if where})
+    if trajectory.tangents and code == codes.DONE and count[codes.INDISTINCT]:
+        return Status(
+            StatusCode.INDISTINCT_TANGENTS,
+            f"{count[codes.INDISTINCT]} times only rounding was left of what tells the tangent vectors apart; "
+            "the exponents after the first are not known.",
+            "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
+        )
     if code == codes.DONE and ambiguous:
         also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""
         return Status(

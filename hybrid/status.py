@@ -31,6 +31,7 @@ class StatusCode(IntEnum):
     NOT_RUN = 102
     DISCONTINUOUS_FIELD = 103
     INTERRUPTED = 104
+    INDISTINCT_TANGENTS = 105
 
 
 @attrs.frozen
