@@ -77,8 +77,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if trajectory.tangents and code == codes.DONE and count[codes.INDISTINCT]:
         return Status(
             StatusCode.INDISTINCT_TANGENTS,
-            f"{count[codes.INDISTINCT]} times only rounding was left of what tells the tangent vectors apart; "
-            "the exponents after the first are not known.",
+            f"{count[codes.INDISTINCT]} times only rounding was left of what tells the tangent vectors "
+            "apart; the exponents after the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
     if code == codes.DONE and ambiguous:

@@ -48,15 +48,16 @@ class ProductEigenvalues:
     @property
     def values(self) -> np.ndarray:
         """The eigenvalues ``(n,)``, real if all of them are; those out of range are zero or infinite."""
-        with np.errstate(over="ignore", under="ignore"):
+        units = self.phases
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             moduli = np.exp(self.log_moduli)
-        if np.all(self.phases.imag == 0):
-            return np.asarray(moduli * self.phases.real)
-        # Component by component: infinity times 0j would be nan.
-        values = np.empty(len(moduli), dtype=complex)
-        values.real = np.where(self.phases.real == 0, 0.0, moduli * self.phases.real)
-        values.imag = np.where(self.phases.imag == 0, 0.0, moduli * self.phases.imag)
-        return values
+            if np.all(units.imag == 0):
+                return np.asarray(moduli * units.real)
+            # Component by component: infinity times zero would be nan.
+            values = np.empty(len(moduli), dtype=complex)
+            values.real = np.where(units.real == 0, 0.0, moduli * units.real)
+            values.imag = np.where(units.imag == 0, 0.0, moduli * units.imag)
+            return values
 
 
 def product_eigenvalues(factors: Sequence[np.ndarray] | np.ndarray) -> ProductEigenvalues:

@@ -113,6 +113,88 @@ class TestAutonomous:
         assert orbit.signature == ("turn",)
 
 
+def van_der_pol():
+    """The limit cycle of mu = 1 with its centre and its size anywhere."""
+
+    def field(t, x, p):
+        q = (x.x - p.offset) / p.size
+        return x.y, (1 - q**2) * x.y - (x.x - p.offset)
+
+    return HybridSystem(
+        state=("x", "y"), parameters={"offset": 0.0, "size": 1.0}, modes=[Mode("turn", field)]
+    )
+
+
+class TestOwnScale:
+    """An orbit closes on the scale of its own motion, wherever it is and whatever the units."""
+
+    @pytest.mark.parametrize(
+        ("offset", "size"), [(0.0, 1.0), (1e6, 1.0), (-30.0, 1e-3), (0.0, 1e-9), (0.0, 1e9)]
+    )
+    def test_far_from_the_origin_and_tiny(self, offset, size):
+        parameters = {"offset": offset, "size": size}
+        orbit = periodic_orbit(van_der_pol(), (offset + 2 * size, 0.0), parameters=parameters, period=6.6)
+        assert orbit.status.ok
+        assert orbit.period == pytest.approx(6.66328685933, rel=1e-7)
+        # Of a millionth of the offset the tolerance of the states leaves fewer digits.
+        atol = 1e-6 if offset else 1e-9
+        np.testing.assert_allclose(np.log(orbit.multipliers) / orbit.period, [0.0, -1.05937699], atol=atol)
+
+    def test_one_component_a_billion_times_smaller_than_the_other(self):
+        """Closed in the units of each component, not in those of the largest."""
+        system = HybridSystem(
+            state=("q", "v"),
+            parameters={"unit": 1e-9},
+            modes=[Mode("on", lambda t, x, p: (p.unit * x.v, -x.q / p.unit - x.v + np.cos(t)))],
+            period=2 * np.pi,
+        )
+        orbit = periodic_orbit(system, (3e-9, 5.0))
+        assert orbit.status.ok
+        np.testing.assert_allclose(orbit.x0, [0.0, 1.0], atol=1e-9)
+        assert abs(orbit.x0[0]) < 1e-18
+
+    def test_an_equilibrium_repeats_after_each_forcing_period(self):
+        system = HybridSystem(
+            state=("q",),
+            parameters={"rest": 5.0},
+            modes=[Mode("on", lambda t, x, p: (p.rest - x.q,))],
+            period=1.0,
+        )
+        for rest in (5.0, 0.0):
+            orbit = periodic_orbit(system, (0.3,), parameters={"rest": rest})
+            assert orbit.status.ok
+            assert orbit.x0[0] == pytest.approx(rest, rel=1e-14, abs=1e-14)
+            assert orbit.multipliers[0] == pytest.approx(math.exp(-1), rel=1e-10)
+
+    def test_states_that_only_jumps_change(self):
+        """Once a period ``q`` becomes ``1 - q / 2``; between the jumps it rests. Fixed point 2/3."""
+        system = HybridSystem(
+            state=("q",),
+            modes=[Mode("rest", lambda t, x, p: (0.0,))],
+            transitions=[
+                hybrid.Transition(
+                    "rest",
+                    "rest",
+                    hybrid.Guard(lambda t, x, p: np.sin(2 * np.pi * (t - 0.3)), +1),
+                    hybrid.Reset(lambda t, x, p: (1 - x.q / 2,)),
+                )
+            ],
+            period=1.0,
+        )
+        once = periodic_orbit(system, (0.1,))
+        assert once.status.ok
+        assert once.x0[0] == pytest.approx(2 / 3, rel=1e-12)
+        assert once.multipliers[0] == pytest.approx(-0.5, rel=1e-12)
+
+    def test_one_of_a_family_of_orbits(self):
+        """Newton's step is arbitrary along the family of a pendulum, and the orbit is one all the same."""
+        pendulum = HybridSystem(state=("q", "v"), modes=[Mode("swing", lambda t, x, p: (x.v, -np.sin(x.q)))])
+        orbit = periodic_orbit(pendulum, (1.0, 0.0), period=6.7)
+        assert orbit.status.ok
+        arc = orbit.arc()
+        np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-9)
+
+
 class TestNoOrbit:
     def test_says_how_far_it_got(self):
         orbit = periodic_orbit(OSCILLATOR, (0.0, 0.0), max_iterations=1)
@@ -129,6 +211,54 @@ class TestNoOrbit:
 
     def test_a_ball_that_loses_energy_has_none(self):
         orbit = periodic_orbit(bouncing_ball(), (1.0, 0.0), period=1.0)
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+
+    def test_an_orbit_that_ends_in_another_mode_is_none(self):
+        """The states agree after one period, and only the mode tells that the orbit has not closed."""
+        guard = hybrid.Guard(lambda t, x, p: np.sin(2 * np.pi * t), +1)
+        system = HybridSystem(
+            state=("q",),
+            modes=[Mode("a", lambda t, x, p: (1 - x.q,)), Mode("b", lambda t, x, p: (1 - x.q,))],
+            transitions=[hybrid.Transition("a", "b", guard)],
+            period=1.0,
+        )
+        first = periodic_orbit(system, (1.0,), mode="a", t0=0.25)
+        assert first.status.code == StatusCode.NOT_CONVERGED
+        assert "the orbit ends in mode 'b' and starts in 'a'" in first.status.message
+        later = periodic_orbit(system, (0.7,), mode="b", t0=0.25)
+        assert later.status.ok
+        np.testing.assert_allclose(later.x0, 1.0, rtol=1e-12)
+
+    @pytest.mark.parametrize("guess", [(0.0, 0.0), (1.0, 2.0)])
+    @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+    def test_an_orbit_at_infinity_is_none(self, guess, unit):
+        """Forced at resonance the amplitude grows for ever; so far out that the ends agree in 13 digits."""
+        system = HybridSystem(
+            state=("q", "v"),
+            parameters={"unit": 1.0},
+            modes=[Mode("on", lambda t, x, p: (x.v, -x.q + p.unit * np.cos(t)))],
+            period=2 * np.pi,
+        )
+        orbit = periodic_orbit(system, np.array(guess) * unit, parameters={"unit": unit})
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+        assert "no orbit is near" in orbit.status.message
+
+    @pytest.mark.parametrize("rate", [lambda q: np.exp(-q), lambda q: 1 / (1 + q**2), lambda q: 1e-9 + 0 * q])
+    @pytest.mark.parametrize("forced", [True, False])
+    def test_a_solution_that_drifts_ever_more_slowly_is_none(self, rate, forced):
+        period = {"period": 1.0}
+        system = HybridSystem(
+            state=("q",), modes=[Mode("on", lambda t, x, p: (rate(x.q),))], **(period if forced else {})
+        )
+        orbit = periodic_orbit(system, (1.0,), **({} if forced else period))
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+
+    @pytest.mark.parametrize("guess", [(0.0, 0.0), (1e-9, 0.0), (1e-3, 0.0)])
+    @pytest.mark.parametrize("offset", [0.0, 5.0])
+    def test_an_equilibrium_is_no_orbit_of_an_autonomous_system(self, guess, offset):
+        orbit = periodic_orbit(
+            van_der_pol(), (offset + guess[0], guess[1]), parameters={"offset": offset}, period=6.6
+        )
         assert orbit.status.code == StatusCode.NOT_CONVERGED
 
     @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Eigenvalues of products of matrices against the product in many digits, which no float could hold."""
 
+from itertools import pairwise
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -53,7 +55,7 @@ def test_eigenvalues_three_hundred_orders_of_magnitude_apart(n):
     frames.append(frames[0])
     sizes = 10.0 ** -np.linspace(0, 5, n)
     factors, logs, signs = [], np.zeros(n), np.ones(n)
-    for before, after in zip(frames[:-1], frames[1:], strict=True):
+    for before, after in pairwise(frames):
         diagonal = sizes * rng.uniform(0.5, 2, n) * rng.choice([-1, 1], n)
         upper = np.triu(rng.normal(size=(n, n)), 1) * sizes[:, None]
         factors.append(after @ (upper + np.diag(diagonal)) @ before.T)
@@ -71,9 +73,7 @@ def test_a_pair_of_equal_moduli_and_opposite_signs():
     frames.append(frames[0])
     step = np.diag([1.0, 1.0, 1e-5, 1e-5])
     last = np.diag([1.0, -1.0, 1e-5, -1e-5])
-    factors = [
-        b @ (last if i == 39 else step) @ a.T for i, (a, b) in enumerate(zip(frames, frames[1:], strict=False))
-    ]
+    factors = [b @ (last if i == 39 else step) @ a.T for i, (a, b) in enumerate(pairwise(frames))]
     found = product_eigenvalues(factors)
     np.testing.assert_allclose(found.values, [1.0, -1.0, 1e-200, -1e-200], rtol=1e-10)
     assert found.values.dtype == float

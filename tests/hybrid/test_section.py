@@ -178,3 +178,25 @@ class TestPoincare:
     def test_bad_arguments(self, guard, points, text):
         with pytest.raises(hybrid.ArgumentError, match=text):
             poincare_section(BALL, (1.0, 0.0), guard, points=points)
+
+
+def test_counts_of_more_jumps_than_fit_into_one_burst():
+    """A clock that ticks a thousand times between two points of the section."""
+    clock = hybrid.HybridSystem(
+        state=("q", "c"),
+        modes=[hybrid.Mode("on", lambda t, x, p: (1.0, 1.0))],
+        transitions=[
+            hybrid.Transition(
+                "on",
+                "on",
+                Guard(lambda t, x, p: x.c - 1e-3, +1),
+                hybrid.Reset(lambda t, x, p: (x.q, 0.0)),
+                name="tick",
+            )
+        ],
+    )
+    section = poincare_section(
+        clock, (0.0, 0.5e-3), Guard(lambda t, x, p: np.sin(2 * np.pi * (x.q - 0.25)), +1), points=4
+    )
+    assert section.jumps.tolist() == [250, 1000, 1000, 1000]
+    np.testing.assert_allclose(section.t, [0.25, 1.25, 2.25, 3.25], atol=1e-12)

@@ -13,12 +13,18 @@ from hybrid.load import load_kernels
 KERNELS = load_kernels("hybrid.kernels.tangent")
 _orthonormalise, _log_abs_determinant = KERNELS.orthonormalise, KERNELS.log_abs_determinant
 _solve, _strain = KERNELS.solve, KERNELS.strain
+_independence_kernel = KERNELS.independence
 COLLAPSED = KERNELS.COLLAPSED
 
 
 @njit
 def _run(y, n, k, growth, threshold):
     return _orthonormalise(y, n, k, growth, threshold)
+
+
+@njit
+def _independence(y, n, k, gram):
+    return _independence_kernel(y, n, k, gram)
 
 
 @njit
@@ -32,13 +38,13 @@ def _determinant(matrix, magnitude):
 
 
 def orthonormalise(vectors, threshold=0.0, growth=None):
-    """``(Q, growth, collapsed)`` of the columns of ``vectors``."""
+    """``(Q, growth, indistinct)`` of the columns of ``vectors``."""
     n, k = vectors.shape
     y = np.concatenate([np.full(n, 7.0), vectors.T.ravel()])
     growth = np.zeros(k) if growth is None else growth
-    collapsed = _run(y, n, k, growth, threshold)
+    indistinct = _run(y, n, k, growth, threshold)
     assert np.all(y[:n] == 7.0), "the state was touched"
-    return y[n:].reshape(k, n).T, growth, collapsed
+    return y[n:].reshape(k, n).T, growth, indistinct
 
 
 def log_determinant(matrix, magnitude=None):
@@ -57,12 +63,12 @@ def tall_matrices(draw):
 
 @given(tall_matrices())
 def test_is_the_qr_decomposition_with_a_positive_diagonal(matrix):
-    q, growth, collapsed = orthonormalise(matrix)
+    q, growth, indistinct = orthonormalise(matrix)
     expected_q, expected_r = np.linalg.qr(matrix)
     signs = np.sign(np.diag(expected_r))
     np.testing.assert_allclose(q, expected_q * signs, atol=1e-9)
     np.testing.assert_allclose(growth, np.log(np.abs(np.diag(expected_r))), atol=1e-9)
-    assert collapsed == 0
+    assert indistinct == 0
 
 
 @given(tall_matrices())
@@ -86,28 +92,51 @@ def test_growth_adds_up():
 
 @pytest.mark.parametrize("threshold", [0.0, COLLAPSED])
 def test_a_zero_vector_has_collapsed(threshold):
-    q, growth, collapsed = orthonormalise(np.array([[2.0, 0.0], [0.0, 0.0]]), threshold)
+    q, growth, indistinct = orthonormalise(np.array([[2.0, 0.0], [0.0, 0.0]]), threshold)
     np.testing.assert_array_equal(q, [[1.0, 0.0], [0.0, 0.0]])
     assert growth[1] == -math.inf
-    assert collapsed == 1
+    assert indistinct == 0
 
 
 def test_what_a_projection_leaves_of_a_direction_is_rounding():
     """Both images lie on one line up to rounding, as after a catch; only their part off it is dropped."""
     image = np.array([[0.3, 0.7], [0.6, 1.4 + 3e-16]])
-    _, growth, collapsed = orthonormalise(image, COLLAPSED)
+    _, growth, indistinct = orthonormalise(image, COLLAPSED)
     assert growth[1] == -math.inf
-    assert collapsed == 1
-    _, growth, collapsed = orthonormalise(np.array([[1.0, 0.0], [0.0, 1e-9]]), COLLAPSED)
+    assert indistinct == 0
+    _, growth, indistinct = orthonormalise(np.array([[1.0, 0.0], [0.0, 1e-9]]), COLLAPSED)
     assert growth[1] == pytest.approx(math.log(1e-9))
-    assert collapsed == 0
+    assert indistinct == 0
 
 
-def test_a_collapse_is_counted_once():
+def test_vectors_that_only_rounding_tells_apart_are_counted():
+    """Without a threshold none collapses, and what is left of the second is no direction of the flow."""
+    _, growth, indistinct = orthonormalise(np.array([[0.3, 0.7], [0.6, 1.4 + 3e-16]]))
+    assert math.isfinite(growth[1])
+    assert indistinct == 1
+
+
+def test_a_zero_vector_stays_minus_infinity():
     growth = np.array([0.0, -math.inf])
-    _, _, collapsed = orthonormalise(np.array([[1.0, 0.0], [0.0, 0.0]]), growth=growth)
-    assert collapsed == 0
+    _, _, indistinct = orthonormalise(np.array([[1.0, 0.0], [0.0, 0.0]]), growth=growth)
+    assert indistinct == 0
     assert growth[1] == -math.inf
+
+
+@given(tall_matrices())
+def test_independence_is_the_square_of_the_product_of_the_sines(matrix):
+    """The squares of the diagonal of ``R`` over those of the columns' lengths."""
+    n, k = matrix.shape
+    diagonal = np.diag(np.linalg.qr(matrix)[1])
+    expected = np.prod(diagonal**2 / (matrix**2).sum(axis=0))
+    y = np.concatenate([np.zeros(n), matrix.T.ravel()])
+    assert _independence(y, n, k, np.empty((n, n + 1))) == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("length", [1e-120, 1e120])
+def test_independence_tells_lengths_near_the_limits_of_numbers(length):
+    y = np.array([0.0, 0.0, length, 0.0, 0.0, 1.0])
+    assert _independence(y, 2, 2, np.empty((2, 3))) == -1.0
 
 
 @given(st.integers(1, 7), st.integers(0, 2**32 - 1))
