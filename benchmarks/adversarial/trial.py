@@ -24,6 +24,7 @@ SCIPY = "SciPy DOP853"
 METHODS = (*SOLVERS, SCIPY)
 # SciPy's are slow: one run in so many.
 SCIPY_SHARE = 16
+SCIPY_OPTIONS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
 # Guards of one model: alone, and beside others whose events cut the steps.
 SIZES = (1, 1, 2, 4)
 MOST_JUMPS = 2000
@@ -169,10 +170,14 @@ def scipy_runs(made: Structure, samples: int) -> list[Found]:
 
             event.direction = guard.direction  # type: ignore[attr-defined]
             events.append(event)
-        with np.errstate(all="ignore"):
-            run = solve_ivp(
-                field, (0.0, made.flow.end), x0[k], method="DOP853", rtol=1e-10, atol=1e-12, events=events
-            )
+        try:
+            with np.errstate(all="ignore"):
+                run = solve_ivp(field, (0.0, made.flow.end), x0[k], events=events, **SCIPY_OPTIONS)
+        except RuntimeError:
+            # Its root finder gave up: nothing comes of the run.
+            for one in found:
+                one.end(k, 0.0, x0[k], False)
+            continue
         for i, one in enumerate(found):
             times, states = run.t_events[i], np.reshape(run.y_events[i], (-1, n))
             one.add(k, times, states)
