@@ -328,6 +328,8 @@ def compared(
     good = {number: drawn for number, drawn in draws if drawn is not None}
     firings = sum(len(drawn.truth.fired) for drawn in good.values() if drawn.truth.ending != "stuck")
     for method in methods:
+        # Compiled before a run is watched.
+        simulate(made.system, [0.0] * len(STATES), (0.0, 0.0), mode="m0", solver=SOLVERS[method])
         began, differences = time.perf_counter(), []
         for number, drawn in good.items():
             if number in left_out.get(method, ()):
