@@ -190,16 +190,16 @@ class CompiledSystem:
 
         system = self.system
         transitions = system.transitions
-        first_outgoing, outgoing = _leaving(system, at_entry=False)
-        first_at_entry, at_entry = _leaving(system, at_entry=True)
+        first_outgoing, outgoing = _leaving(system, at_start=False)
+        first_at_start, at_start = _leaving(system, at_start=True)
         return Model(
             **dict(zip(ROLES, self.roles, strict=True)),
             parameters=system.parameter_values(),
             dimension=system.dimension,
             first_outgoing=first_outgoing,
             outgoing=outgoing,
-            first_at_entry=first_at_entry,
-            at_entry=at_entry,
+            first_at_start=first_at_start,
+            at_start=at_start,
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             affine_guard=_indices(self.emitted.affine_guard),
@@ -228,7 +228,7 @@ class CompiledSystem:
         return not emitted.autonomous[mode] or any(timed for each, timed in pairs if each.source == name)
 
 
-def _leaving(system: HybridSystem, *, at_entry: bool) -> tuple[np.ndarray, np.ndarray]:
+def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.ndarray]:
     """First places, and the indices of the transitions that leave each mode, whose guards are of one kind."""
     indices: list[int] = []
     first = [0]
@@ -236,7 +236,7 @@ def _leaving(system: HybridSystem, *, at_entry: bool) -> tuple[np.ndarray, np.nd
         indices += [
             i
             for i, transition in enumerate(system.transitions)
-            if transition.source == name and transition.guard.at_entry == at_entry
+            if transition.source == name and transition.guard.at_start == at_start
         ]
         first.append(len(indices))
     return _indices(first), _indices(indices)

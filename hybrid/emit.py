@@ -298,7 +298,7 @@ def _boundaries(
             _is_affine(written, symbols.variables),
         )
         for transition, written in zip(system.transitions, guards, strict=True)
-        if transition.source == mode and not transition.guard.at_entry
+        if transition.source == mode and not transition.guard.at_start
     ]
 
 

@@ -11,6 +11,9 @@ import numpy as np
 from hybrid.errors import ModelError
 from hybrid.system import Guard, HybridSystem, Mode, ModelFunction, Reset, Transition, as_parameters, as_state
 
+# A start in the sliding mode that is further from the surface than this share of the state does not slide.
+# What the integration lets the state drift while it slides is far less, so that a run can be taken up again.
+SLIDING_BAND = 1e-6
 # Two fields that both move through the surface slower than this share of their speeds are tangent to it.
 TANGENT = 1e-9
 # An orbit that comes to the surface slower than this share of its speed, and turns back, only touches it.
@@ -63,7 +66,8 @@ def filippov(
     HybridSystem
         Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run, and
         ``below too high``, ``above too low``, ``sliding too high`` and ``sliding too low``: a start takes one
-        of them if it lies off the surface, by more than rounding, where its mode does not belong.
+        of them if it lies off the surface where its mode does not belong, by more than rounding, or, in the
+        sliding mode, by more than 1e-6 of the state's largest component.
 
     Raises
     ------
@@ -108,8 +112,8 @@ def filippov(
         transitions = [
             _entered("below", "above", switching),
             _entered("above", "below", switching),
-            _entered("sliding", "above", switching),
-            _entered("sliding", "below", switching),
+            _entered("sliding", "above", switching, surface.is_off),
+            _entered("sliding", "below", switching, surface.is_off),
             Transition("below", "sliding", Guard(switching, +1, when=surface.arrives_from_below)),
             Transition("below", "above", Guard(switching, +1, when=surface.crosses_up)),
             Transition("above", "sliding", Guard(switching, -1, when=surface.arrives_from_above)),
@@ -226,6 +230,14 @@ class _Surface:
         slope, speed = self.gradient(t, x, p)[:-1], [*velocity]
         return np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
 
+    def is_off(self, t: Any, x: Any, p: Any) -> Any:
+        """Whether a state is too far from the surface to slide, measured by its own size."""
+        largest = np.abs(x[0])
+        for value in x[1:]:
+            largest = np.maximum(largest, np.abs(value))
+        slope = _dot([np.abs(each) for each in self.gradient(t, x, p)[:-1]], [1.0] * len(x), 0.0)
+        return np.abs(self.switching(t, x, p)) > SLIDING_BAND * slope * largest
+
     def projection(self, t: Any, x: Any, p: Any) -> list[Any]:
         """The nearest point of the surface, to first order."""
         normal = self.gradient(t, x, p)[:-1]
@@ -293,10 +305,12 @@ def _rate(gradient: ModelFunction, field: ModelFunction) -> ModelFunction:
     return rate
 
 
-def _entered(source: str, target: str, switching: ModelFunction) -> Transition:
+def _entered(
+    source: str, target: str, switching: ModelFunction, when: ModelFunction | None = None
+) -> Transition:
     """Where a start off the surface goes that names a mode which does not belong there."""
     direction, place = (+1, "high") if target == "above" else (-1, "low")
-    guard = Guard(switching, direction, at_entry=True)
+    guard = Guard(switching, direction, at_start=True, when=when)
     return Transition(source, target, guard, name=f"{source} too {place}")
 
 

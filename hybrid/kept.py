@@ -90,7 +90,7 @@ def operations_of(system: HybridSystem) -> str | None:
             transition.target,
             transition.accumulates_to,
             int(transition.guard.direction),
-            transition.guard.at_entry,
+            transition.guard.at_start,
             transition.guard.when is None,
             transition.reset is None,
         ]

@@ -70,15 +70,14 @@ class Guard(Portable):
         Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if it is positive
         (or true) there, and is passed as if there were no guard if not. It is asked at crossings and at the
         entry of the mode only, and need not be continuous.
-    at_entry
-        True for a guard whose crossings are not looked for: its transition fires only where a state enters
-        the mode, or starts in it, beyond the guard by more than rounding. ``direction`` says which side that
-        is.
+    at_start
+        True for a guard whose crossings are not looked for: its transition fires only where a run starts in
+        the mode, beyond the guard by more than rounding. ``direction`` says which side that is.
 
     Raises
     ------
     ModelError
-        If a given function is not callable, ``direction`` is none of -1, 0, +1, or ``at_entry`` is no bool or
+        If a given function is not callable, ``direction`` is none of -1, 0, +1, or ``at_start`` is no bool or
         comes without a direction.
     """
 
@@ -86,15 +85,15 @@ class Guard(Portable):
     direction: int = attrs.field(default=0)
     gradient: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
     when: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
-    at_entry: bool = attrs.field(default=False, kw_only=True)
+    at_start: bool = attrs.field(default=False, kw_only=True)
 
-    @at_entry.validator
-    def _check_at_entry(self, attribute: attrs.Attribute[bool], value: object) -> None:
+    @at_start.validator
+    def _check_at_start(self, attribute: attrs.Attribute[bool], value: object) -> None:
         if not isinstance(value, bool):
-            raise ModelError(f"Guard: at_entry must be True or False; got {value!r}.")
+            raise ModelError(f"Guard: at_start must be True or False; got {value!r}.")
         if value and self.direction == 0:
             raise ModelError(
-                "Guard: at_entry=True needs direction -1 or +1, the side that the mode excludes."
+                "Guard: at_start=True needs direction -1 or +1, the side that the mode excludes."
             )
 
     @direction.validator

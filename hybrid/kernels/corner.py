@@ -29,7 +29,7 @@ from hybrid.kernels.guards import (
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
-from hybrid.kernels.sides import FLOWED, LANDED, STARTED, beyond_at_entry, end_instant, take_sides
+from hybrid.kernels.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 
 MOST_JUMPS = 50
 # States that differ by less than this, relative to their sizes, came out the same.
@@ -41,7 +41,7 @@ def enter(model, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
     One whose guard a reset has taken the state beyond is locked to this instant, not to its guard.
-    Transitions that only an entry fires come before all others.
+    Transitions that only the start of a run fires come before all others.
     """
     mode, t, left = run.count[MODE], run.clock[PHASE], run.count[PREVIOUS_MODE]
     if run.count[STEPS] == 0:
@@ -50,7 +50,7 @@ def enter(model, run, work):
     came = STARTED if left == NO_MODE else LANDED
     fired = run.count[LAST_FIRED] if run.count[JUMPS] > 0 else NO_TRANSITION
     fires = take_sides(model, run, mode, t, run.y, came, left, fired, run.side, run.due, run.on_guard, work)
-    excluded = beyond_at_entry(model, run, mode, t, work)
+    excluded = beyond_at_start(model, run, mode, t, work) if came == STARTED else NO_TRANSITION
     if excluded != NO_TRANSITION:
         run.count[LOCKED] = 1
         return excluded

@@ -49,8 +49,8 @@ class Model(Structure):
 
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
     which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
-    transitions that leave mode ``m``, in the order they were listed, but for those that only its entry fires:
-    these are in ``at_entry[first_at_entry[m]:first_at_entry[m + 1]]``. ``target`` is -1 for one that ends the
+    transitions that leave mode ``m``, in the order they were listed, but for those that only a start fires:
+    these are in ``at_start[first_at_start[m]:first_at_start[m + 1]]``. ``target`` is -1 for one that ends the
     run. ``affine_guard`` is 1 for a guard that is affine in state and time, ``guard_in_series`` for one that
     the series of its mode hold in a column; ``bound`` and ``spread`` run the ``programs`` of the others.
     Transitions with the same ``surface`` have the same guard up to a factor, its sign the product of their
@@ -74,8 +74,8 @@ class Model(Structure):
     dimension: int64
     first_outgoing: INDICES
     outgoing: INDICES
-    first_at_entry: INDICES
-    at_entry: INDICES
+    first_at_start: INDICES
+    at_start: INDICES
     target: INDICES
     direction: INDICES
     affine_guard: INDICES

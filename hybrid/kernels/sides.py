@@ -168,10 +168,10 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
 
 
 @njit(**KERNEL)
-def beyond_at_entry(model, run, mode, t, work):
-    """A transition that only the entry of a mode fires, if the state lies beyond its guard; else none."""
-    for slot in range(model.first_at_entry[mode], model.first_at_entry[mode + 1]):
-        transition = model.at_entry[slot]
+def beyond_at_start(model, run, mode, t, work):
+    """A transition that only the start of a run fires, if the state lies beyond its guard; else none."""
+    for slot in range(model.first_at_start[mode], model.first_at_start[mode + 1]):
+        transition = model.at_start[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
         beyond = value * model.direction[transition] > rounding_band(model, run, transition, t, run.y, work)
         if beyond and allowed(model, transition, t, run.y, work.scalar):

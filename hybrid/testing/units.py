@@ -118,7 +118,7 @@ def _measured(system: HybridSystem) -> Measured:
                 original(transition.guard.function),
                 transition.guard.direction,
                 when=None if transition.guard.when is None else original(transition.guard.when),
-                at_entry=transition.guard.at_entry,
+                at_start=transition.guard.at_start,
             ),
             reset=None if transition.reset is None else Reset(longer(transition.reset.function)),
         )

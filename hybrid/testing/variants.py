@@ -195,7 +195,7 @@ def _freed(
             scaled_guard,
             transition.guard.direction,
             when=unaware(transition.guard.when),
-            at_entry=transition.guard.at_entry,
+            at_start=transition.guard.at_start,
             gradient=None if gradient is None else scaled_gradient,
         ),
         reset=None if transition.is_marker else Reset(map_off_guard),

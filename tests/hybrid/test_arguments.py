@@ -310,7 +310,7 @@ def table(made):
             {
                 "function": [None, *FUNCTION],
                 "direction": [None, "up", 2, 0.5, True, False, math.nan, [1], 1j],
-                "at_entry": FLAG,
+                "at_start": FLAG,
                 "gradient": FUNCTION,
                 "when": FUNCTION,
             },
