@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.kernels import codes
+from hybrid.load import load_kernels
 from hybrid.periods import check_time
 from hybrid.run import Trajectory, empty_record, record_layout, start
 from hybrid.solvers import RungeKutta
@@ -113,6 +114,9 @@ class _Recorder:
         # The state at the end is at hand without any polynomial.
         only_the_end = times is not None and not (times.size and times[0] < t1)
         self.steps_at_once = 0 if only_the_end else STEPS_AT_ONCE
+        if times is not None and self.steps_at_once:
+            # Compiled before the run, not in the middle of it, where an interrupt would meet the compiler.
+            load_kernels("hybrid.kernels.dense")
         n, degree = trajectory.model.dimension, trajectory.plan.degree
         self.layout = record_layout(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
         self.steps: list[tuple[np.ndarray, ...]] = []

@@ -83,7 +83,10 @@ def chart():
 
 hybrid.global_error(system, start, (0.0, 1.0), solver=slow)
 lyapunov.chart(system, {"c": [0.1]}, start, intervals=2, transient=0, section=1, threads=1)
+lyapunov.lyapunov_spectrum(system, start, intervals=1)
 lyapunov.two_orbit_exponents(system, start, intervals=1)
+hybrid.simulate(system, start, (0.0, 1.0), samples=[1.0])
+hybrid.stroboscopic_section(system, start, periods=1, solver=slow)
 hybrid.periodic_orbit(system, (0.9, 1.0), max_iterations=1)
 for name in sys.argv[1:]:
     print(name, flush=True)
@@ -124,7 +127,9 @@ def test_real_interrupts():
             sent = time.monotonic()
             child.send_signal(signal.SIGINT)
             found[name] = child.stdout.readline().rstrip("\n")
-            late[name] = float(child.stdout.readline()) - sent
+            done = child.stdout.readline()
+            assert done, f"{name}: {child.stderr.read()}"
+            late[name] = float(done) - sent
         assert child.wait(60) == 0
     finally:
         child.kill()
