@@ -85,7 +85,7 @@ hybrid.global_error(system, start, (0.0, 1.0), solver=slow)
 lyapunov.chart(system, {"c": [0.1]}, start, intervals=2, transient=0, section=1, threads=1)
 lyapunov.lyapunov_spectrum(system, start, intervals=1)
 lyapunov.two_orbit_exponents(system, start, intervals=1)
-hybrid.simulate(system, start, (0.0, 1.0), samples=[1.0])
+hybrid.simulate(system, start, (0.0, 1.0), samples=[0.5, 1.0])
 hybrid.stroboscopic_section(system, start, periods=1, solver=slow)
 hybrid.periodic_orbit(system, (0.9, 1.0), max_iterations=1)
 for name in sys.argv[1:]:
