@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels import codes
-from hybrid.run import Trajectory, split_time
+from hybrid.periods import split_time
+from hybrid.run import Trajectory
 
 # The tangent vectors are orthonormalised where their condition number is above this, or their size leaves the
 # range.
