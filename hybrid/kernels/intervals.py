@@ -294,7 +294,7 @@ def slope_of(code, low, high, least, most):
         below, above = sine(low, high)
         return -above, -below
     if code == op.ABSOLUTE:
-        return 1.0 if low >= 0.0 else -1.0, -1.0 if high <= 0.0 else 1.0
+        return 1.0 if low > 0.0 else -1.0, -1.0 if high < 0.0 else 1.0
     if code == op.SQRT:
         return quotient(0.5, 0.5, least, most)
     if code == op.LOG:
@@ -325,6 +325,9 @@ def slope_of(code, low, high, least, most):
 def slope_of_rare(code, low, high, least, most):
     """The same for functions that are seldom in guards."""
     if code == op.TAN:
+        if least == -math.inf:
+            # It jumps down at its pole.
+            return -math.inf, math.inf
         below, above = whole_power(least, most, 2)
         return 1.0 + below, 1.0 + above
     if code == op.NOT:

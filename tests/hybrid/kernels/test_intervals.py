@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
@@ -96,6 +96,7 @@ def intervals():
 
 
 @pytest.mark.parametrize("code", FUNCTIONS)
+@settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(intervals())
 def test_a_function_lies_within_its_bounds(code, case):
     low, high, u = case
@@ -119,6 +120,7 @@ def test_a_function_lies_within_its_bounds(code, case):
 
 
 @pytest.mark.parametrize("code", FUNCTIONS)
+@settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(intervals())
 def test_a_difference_is_at_most_the_slope_times_the_distance(code, case):
     low, _, u = case
