@@ -40,6 +40,8 @@ CLOSE = 1e-4
 # A piece lies within rounding if nowhere on it the guard is farther from zero than this many times the
 # rounding in its middle.
 WITHIN_ROUNDING = 4.0
+# A range is no wider than that of the middle if it is not wider by more than this factor.
+NO_BETTER = 1.01
 MOST_ROOT_STEPS = 200
 # A guard that is zero at the start of the step is not looked at before this share of the step.
 SETTLED = 64.0 * EPSILON
@@ -74,13 +76,16 @@ def root_in_bracket(model, transition, path, order, clock, start, pace, low, hig
         row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
         value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
         slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE])
+        if not abs(slope) < math.inf and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
+            # It jumps somewhere within rounding of this place: the event is beyond.
+            value = float(side)
         if value * side > 0.0:
             low = place
         else:
             high = place
         if value == 0.0 or high - low <= 2.0 * EPSILON * high:
             break
-        closer = place - value / slope if slope != 0.0 and math.isfinite(slope) else math.nan
+        closer = place - value / slope if 0.0 < abs(slope) < math.inf else math.nan
         change = abs(closer - place)
         if change <= EPSILON * high:
             return place
@@ -100,7 +105,7 @@ def _turn_between(model, transition, path, order, clock, start, pace, low, high,
     for place, towards in ((low, True), (high, False)):
         row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
         slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side
-        if not math.isfinite(slope) or (slope < 0.0) != towards:
+        if not abs(slope) < math.inf or (slope < 0.0) != towards:
             return NOWHERE
     while high - low > 2.0 * EPSILON * high:
         place = 0.5 * (low + high)
@@ -161,7 +166,8 @@ def first_change(
         monotone = row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
         nearest, farthest = min(abs(row[LOW]), abs(row[HIGH])), max(abs(row[LOW]), abs(row[HIGH]))
         rounding = WITHIN_ROUNDING * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
-        smooth = math.isfinite(row[MOST_SLOPE] - row[LEAST_SLOPE]) and low < middle < high and side != 0
+        bounded = -math.inf < row[LEAST_SLOPE] and row[MOST_SLOPE] < math.inf
+        smooth = bounded and low < middle < high and side != 0
         if clear and not (smooth and nearest <= CLOSE * farthest):
             sure = high
             top -= 1
@@ -172,7 +178,9 @@ def first_change(
                 model, method, run, transition, path, order, clock, start, pace, middle, work
             )
         shallow = smooth and not monotone and farthest <= max(rounding, tolerated)
-        splits = low < middle < high and high - low > EPSILON * length
+        # Halves of a piece on which the guard is no less certain than in its middle would tell no more.
+        tells = not row[HIGH] - row[LOW] <= NO_BETTER * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
+        splits = low < middle < high and high - low > EPSILON * length and tells
         if splits and not (clear or monotone or shallow):
             if pieces <= MOST_PIECES:
                 stack[top, 0] = middle

@@ -83,7 +83,7 @@ def finite(run, length):
     total = 0.0
     for i in range(length):
         total += abs(run.y[i])
-    return math.isfinite(total)
+    return total < math.inf
 
 
 @njit(

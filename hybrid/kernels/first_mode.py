@@ -22,7 +22,7 @@ def try_modes(parts, model, run, work, first, stop, verdicts):
         fires = parts.enter(model, run, work)
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
             transition = model.outgoing[slot]
-            if not math.isfinite(guard_value(model, transition, t, run.y, work.scalar)):
+            if not abs(guard_value(model, transition, t, run.y, work.scalar)) < math.inf:
                 return transition
             beyond = model.direction[transition] == run.side[transition] and run.on_guard[transition] == 0
             beyond = beyond and model.marker[transition] == 0 and model.paired[transition] == 0

@@ -59,6 +59,12 @@ def rounding_band(model, run, transition, t, x, work):
         share = ROUNDING_OF_STATE * EPSILON
         band = model.spread(model.programs, transition, t, x, run.scale, share, work.registers)
         return band if band >= 0.0 else 0.0
+    return smooth_band(model, run, t, work)
+
+
+@njit(**INLINE)
+def smooth_band(model, run, t, work):
+    """``rounding_band`` from the gradient alone, which is ``work.gradient``."""
     n = model.dimension
     size = abs(work.gradient[n] * t)
     for i in range(n):

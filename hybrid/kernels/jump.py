@@ -189,7 +189,7 @@ def judge(run, n, work):
         for j in range(n):
             largest = max(largest, abs(work.saltation[i, j]))
     run.clock[LARGEST_SALTATION] = max(run.clock[LARGEST_SALTATION], largest)
-    if not math.isfinite(largest):
+    if not largest < math.inf:
         run.count[SINGULAR_JUMPS] += 1
 
 

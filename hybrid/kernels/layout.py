@@ -282,7 +282,8 @@ ADVANCE = types.FunctionType(
     int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
 )
 
-# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning. Kernels
+# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning in
+# comparisons (``math.isfinite`` takes a difference of a number and itself, which is taken to be zero). Kernels
 # allocate nothing and own nothing, so no references are counted.
 _MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False}
 # Called from Python, and kept on disk: these state their signatures.

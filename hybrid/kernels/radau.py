@@ -112,7 +112,7 @@ def solve_stages(model, method, mode, t, h, y, work):
                     shift += method.a[stage, j] * change_of_stages[(j - 1) * n + i]
                 square += (h * shift / scale) ** 2
         change = math.sqrt(square / (n * s))
-        if not math.isfinite(change):
+        if not abs(change) < math.inf:
             return False
         if change <= enough:
             return True

@@ -15,6 +15,8 @@ from hybrid.kernels.step import attempt_again
 EULER_IS_ENOUGH = 1e-8
 # Newton's method converges to a simple root if its steps shrink faster than this.
 QUADRATIC = 0.1
+# Farthest Newton step, as a share of the step, for a guard that may have kinks and jumps.
+FARTHEST = 1e-3
 # First distance, as a share of the step, at which the other side of a guard is looked for.
 FIRST_REACH = 1e-10
 MOST_LANDINGS = 200
@@ -156,7 +158,9 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
         slow = trial > 2 and not abs(correction) <= 0.5 * last
         # A place that Newton's method has not led to says nothing of how fast that converges.
         last = 0.0
-        if low < newton < high and not slow:
+        # Beyond the error of an interpolant Newton's step follows something else, the slope beside a jump.
+        trusted = settled == 0 or abs(correction) <= FARTHEST * h
+        if low < newton < high and trusted and not slow:
             length, last = newton, abs(correction)
         elif before and after:
             length = 0.5 * (low + high)

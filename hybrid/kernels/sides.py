@@ -10,12 +10,17 @@ from hybrid.kernels.guards import (
     guard_speed,
     guard_value,
     rounding_band,
+    smooth_band,
     speed_rounding,
 )
 from hybrid.kernels.layout import KERNEL
 
 # How the state came to the point: a run starts there, the flow led there, or a reset put it there.
 STARTED, FLOWED, LANDED = range(3)
+# The order of a guard that jumps across zero.
+JUMPING = 4
+# A guard larger than this many times what rounding makes of it through its gradient jumps.
+SMOOTH = 4.0
 # A reset that keeps less than this share of a guard's speed holds a state that is pushed through the guard.
 KEPT = 1e-3
 
@@ -48,12 +53,17 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
 
     That order is 0 off the guard, 1 where its speed decides, 2 where the speed is zero up to rounding and the
     acceleration decides, 3 where that is zero too: then nothing has changed since the guard was last looked
-    at, if it was zero before, and else it counts as not yet crossed. ``work.field`` is current.
+    at, if it was zero before, and else it counts as not yet crossed. It is ``JUMPING`` where the guard jumps
+    across zero within the rounding of the state: its derivatives say nothing then. ``work.field`` is current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     trend, order = value, 0
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
+        if abs(value) > SMOOTH * smooth_band(model, run, t, work):
+            if was_on and before != 0:
+                return before, JUMPING
+            return 1 if value > 0.0 else -1, JUMPING
         trend, order = speed, 1
         if abs(speed) <= speed_rounding(model, run, mode, t, work):
             trend, order = guard_acceleration(model, run, transition, mode, t, x, work), 2
@@ -135,7 +145,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         if came == STARTED:
             crossed = order > 0 and direction != 0 and now == direction
         elif came == FLOWED:
-            crossed = order == 1 and before == -now and (direction == 0 or now == direction)
+            crossed = order in (1, JUMPING) and before == -now and (direction == 0 or now == direction)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
             # A guard that fires both ways and has been crossed has been taken back.
