@@ -7,6 +7,7 @@ import numpy as np
 from hybrid.kernels import codes
 from hybrid.periods import split_time
 from hybrid.run import Trajectory
+from hybrid.status import StatusCode
 
 # The tangent vectors are orthonormalised where their condition number is above this, or their size leaves the
 # range.
@@ -38,6 +39,8 @@ def fundamental_factors(trajectory: Trajectory, t: float) -> tuple[list[np.ndarr
         strained = False
 
     while True:
+        if trajectory.stop.is_set():
+            return factors, StatusCode.INTERRUPTED
         before = run.saved() if implicit else None
         steps = int(run.count[codes.STEPS])
         code = trajectory.advance_to(*place, record, max_steps=steps + 1, max_jumps=trajectory.jumps)

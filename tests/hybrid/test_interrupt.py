@@ -32,7 +32,7 @@ def kept(result, what):
     print(status.code.name if hasattr(status, "code") else "", what, flush=True)
 
 def simulate():
-    arc = hybrid.simulate(system, start, (0.0, 1e9), samples=[1.0, 1e9])
+    arc = hybrid.simulate(system, start, (0.0, 1e9), samples=[1.0, 1e9], max_jumps=10**9)
     kept(arc, len(arc.t))
 
 def dense():
@@ -40,7 +40,7 @@ def dense():
     kept(arc, arc.t[-1] > 100.0)
 
 def spectrum():
-    found = lyapunov.lyapunov_spectrum(system, start, interval=1e6, transient=0)
+    found = lyapunov.lyapunov_spectrum(system, start, interval=1e8, transient=0)
     kept(found, found.intervals)
 
 def long_spectrum():
@@ -48,7 +48,7 @@ def long_spectrum():
     kept(found, found.intervals > 100 and abs(found.sum_defect) < 1e-6)
 
 def two_orbits():
-    found = lyapunov.two_orbit_exponents(system, start, interval=1e6)
+    found = lyapunov.two_orbit_exponents(system, start, interval=1e8)
     kept(found, found.intervals)
 
 def strobe():
@@ -74,11 +74,11 @@ def work():
     kept(found, found.status.tolist())
 
 def compared():
-    found = lyapunov.compare_models({"a": system, "b": system}, start, reference="a", interval=1e6)
+    found = lyapunov.compare_models({"a": system, "b": system}, start, reference="a", interval=1e8)
     kept(found, found.status.code.name)
 
 def chart():
-    found = lyapunov.chart(system, {"c": [0.1, 0.2, 0.3]}, start, interval=1e5, transient=0, threads=2)
+    found = lyapunov.chart(system, {"c": [0.1, 0.2, 0.3]}, start, interval=1e8, transient=0, threads=2)
     kept(None, {status.code.name for status in found.status})
 
 hybrid.global_error(system, start, (0.0, 1.0), solver=slow)
@@ -123,18 +123,19 @@ def test_real_interrupts():
         for name in CALLS:
             line = child.stdout.readline().strip()
             assert line == name, child.stderr.read()
-            time.sleep(0.5)
+            time.sleep(0.3)
             sent = time.monotonic()
             child.send_signal(signal.SIGINT)
             found[name] = child.stdout.readline().rstrip("\n")
             done = child.stdout.readline()
             assert done, f"{name}: {child.stderr.read()}"
             late[name] = float(done) - sent
-        assert child.wait(60) == 0
+        ended = child.wait(60)
     finally:
         child.kill()
         child.communicate()
-    assert found == CALLS
+    assert found == CALLS, late
+    assert ended == 0
     assert max(late.values()) < 0.5, late
 
 
