@@ -136,6 +136,8 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     kernel = entry(load_kernels("hybrid.kernels.sections").strobe)
     record, bursts = trajectory.no_record(), Bursts([trajectory])
     first, total, code = int(trajectory.run.count[codes.CYCLE]) + 1, 0, codes.GO_ON
+    # Points need no tangent vectors, which the trajectory may have.
+    plain = attrs.evolve(trajectory, tangents=0)
     while code == codes.GO_ON:
         done, code = kernel(
             address(load_kernels().advance),
@@ -155,7 +157,7 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
         code = bursts.judged(code)
         if code == codes.GO_ON:
             # The burst has ended within a period, which the kernel would begin anew.
-            code = trajectory.advance_to(first + total, trajectory.phase0, record)
+            code = plain.advance_to(first + total, trajectory.phase0, record)
             if code == codes.DONE:
                 places[total] = trajectory.run.count[[codes.CYCLE, codes.MODE, codes.JUMPS]]
                 states[total] = trajectory.x

@@ -11,7 +11,7 @@ import attrs
 from hybrid.compile import compile_system
 from hybrid.names import PARAMETERS, STATE, named_values
 from hybrid.system import Guard, HybridSystem, Reset
-from hybrid.testing.case import Case, discard
+from hybrid.testing.case import Case, as_case, discard
 from hybrid.testing.invariance import compare
 
 UNITS = "The units of the state and of the time do not matter"
@@ -55,6 +55,7 @@ def check_units(case: Case) -> None:
     PropertyError
         If the run changes.
     """
+    as_case(case)
     if compile_system(case.system).emitted.opaque:
         discard("a model function cannot be traced, and so cannot be changed")
     run, variant = case.run, measured(case.system)
