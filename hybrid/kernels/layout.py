@@ -283,8 +283,8 @@ ADVANCE = types.FunctionType(
 )
 
 # How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning in
-# comparisons (``math.isfinite`` takes a difference of a number and itself, which is taken to be zero). Kernels
-# allocate nothing and own nothing, so no references are counted.
+# comparisons (``math.isfinite`` takes the difference of a number and itself, which may be taken for zero).
+# Kernels allocate nothing and own nothing, so no references are counted.
 _MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False}
 # Called from Python, and kept on disk: these state their signatures.
 ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}
