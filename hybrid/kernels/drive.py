@@ -33,14 +33,13 @@ from hybrid.kernels.codes import (
     SINCE_ENTRY,
     STALE,
     STEPS,
-    STEPS_AT_ENTRY,
     STUCK,
     TERMINAL,
 )
 from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, widen_scale
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.series import series_step
-from hybrid.kernels.tangent import CLOSE_AT_ENTRY, keep_apart, keep_apart_after_step
+from hybrid.kernels.tangent import keep_apart
 
 # More jumps than this at one instant, in all or per transition, are not going to end.
 MOST_JUMPS_AT_ONCE = 1000
@@ -155,9 +154,6 @@ def advance(
                 run.first_step[mode] = 0.0
             run.clock[LAST_STEP] = 0.0
             run.count[PHASE_OF_RUN] = STALE
-            run.count[STEPS_AT_ENTRY] = run.count[STEPS]
-            if orthonormal:
-                keep_apart(run, model.dimension, tangents, CLOSE_AT_ENTRY, work.jacobian)
         remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
             fired = arrived(model, run, work)
@@ -181,8 +177,8 @@ def advance(
             return int(code)
         forward(run, model.period, span)
         run.clock[SINCE_ENTRY] += span
-        if orthonormal and span > 0.0:
-            keep_apart_after_step(model, run, mode, tangents, work.jacobian)
+        if orthonormal and 0.0 < span < remaining:
+            keep_apart(model, run, mode, tangents, work.jacobian)
         fired = run.count[PENDING]
         past = time_left(model, run, stop_cycle, stop_phase) < 0.0
         if past or (span >= remaining and fired == NO_TRANSITION):

@@ -12,9 +12,8 @@ from hybrid.kernels.codes import (
     READY,
     RUNGE_KUTTA,
     STALE,
-    STEPS,
-    STEPS_AT_ENTRY,
     STRAIN,
+    UNCHECKED,
 )
 from hybrid.kernels.layout import KERNEL
 
@@ -28,11 +27,11 @@ STRAINED = math.log(1e3)
 # what counts is the vector's part orthogonal to the vectors before it: that part loses as many digits as the
 # product has. An exact step has an error of rounding alone; the step of a Runge-Kutta method has to evaluate
 # the rates once more afterwards.
-CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-5**2, 1e-1**2, 1e-2**2
-CLOSE_AT_ENTRY = 1e-3**2
-# A stiff contact stretches all vectors along the speed, and shrinks them again before it ends: no sign of
-# exponents that are far apart. A longer stay on the clock of a contact is looked at from this step on.
-STEPS_OF_CONTACT = 16
+CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-3**2, 1e-1**2, 1e-2**2
+# They are looked at after so many steps: an exact one brings them no closer than a factor of a few thousand.
+# A stiff contact stretches all of them along the speed, and shrinks them again before it ends, which is no
+# sign of exponents that are far apart.
+STEPS_IN_EXACT, STEPS_IN_CONTACT = 2, 16
 # Tangent vectors are also orthonormalised where a square of their length leaves this range.
 SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 
@@ -113,27 +112,26 @@ def independence(y, n, k, gram):
 
 
 @njit(**KERNEL)
-def keep_apart(run, n, tangents, closest, gram):
-    """Orthonormalise the tangent vectors of a run where ``independence`` is not above ``closest``."""
+def keep_apart(model, run, mode, tangents, gram):
+    """After a step: orthonormalise the tangent vectors if they have come too close for its propagator."""
+    kind, closest, steps = model.propagator[mode], CLOSE_IN_TAYLOR, 1
+    if kind == EXACT:
+        closest, steps = CLOSE_IN_EXACT, STEPS_IN_EXACT
+    elif kind == RUNGE_KUTTA:
+        closest = CLOSE_IN_RUNGE_KUTTA
+    elif kind == DESINGULARISED:
+        steps = STEPS_IN_CONTACT
+    run.count[UNCHECKED] += 1
+    if run.count[UNCHECKED] < steps:
+        return
+    run.count[UNCHECKED] = 0
+    n = model.dimension
     if independence(run.y, n, tangents, gram) > closest:
         return
     run.count[INDISTINCT] += orthonormalise(run.y, n, tangents, run.growth, 0.0)
     run.clock[STRAIN] = 0.0
     if run.count[PHASE_OF_RUN] == READY:
         run.count[PHASE_OF_RUN] = STALE
-
-
-@njit(**KERNEL)
-def keep_apart_after_step(model, run, mode, tangents, gram):
-    """``keep_apart`` after a step, with the limit that fits its propagator."""
-    kind, closest = model.propagator[mode], CLOSE_IN_TAYLOR
-    if kind == EXACT:
-        closest = CLOSE_IN_EXACT
-    elif kind == RUNGE_KUTTA:
-        closest = CLOSE_IN_RUNGE_KUTTA
-    elif kind == DESINGULARISED and run.count[STEPS] - run.count[STEPS_AT_ENTRY] < STEPS_OF_CONTACT:
-        return
-    keep_apart(run, model.dimension, tangents, closest, gram)
 
 
 @njit(**KERNEL)
