@@ -83,10 +83,10 @@ def product_eigenvalues(factors: Sequence[np.ndarray] | np.ndarray) -> ProductEi
     >>> product_eigenvalues([shrink] * 200).log_moduli / np.log(10)
     array([   0., -600.])
     """
-    chain = np.array(factors, dtype=float)
-    n = chain.shape[-1]
+    chain = [np.array(factor, dtype=float) for factor in factors]
+    n = chain[0].shape[-1]
     with np.errstate(over="ignore", under="ignore", divide="ignore", invalid="ignore"):
-        chain, logs = _without_null_space(list(chain))
+        chain, logs = _without_null_space(chain)
         moduli, phases = [], []
         if chain and len(chain[0]):
             found = _Reduced(chain).eigenvalues()

@@ -25,7 +25,7 @@ def exact_eigenvalues(factors, digits):
 
 
 def relative_error(found, exact):
-    """Largest relative distance of the eigenvalues found from the nearest ones that are not taken."""
+    """Largest relative distance of the eigenvalues found from the nearest that are not taken yet."""
     worst, left = 0.0, list(exact)
     with mp.workdps(50):
         for log_modulus, phase in zip(found.log_moduli, found.phases, strict=True):
