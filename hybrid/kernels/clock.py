@@ -5,6 +5,8 @@ all that a system without forcing knows of time, then has as many digits after a
 the start.
 """
 
+import math
+
 from numba import njit
 
 from hybrid.kernels.codes import CYCLE, PHASE, PHASE_LOW, SINCE_ENTRY
@@ -25,6 +27,8 @@ def sum_in_two_parts(a, b):
 @njit(**IN_ORDER)
 def time_left(model, run, stop_cycle, stop_phase):
     """Time until the stop; periods are counted, not measured, so that none of their digits is lost."""
+    if not stop_phase < math.inf:
+        return stop_phase
     left, lost = sum_in_two_parts(stop_phase, -run.clock[PHASE])
     return (stop_cycle - run.count[CYCLE]) * model.period + (left + (lost - run.clock[PHASE_LOW]))
 

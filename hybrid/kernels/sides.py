@@ -160,8 +160,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         pending = came == LANDED and due[transition] == 1 and beyond
         if model.marker[transition] == 1 and came != FLOWED:
             # It marks what the flow crosses: at most what was reached together with the first jump.
-            reached = came == LANDED and was_on and order > 0
-            crossed, pending = crossed and reached, pending and reached
+            crossed, pending = False, pending and was_on and order > 0
         # A root of third order that was crossed without speed: the next step shows the side.
         flat = (
             own

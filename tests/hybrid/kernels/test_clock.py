@@ -65,7 +65,8 @@ def test_a_shift_of_time_changes_nothing(system, x0, span, solver, shift):
     np.testing.assert_allclose(late.x[-1], early.x[-1], rtol=1e-14)
     np.testing.assert_allclose(late.fundamental, early.fundamental, rtol=1e-13, atol=1e-13)
     times = np.arange(1, 64) / 64 * min(span, 4.0)
-    np.testing.assert_allclose(late(shift + times), early(times), rtol=1e-14, atol=1e-14)
+    # The interpolant of a Runge-Kutta step is a sum of terms larger than the state.
+    np.testing.assert_allclose(late(shift + times), early(times), rtol=1e-13, atol=1e-13)
 
 
 def test_spikes_go_on_as_they_began():
