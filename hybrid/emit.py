@@ -335,9 +335,12 @@ def _has_proved_period(system: HybridSystem, written: Iterable[_Written], writer
 
 
 def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -> tuple[bool, ...]:
-    """By transition: whether the series of its source mode hold its guard."""
+    """By transition: whether the series of its source mode hold its guard; none follow guards of a start."""
     held = {mode: iter(each.guards) for mode, each in zip(system.mode_names, propagators, strict=True)}
-    return tuple(next(held[transition.source], False) for transition in system.transitions)
+    return tuple(
+        not transition.guard.at_start and next(held[transition.source], False)
+        for transition in system.transitions
+    )
 
 
 def _ends_mode(transition: Transition) -> bool:

@@ -64,7 +64,8 @@ def filippov(
     Returns
     -------
     HybridSystem
-        Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run, and
+        Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run,
+        ``two-fold at start``, which ends a run that starts where the surface repels, and
         ``below too high``, ``above too low``, ``sliding too high`` and ``sliding too low``: a start takes one
         of them if it lies off the surface where its mode does not belong, by more than rounding, or, in the
         sliding mode, by more than 1e-6 of the state's largest component.
@@ -118,6 +119,9 @@ def filippov(
             Transition("below", "above", Guard(switching, +1, when=surface.crosses_up)),
             Transition("above", "sliding", Guard(switching, -1, when=surface.arrives_from_above)),
             Transition("above", "below", Guard(switching, -1, when=surface.crosses_down)),
+            Transition(
+                "sliding", None, Guard(surface.attraction, -1, at_start=True), name="two-fold at start"
+            ),
             Transition("sliding", None, Guard(surface.attraction, -1), name="two-fold"),
             Transition("sliding", "above", Guard(surface.speed_above, +1), Reset(surface.projection)),
             Transition("sliding", "below", Guard(surface.speed_below, -1), Reset(surface.projection)),

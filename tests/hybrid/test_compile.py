@@ -59,7 +59,7 @@ def test_graph_as_indices():
     np.testing.assert_array_equal(model.outgoing, [0, 1])
     np.testing.assert_array_equal(model.target, [1, 0])
     np.testing.assert_array_equal(model.direction, [1, -1])
-    assert model.surface[0] != model.surface[1]
+    assert model.surface[0] == model.surface[1]
     np.testing.assert_array_equal(model.paired, [0, 0])
     np.testing.assert_array_equal(model.marker, [0, 0])
     assert model.period == pytest.approx(2 * np.pi / 8)

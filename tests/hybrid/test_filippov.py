@@ -367,7 +367,7 @@ class TestTwoFolds:
     def test_sliding_where_both_fields_leave_ends_the_run(self):
         arc = hybrid.simulate(self.VISIBLE, (1.0, 0.0), (0.0, 1.0), mode="sliding")
         assert arc.status.code == hybrid.StatusCode.TERMINAL
-        assert events(arc) == ["two-fold"]
+        assert events(arc) == ["two-fold at start"]
 
     @pytest.mark.parametrize(("mode", "sign"), [("below", -2.7), ("above", 1.3)])
     def test_a_named_mode_decides(self, mode, sign):
