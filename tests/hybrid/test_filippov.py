@@ -355,7 +355,7 @@ class TestTwoFolds:
     def test_start_at_the_two_fold(self):
         with pytest.raises(hybrid.ArgumentError, match="more than one mode: below, above"):
             hybrid.simulate(self.VISIBLE, (0.0, 0.0), (0.0, 1.0))
-        with pytest.raises(hybrid.ArgumentError, match="'sliding' is left through 'two-fold'"):
+        with pytest.raises(hybrid.ArgumentError, match="left through 'two-fold at start', 'two-fold'"):
             hybrid.simulate(self.INVISIBLE, (0.0, 0.0), (0.0, 1.0))
 
     def test_start_at_the_two_fold_with_one_way_out(self):
@@ -428,6 +428,7 @@ class TestModel:
             "below->above",
             "above->sliding",
             "above->below",
+            "two-fold at start",
             "two-fold",
             "sliding->above",
             "sliding->below",
@@ -502,7 +503,7 @@ class TestUnits:
     @pytest.mark.parametrize(("state", "time"), [(2.0**-30, 1.0), (2.0**-60, 2.0**20), (2.0**30, 2.0**-20)])
     @pytest.mark.parametrize("solver", [hybrid.Taylor, hybrid.DOP853])
     @pytest.mark.parametrize(
-        ("which", "x0"), [(0, (-0.1, 0.1)), (0, (0.3, -0.9)), (1, (-2.3, -0.5)), (1, (-1.0, 0.5))]
+        ("which", "x0"), [(0, (-0.1, 0.1)), (0, (-1.0, -0.5)), (1, (-2.3, -0.5)), (1, (-1.5, 0.5))]
     )
     def test_the_run_is_the_same(self, state, time, solver, which, x0):
         arcs = []
@@ -541,7 +542,7 @@ def test_leaving_projects_what_the_solver_has_let_drift():
     )
     [leave] = arc.jumps
     assert leave.transition == "sliding->above"
-    assert abs(leave.x_minus[1] - math.sin(4.0 * leave.t)) > 1e-8
+    assert abs(leave.x_minus[1] - math.sin(4.0 * leave.t)) > 1e-10
     assert leave.x_plus[1] == pytest.approx(math.sin(4.0 * leave.t), abs=1e-15)
 
 
