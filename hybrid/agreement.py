@@ -86,7 +86,8 @@ def disagreement(
     """
     system = compiled.system
     found = value(compiled, role, index, t, x, values)
-    text = _difference(system, role.title, role.function, found, t, x, values)
+    opaque = _is_opaque(compiled, role.function)
+    text = _difference(system, role.title, role.function, found, t, x, values, opaque)
     if text is not None or role.name == CONDITION:
         return text
     if role.derivative is not None:
@@ -94,9 +95,9 @@ def disagreement(
         given = evaluate(system, role.derivative, t, x, values)
         width = found.shape[1] if given is None else len(given) // role.rows
         return _difference(
-            system, role.derivative_title, role.derivative, found[:, :width].ravel(), t, x, values
+            system, role.derivative_title, role.derivative, found[:, :width].ravel(), t, x, values, opaque
         )
-    if not _is_opaque(compiled, role.function):
+    if not opaque:
         return None
     try:
         wanted = complex_step(system, role, t, x, values)
@@ -126,6 +127,7 @@ def _difference(
     t: float,
     x: np.ndarray,
     values: np.ndarray,
+    opaque: bool,
 ) -> str | None:
     wanted = evaluate(system, function, t, x, values)
     if wanted is None or len(wanted) != len(found):
@@ -134,8 +136,9 @@ def _difference(
     if np.all(apart <= SAME * np.abs(wanted)):
         return None
     band = rounding_band(system, function, t, x, values, wanted)
-    # What is nothing but rounding in Python may be a quotient of zeros in other operations.
-    lost = ~np.isfinite(found) & (band > np.abs(wanted))
+    # What is nothing but rounding in Python may be a quotient of zeros in other operations. An opaque
+    # function tells of its errors by nan.
+    lost = ~np.isfinite(found) & (not opaque)
     wrong = ~(apart <= band) & ~lost
     if not np.any(wrong):
         return None

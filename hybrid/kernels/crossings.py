@@ -47,6 +47,10 @@ MOST_ROOT_STEPS = 200
 SETTLED = 64.0 * EPSILON
 # Parts of a step at whose ends a guard that could not be traced is looked at.
 SAMPLES = 32
+# What ``Run.on_guard`` is for a guard whose speed and acceleration are zero too, and in how many places of a
+# step such a guard is looked at.
+AT_REST = 3
+PLACES_AT_REST = 8
 
 
 @njit(**INLINE)
@@ -259,14 +263,21 @@ def sampled_change(model, run, transition, path, order, clock, start, pace, leng
 
 
 @njit(**KERNEL)
-def leaves(model, run, transition, t, x, work):
-    """Whether a guard that is zero at the start of a step is not, beyond rounding, at its end ``(t, x)``.
+def rests(model, run, transition, path, order, clock, start, pace, length, work):
+    """Whether the state rests on a guard: it started there without speed, and the guard stays zero.
 
-    A guard that stays zero is one that the state rests on.
+    Zero at the end of the step alone says nothing: a guard may come back.
     """
-    value = guard_value(model, transition, t, x, work.scalar)
-    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
-    return abs(value) > rounding_band(model, run, transition, t, x, work)
+    if run.on_guard[transition] != AT_REST:
+        return False
+    for i in range(1, PLACES_AT_REST + 1):
+        place = length * i / PLACES_AT_REST
+        value = _sample(model, transition, path, order, clock, start, pace, place, work)
+        t = time_at(path, order, clock, start, pace, place)
+        model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
+        if abs(value) > rounding_band(model, run, transition, t, work.state, work):
+            return False
+    return True
 
 
 @njit(**KERNEL)

@@ -6,7 +6,7 @@ from numba import njit
 
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
 from hybrid.kernels.codes import GRAZING_PLACE, MODE, NO_TRANSITION
-from hybrid.kernels.crossings import crossing_on_path, leaves
+from hybrid.kernels.crossings import crossing_on_path, rests
 from hybrid.kernels.guards import error_band, guard_speed, guard_value, note_grazing, rounding_band
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.step import attempt_again
@@ -92,7 +92,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
             if theta > 1.0 and side == run.side[transition] and on_guard == 0:
                 note_grazing(run, transition, degree, side, band, work)
         else:
-            if on_guard > 0 and not leaves(model, run, transition, t + h, work.new, work):
+            if rests(model, run, transition, work.path, degree_of_path, -1, t, h, 1.0, work):
                 continue
             theta, side, share = crossing_on_path(
                 model,
@@ -132,8 +132,8 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     before = guard_value(model, transition, t, y, work.scalar) * side > 0.0
     after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
     length, last, reach = theta * h, math.inf, FIRST_REACH * h
-    # Along the step an affine guard is as smooth as the state. Another one has to show it.
-    settled = 0 if model.affine_guard[transition] == 1 else 1
+    # Along the step an affine guard is as smooth as the state. Another one may have kinks, jumps, flat roots.
+    smooth = model.affine_guard[transition] == 1
     for trial in range(MOST_LANDINGS):
         attempt_again(parts, model, method, mode, t, length, y, tangents, work)
         if length == 0.0:
@@ -141,7 +141,7 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
         value = guard_value(model, transition, t + length, work.new, work.scalar)
         speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
         correction = -value / speed
-        converges = trial >= settled and abs(correction) <= QUADRATIC * last
+        converges = smooth or (trial > 0 and abs(correction) <= QUADRATIC * last)
         if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
             for i in range(model.dimension * (1 + tangents)):
                 work.new[i] += correction * work.stages[s, i]
@@ -150,20 +150,23 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
             low, before = length, True
         else:
             high, after = length, True
-        if before and after and high - low <= 2.0 * EPSILON * high:
+        finest = 2.0 * EPSILON * (max(high, abs(t)) if smooth else high)
+        if before and after and high - low <= finest:
             if length != high:
                 attempt_again(parts, model, method, mode, t, high, y, tangents, work)
             return high, 0.0
         newton = length + correction
-        slow = trial > 2 and not abs(correction) <= 0.5 * last
+        slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
         # A place that Newton's method has not led to says nothing of how fast that converges.
         last = 0.0
         # Beyond the error of an interpolant Newton's step follows something else, the slope beside a jump.
-        trusted = settled == 0 or abs(correction) <= FARTHEST * h
+        trusted = smooth or abs(correction) <= FARTHEST * h
         if low < newton < high and trusted and not slow:
             length, last = newton, abs(correction)
         elif before and after:
             length = 0.5 * (low + high)
+        elif smooth:
+            break
         else:
             # Only one side has been seen: look for the other one, farther and farther from the root.
             length = theta * h + (reach if before else -reach)

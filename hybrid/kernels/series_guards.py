@@ -16,11 +16,11 @@ from hybrid.kernels.codes import (
     NO_TRANSITION,
     ROOTED,
 )
-from hybrid.kernels.crossings import crossing_on_path, leaves
+from hybrid.kernels.crossings import crossing_on_path, rests
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
 from hybrid.kernels.lanes import four_times, load, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
-from hybrid.kernels.path import state_at, time_at, value_at
+from hybrid.kernels.path import value_at
 
 # The error of the last step towards a root is taken to be this many times its estimate.
 UNSEEN = 64.0
@@ -295,14 +295,6 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
 
 
 @njit(**KERNEL)
-def leaves_on_path(model, run, transition, order, clock, t, h, work):
-    """``leaves`` for the end of a step along the series."""
-    state_at(work.series, order, model.dimension, h, work.state)
-    end = time_at(work.series, order, clock, t, 1.0, h)
-    return leaves(model, run, transition, end, work.state, work)
-
-
-@njit(**KERNEL)
 def earliest_on_series(model, method, run, order, t, h, clock, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
@@ -320,7 +312,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         transition = model.outgoing[slot]
         on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
-            if on_guard > 0 and not leaves_on_path(model, run, transition, order, clock, t, h, work):
+            if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
                 continue
             run.on_guard[transition] = 0
             theta, side, share = crossing_on_path(

@@ -20,6 +20,7 @@ from hybrid import (
     Tsit5,
     compile_system,
     simulate,
+    stroboscopic_section,
 )
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-9, atol=1e-11), Tsit5(rtol=1e-9, atol=1e-11))
@@ -184,6 +185,30 @@ def test_a_guard_that_touches_does_not_fire():
     half = np.sqrt(2e-9 / 1.5)
     expected = [np.pi - half, np.pi + half, 3 * np.pi - half, 3 * np.pi + half]
     np.testing.assert_allclose(over.jumps.t, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS[:2])
+@pytest.mark.parametrize("start", [0.0, 0.25])
+def test_a_guard_that_is_zero_at_both_ends_of_a_step(solver, start):
+    """From period to period each step starts and ends on the guard, and crosses it in between."""
+    system = HybridSystem(
+        state=("x", "n"),
+        modes=[Mode("decay", lambda t, x, p: (-x.x, 0.0))],
+        transitions=[
+            Transition(
+                "decay",
+                "decay",
+                Guard(lambda t, x, p: np.sin(2 * np.pi * (t - 0.5 - p.start)), +1),
+                Reset(lambda t, x, p: (x.x, x.n + 1)),
+            )
+        ],
+        parameters={"start": 0.0},
+        period=1.0,
+    )
+    section = stroboscopic_section(
+        system, (1.0, 0.0), periods=7, t0=start, parameters={"start": start}, solver=solver
+    )
+    np.testing.assert_array_equal(np.diff(section.x[:, 1]), 1.0)
 
 
 def test_a_guard_that_cannot_be_traced_is_said_to_be_sampled():
