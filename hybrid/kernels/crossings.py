@@ -17,10 +17,12 @@ from hybrid.kernels.codes import (
     GRAZING_VALUE,
     HIGH,
     HIGH_MIDDLE,
+    LAST_FIRED,
     LEAST_SLOPE,
     LOW,
     LOW_MIDDLE,
     MOST_SLOPE,
+    SINCE_ENTRY,
     UNPROVED,
 )
 from hybrid.kernels.guards import error_band, guard_value, has_program, rounding_band
@@ -219,7 +221,10 @@ def first_change(
             )
             touch, depth = NOWHERE, math.inf
             side = after
-            if crosses_towards(direction, after):
+            # Where it has just fired, the step only shows to which side the guard leaves zero.
+            same = on_guard > 0 and place <= SETTLED * length and run.count[LAST_FIRED] == transition
+            again = same and run.clock[SINCE_ENTRY] == 0.0
+            if crosses_towards(direction, after) and not again:
                 return place, side, length
         side, sure = after, high
     if touch != NOWHERE:

@@ -97,7 +97,7 @@ def test_a_flight_that_is_a_polynomial_is_exact_at_any_step(solver):
 
 
 def test_tangents_converge_with_the_state():
-    steps, matrices = (0.8, 0.4, 0.2), []
+    steps, matrices = (0.4, 0.2, 0.1), []
     for step in (*steps, 0.05):
         method = hybrid.DOP853(rtol=1.0, atol=1.0, max_step=step)
         matrices.append(simulate(HEATED, (0.5, 0.0), (0.0, 12.0), solver=method, tangent=True).fundamental)
