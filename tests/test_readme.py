@@ -52,7 +52,7 @@ def test_the_readme_shows_what_it_says():
     assert np.diag(impact.saltation) == pytest.approx([-0.9, -0.9])
     orbit = names["orbit"]
     assert orbit.status.ok
-    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), [0.0867, 3.401], rtol=1e-3)
+    np.testing.assert_allclose(np.sort_complex(orbit.multipliers), [-3.401, -0.0867], rtol=1e-3)
     assert orbit.signature == ("buffer", "free", "free", "free", "free", "buffer")
     assert lyapunov.floquet_exponents(orbit) == pytest.approx([0.312, -0.623], abs=1e-3)
     assert names["strobe"].x.shape == (2000, 2)

@@ -206,7 +206,7 @@ def check_system(
     >>> import models
     >>> report = check_system(models.bouncing_ball(), examples=5)
     >>> report.unchecked
-    ('The saltation matrix is the identity ...', 'The order in which ...', 'An elastic system ...')
+    ('The declared period ...', 'The saltation matrix is the identity ...', 'The order ...', 'An elastic ...')
     """
     as_system("system", system)
     examples = arguments.count("examples", examples, 1)

@@ -94,7 +94,7 @@ def test_estimates_hold_the_error(case, rtol, method):
 def test_estimates_hold_the_rounding_of_polynomial_flight(rtol, method):
     """A method makes no error here: what there is, rounding has made and the bounces have magnified."""
     covered, ratio = shares(bouncing_ball, method(rtol=rtol, atol=rtol / 100), 100)
-    assert covered >= 0.85
+    assert covered >= 0.8
     assert ratio < 50.0
 
 

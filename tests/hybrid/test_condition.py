@@ -344,7 +344,9 @@ class TestModel:
     def test_errors(self):
         with pytest.raises(hybrid.ModelError, match="nothing follows a reset where there is no target"):
             Transition("a", None, Guard(height), Reset(lambda t, x, p: (0.0,)))
-        with pytest.raises(hybrid.ModelError, match="accumulates_to='b' is for transitions from"):
+        with pytest.raises(
+            hybrid.ModelError, match="accumulates_to='b' is for transitions whose jumps may accumulate"
+        ):
             Transition("a", None, Guard(height), accumulates_to="b")
         with pytest.raises(hybrid.ModelError, match=r"Guard: when must be a function of \(t, x, p\); got 3"):
             Guard(height, when=3)
