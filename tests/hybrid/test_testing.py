@@ -32,6 +32,7 @@ from hybrid.testing import (
     small_systems,
     states,
 )
+from hybrid.testing.crossings import CROSSINGS
 from hybrid.testing.events import JUMPS, SIDES
 from hybrid.testing.functions import PERIOD
 from hybrid.testing.invariance import ELASTIC, ORDER
@@ -103,7 +104,7 @@ def rattler():
             {NOT_ELASTIC},
         ),
         (rattler(), {}, {NOT_ELASTIC}),
-        (models.solvable_oscillator(), {}, {SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
+        (models.solvable_oscillator(), {}, {CROSSINGS, SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
         (models.rimless_wheel(), DOWNHILL, {NOT_CONTINUOUS, NOT_ELASTIC}),
         (systems.jerk(), {}, {NOT_ELASTIC}),
         (systems.constant_fields(), {"mode": "left"}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
