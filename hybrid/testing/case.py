@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any, NoReturn
 
@@ -329,3 +329,13 @@ def mode_after(jump: Jump) -> str:
     """The mode that a jump leads to; runs are cut before a jump that ends them."""
     assert jump.target is not None
     return jump.target
+
+
+def stretches(case: Case) -> Iterator[tuple[int, str | None, float, float]]:
+    """Between events: how many came before, the mode, start and length; the shortest are left out."""
+    jumps, t1 = case.run.arc.jumps, case.run.t1
+    times = [case.t0, *jumps.t, t1]
+    for j in range(len(times) - 1):
+        length = times[j + 1] - times[j]
+        if length > 1e-9 * (t1 - case.t0):
+            yield j, mode_after(jumps[j - 1]) if j else case.mode, times[j], length

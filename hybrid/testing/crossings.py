@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.system import Transition
-from hybrid.testing.case import Case, as_case, discard, mode_after
+from hybrid.testing.case import Case, as_case, discard, stretches
 
 CROSSINGS = "Each change of sign of a guard in its direction fires once"
 
@@ -30,16 +30,9 @@ def check_crossings(case: Case) -> None:
     guards = [each for each in case.system.transitions if each.guard.when is None]
     if not guards:
         discard("every guard has a condition")
-    times = [case.t0, *run.arc.jumps.t, run.t1]
-    mode = case.mode
     _check_doubled(case)
-    for j in range(len(times) - 1):
-        if j > 0:
-            mode = mode_after(run.arc.jumps[j - 1])
-        length = times[j + 1] - times[j]
-        if not length > 1e-9 * (run.t1 - case.t0):
-            continue
-        places = times[j] + length * PLACES
+    for _, mode, start, length in stretches(case):
+        places = start + length * PLACES
         states = run.arc(places)
         for transition in (guard for guard in guards if guard.source == mode):
             _check_between(case, transition, places, states)

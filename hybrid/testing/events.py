@@ -6,7 +6,7 @@ import numpy as np
 
 from hybrid.arc import Jump
 from hybrid.roles import guard_role
-from hybrid.testing.case import Case, as_case, discard, guard_beyond, mode_after
+from hybrid.testing.case import Case, as_case, discard, guard_beyond, mode_after, stretches
 from hybrid.testing.saltation import event_told
 
 JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
@@ -97,14 +97,8 @@ def check_sides(case: Case) -> None:
     ]
     if not guards:
         discard("no guard has a direction")
-    times, mode = [case.t0, *run.arc.jumps.t, run.t1], case.mode
-    for j in range(len(times) - 1):
-        if j > 0:
-            mode = mode_after(run.arc.jumps[j - 1])
-        length = times[j + 1] - times[j]
-        if not length > 1e-9 * (run.t1 - case.t0):
-            continue
-        for t in times[j] + length * INNER:
+    for j, mode, start, length in stretches(case):
+        for t in start + length * INNER:
             x = run.arc(t)
             for transition in (guard for guard in guards if guard.source == mode):
                 beyond = guard_beyond(case, transition, t, x)
