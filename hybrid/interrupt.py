@@ -11,9 +11,10 @@ from typing import Any, Protocol
 from hybrid.kernels import codes
 from hybrid.status import Status, StatusCode
 
-# Steps of the first burst, which takes less than a millisecond for most models, and how long later ones take.
+# Steps of the first burst, which takes less than a millisecond for most models, and how long later ones take:
+# a step may become ten times slower from one burst to the next, where numbers leave the normal range.
 FIRST_BURST = 256
-SECONDS = 0.05
+SECONDS = 0.02
 
 
 class Stop(Protocol):
@@ -86,7 +87,7 @@ class Told(threading.Event):
 
 
 class Bursts:
-    """How many steps kernels may take before Python asks whether to stop: a twentieth of a second's.
+    """How many steps kernels may take before Python asks whether to stop: 20 ms of them.
 
     Where a burst ends has no influence on what is computed.
 

@@ -336,37 +336,25 @@ class TestSeveral:
             turn = np.array([[np.cos(20), np.sin(20)], [-np.sin(20), np.cos(20)]])
             np.testing.assert_allclose(arc.fundamental, turn, atol=1e-8)
 
-    def test_a_blow_goes_through_many_balls(self):
+    def test_each_reset_leads_beyond_the_next_guard(self):
         """More jumps at one instant than a small limit would let pass: 0 to 39, one after the other."""
-        n = 40
-
-        def swap(i):
-            def reset(t, x, p):
-                x = list(x)
-                x[n + i], x[n + i + 1] = x[n + i + 1], x[n + i]
-                return x
-
-            return reset
-
-        system = HybridSystem(
-            state=2 * n,
-            modes=[Mode("free", lambda t, x, p: [*x[n:], *([0.0] * n)])],
-            transitions=[
-                Transition(
-                    "free",
-                    "free",
-                    Guard(lambda t, x, p, i=i: x[i + 1] - x[i], -1),
-                    Reset(swap(i)),
-                    name=str(i),
+        system = clock(
+            *(
+                up(
+                    "a",
+                    "a",
+                    lambda t, x, p, i=i: x.y - (1 + i),
+                    lambda t, x, p: (x.y + 1.01, x.n + 1, x.m),
+                    str(i),
                 )
-                for i in range(n - 1)
-            ],
+                for i in range(40)
+            ),
+            modes=("a",),
         )
-        x0 = np.zeros(2 * n)
-        x0[0], x0[n] = -1.0, 1.0
-        arc = simulate(system, x0, (0.0, 2.0), mode="free")
-        assert fired(arc) == [str(i) for i in range(n - 1)]
-        np.testing.assert_allclose(arc.x[-1, n:], [0.0] * (n - 1) + [1.0], atol=1e-14)
+        arc = simulate(system, (0.5, 0.0, 0.0), (0.0, 1.25))
+        assert fired(arc) == [str(i) for i in range(40)]
+        np.testing.assert_allclose(arc.jumps.t, 0.5, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(arc.x[-1], (42.15, 40.0, 0.0), rtol=1e-13)
 
 
 class TestStart:
