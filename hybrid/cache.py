@@ -90,7 +90,7 @@ def source_key(*texts: str) -> str:
     return digest.hexdigest()[:24]
 
 
-def keep_text(path: Path, text: str) -> bool:
+def keep(path: Path, content: bytes) -> bool:
     """Write a file whole or not at all: other processes may be doing the same, or reading it.
 
     Where that is impossible, one line says so: the next process does the work again.
@@ -98,7 +98,7 @@ def keep_text(path: Path, text: str) -> bool:
     draft = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:16]}")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        draft.write_text(text, encoding="utf-8")
+        draft.write_bytes(content)
         draft.replace(path)
     except OSError as error:
         with suppress(OSError):
@@ -108,11 +108,11 @@ def keep_text(path: Path, text: str) -> bool:
     return True
 
 
-def kept_text(path: Path) -> str | None:
-    """Text of a file, None if there is none or it cannot be read."""
+def kept(path: Path) -> bytes | None:
+    """Content of a file, None if there is none or it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError):
+        return path.read_bytes()
+    except OSError:
         return None
 
 

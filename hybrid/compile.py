@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
-from functools import cached_property, lru_cache
-from types import ModuleType
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -13,12 +11,12 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.agreement import check_agreement
-from hybrid.cache import announced, compiled_into, keep_text, kept_text, source_key
+from hybrid.cache import announced
+from hybrid.compiler.functions import ROLES, functions_of
 from hybrid.errors import ArgumentError
-from hybrid.kept import models_folder, traced_or_kept
+from hybrid.kept import traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
 from hybrid.load import address, entry, load_kernels
-from hybrid.opaque import namespace_of, refusal_of
 from hybrid.periodicity import period_fault
 from hybrid.roles import CONDITION, Role
 from hybrid.surface import is_paired
@@ -27,30 +25,12 @@ from hybrid.system import HybridSystem, as_system
 if TYPE_CHECKING:
     from hybrid.emitted import Emitted
 
-ROLES = (
-    "flow",
-    "flow_jacobian",
-    "variational_flow",
-    "guard",
-    "guard_gradient",
-    "reset",
-    "reset_jacobian",
-    "series",
-)
-
 # The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
 ROLE_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
 GRADIENT = 3
 # Parameter vectors to remember.
 REMEMBERED = 10_000
 UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
-# Models whose machine code is kept in memory after their systems are gone.
-MOST_SOURCES = 64
-
-# Division by zero is infinite, not an error. The products of series may be fused into their sums; in a guard
-# that could make a difference of equal terms differ from zero.
-IEEE = {"error_model": "numpy"}
-FUSED = {"series": IEEE | {"fastmath": {"contract"}}}
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -282,56 +262,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
         load_kernels()
         emitted = traced_or_kept(system)
         with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
-            compiled = CompiledSystem(system, emitted, _compiled_roles(emitted))
+            compiled = CompiledSystem(system, emitted, functions_of(emitted))
         check_agreement(compiled)
         object.__setattr__(system, "_compiled", compiled)
     return compiled
-
-
-def _compiled_roles(emitted: Emitted) -> tuple[Any, ...]:
-    if emitted.opaque:
-        # Functions of the user's are compiled in this process, and never kept.
-        own = namespace_of(emitted)
-        try:
-            return _decorated(own, cached=False)
-        except Exception as error:
-            raise refusal_of(emitted, own, error) from error
-    return roles_of(emitted.source)
-
-
-@lru_cache(maxsize=MOST_SOURCES)
-def roles_of(source: str) -> tuple[Any, ...]:
-    """The compiled functions of a source text, shared by all systems that have it."""
-    # Series call a kernel, which becomes part of them.
-    folder = models_folder()
-    path = folder / f"hybrid_model_{source_key(source)}.py"
-    # A file that is damaged is not what it should be.
-    if kept_text(path) != source and not keep_text(path, source):
-        return _decorated(_executed(source), cached=False)
-    # Numba finds the globals of a cached function again through the name of its module.
-    sys.modules[path.stem] = module = ModuleType(path.stem)
-    try:
-        exec(compile(source, str(path), "exec"), vars(module))
-        with compiled_into(folder):
-            return _decorated(vars(module), cached=True)
-    finally:
-        del sys.modules[path.stem]
-
-
-def _decorated(namespace: Mapping[str, Any], cached: bool) -> tuple[Any, ...]:
-    from numba import cfunc
-
-    from hybrid.kernels.layout import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE
-
-    types = {"flow_jacobian": MATRIX_ROLE, "reset_jacobian": MATRIX_ROLE, "series": SERIES_ROLE}
-    return tuple(
-        cfunc(types.get(role, VECTOR_ROLE).signature, cache=cached, **FUSED.get(role, IEEE))(namespace[role])
-        for role in ROLES
-    )
-
-
-def _executed(source: str) -> dict[str, Any]:
-    """Roles that are compiled in this process and not kept, as there is no room for them."""
-    namespace: dict[str, Any] = {}
-    exec(compile(source, "<hybrid model>", "exec"), namespace)
-    return namespace

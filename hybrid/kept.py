@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from hybrid.cache import cache_folder, keep_text, kept_text
+from hybrid.cache import cache_folder, keep, kept, source_key
 from hybrid.emitted import Emitted, Programs, Propagator
 from hybrid.load import kernels_key
 from hybrid.roles import roles
@@ -58,19 +58,25 @@ def traced_or_kept(system: HybridSystem) -> Emitted:
     if operations is None:
         return _traced(system)
     path = models_folder() / f"emitted_{_digest(operations)}.json"
-    kept = _read(path)
-    if kept is not None:
-        return kept
+    before = _read(path)
+    if before is not None:
+        return before
     emitted = _traced(system)
     if not emitted.opaque:
         text = json.dumps(attrs.asdict(emitted), default=int)
-        keep_text(path, f"{_checksum(text)}\n{text}")
+        keep(path, f"{_checksum(text)}\n{text}".encode())
     return emitted
 
 
 def models_folder() -> Path:
-    """Folder of what is kept of models. Series call a kernel, which becomes part of them."""
-    return cache_folder(f"models-{kernels_key()}")
+    """Folder of what is kept of models, named after what makes machine code of them."""
+    return cache_folder(f"models-{_compiler()}")
+
+
+@cache
+def _compiler() -> str:
+    paths = sorted((Path(__file__).parent / "compiler").glob("*.py"))
+    return source_key(kernels_key(), *(path.read_text(encoding="utf-8") for path in paths))
 
 
 def operations_of(system: HybridSystem) -> str | None:
@@ -154,20 +160,20 @@ def _traced(system: HybridSystem) -> Emitted:
 
 
 def _read(path: Path) -> Emitted | None:
-    checksum, _, text = (kept_text(path) or "").partition("\n")
+    checksum, _, text = (kept(path) or b"").decode(errors="replace").partition("\n")
     if checksum != _checksum(text):
         return None
     try:
-        kept: dict[str, Any] = json.loads(text)
+        found: dict[str, Any] = json.loads(text)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
         for name in (*of_transitions, "affine_mode", "autonomous", "discontinuities", "timed_guard"):
-            kept[name] = tuple(kept[name])
-        rows, numbers, first = (kept["programs"][name] for name in ("rows", "numbers", "first"))
-        kept["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))
-        for each in kept["propagators"]:
+            found[name] = tuple(found[name])
+        rows, numbers, first = (found["programs"][name] for name in ("rows", "numbers", "first"))
+        found["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))
+        for each in found["propagators"]:
             each["statements"], each["guards"] = tuple(each["statements"]), tuple(each["guards"])
-        kept["propagators"] = tuple(Propagator(**each) for each in kept["propagators"])
-        return Emitted(**kept)
+        found["propagators"] = tuple(Propagator(**each) for each in found["propagators"])
+        return Emitted(**found)
     except (ValueError, LookupError, TypeError):
         return None
 

@@ -91,7 +91,7 @@ def table_statements(
         begin.append(f"z{i}, l{i} = load(out, order + 2, table), nothing")
     write = [_entry(f"z{i}", i, front) for i in range(n)]
     for i, row in enumerate(form.guards):
-        write += [f"g, _ = {_product(row, '1.0', constants)}", _entry("g", n + i, front)]
+        write += [f"held, _ = {_product(row, '1.0', constants)}", _entry("held", n + i, front)]
     write += [_entry("nothing", i, front) for i in range(n + guards, front)]
     step = [f"r{i}, m{i} = {_product(form.rates[i], 'o + 1.0', constants)}" for i in range(one)]
     step += [f"z{i}, l{i} = r{i}, m{i}" for i in range(one)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import attrs
+import numpy as np
 import sympy
 from sympy.core.parameters import distribute
 
@@ -58,6 +59,8 @@ ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
 CLOCK, DIVERGENCE, OTHERS = range(3)
 # The square root of a guard is started from no less than this share of the sizes it is a difference of.
 FLOOR = 1e-17
+# No matrix is scaled up by more than its inverse.
+SMALLEST = 1e-300
 # Share of those sizes below which the guard and the square of a root differ by rounding.
 SAME = 1e-13
 
@@ -218,6 +221,8 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
     """Degree of the solutions in time if they are polynomials, else 0."""
     if any(entry.has(*ELEMENTARY) and entry.has(symbols.t) for entry in field):
         return 0
+    if not _may_be_nilpotent(jacobian):
+        return 0
     # x^(k + 1) = J x^(k) + d^k f/dt^k
     rate, forcing = list(field), list(field)
     for degree in range(1, 2 * len(field) + 4):
@@ -229,6 +234,20 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
         if all(entry == 0 for entry in rate):
             return degree
     return 0
+
+
+def _may_be_nilpotent(matrix: Sequence[Sequence[sympy.Expr]]) -> bool:
+    """Whether a matrix in the parameters vanishes in its own powers, as far as one set of values can tell."""
+    names = sorted({name for row in matrix for entry in row for name in entry.free_symbols}, key=str)
+    drawn = np.random.default_rng(1).uniform(1.0, 2.0, len(names))
+    values = dict(zip(names, map(sympy.Float, drawn), strict=True))
+    try:
+        numbers = np.array([[float(entry.xreplace(values)) for entry in row] for row in matrix])
+    except (TypeError, ValueError):
+        return True
+    scaled = numbers / max(np.abs(numbers).max(), SMALLEST)
+    power = np.linalg.matrix_power(scaled, len(matrix))
+    return not np.abs(power).max() > SAME
 
 
 def _write(

@@ -16,6 +16,7 @@ from hybrid.kernels.lanes import (
     HERE,
     built_in,
     everywhere,
+    matrix_of,
     multiply_add,
     read,
     vector_of,
@@ -86,7 +87,6 @@ def combine_tangents(series, order, table, width, first, n):
     )
 
 
-@register_jitable
 def spread_tangents(y, n, series, first, stride):
     """Tangent vectors from ``y (n (1 + k),)`` into order zero of their series: four at a time, by component.
 
@@ -106,34 +106,6 @@ def gather_tangents(series, order, n, first, stride, y):
         column = first + vector // NARROW * stride + vector % NARROW
         for i in range(n):
             y[n * (1 + vector) + i] = series[order, column + NARROW * i]
-
-
-@overload(convolve, jit_options=HERE)
-def _overload_convolve(series, order, inset, left, first, width, widest):
-    return lambda series, order, inset, left, first, width, widest: _convolve_in_registers(
-        series, order, inset, left, first, width, widest, False
-    )
-
-
-@overload(convolve_pairs, jit_options=HERE)
-def _overload_convolve_pairs(series, order, inset, left, first, width, widest):
-    return lambda series, order, inset, left, first, width, widest: _convolve_in_registers(
-        series, order, inset, left, first, width, widest, True
-    )
-
-
-@overload(combine, jit_options=HERE)
-def _overload_combine(series, order, table, width, numbers):
-    return lambda series, order, table, width, numbers: _combine_in_registers(
-        series, order, table, width, numbers
-    )
-
-
-@overload(combine_tangents, jit_options=HERE)
-def _overload_combine_tangents(series, order, table, width, first, n):
-    return lambda series, order, table, width, first, n: _combine_tangents_in_registers(
-        series, order, table, width, first, n
-    )
 
 
 @overload(evaluate, jit_options=HERE)
@@ -159,36 +131,6 @@ def _overload_evaluate_with_sizes(series, order, s, first, width):
     return in_registers
 
 
-class _Matrix:
-    """Writes the instructions that walk through the rows of a matrix."""
-
-    def __init__(self, context, builder, matrix_type, matrix):
-        array = context.make_array(matrix_type)(context, builder, matrix)
-        self.builder = builder
-        self.data = array.data
-        self.columns = cgutils.unpack_tuple(builder, array.shape)[1]
-
-    def address(self, row, column):
-        """Address of an entry."""
-        builder = self.builder
-        return builder.gep(self.data, [builder.add(builder.mul(row, self.columns), column)])
-
-    def walker(self, row, column):
-        """A variable that holds the address of an entry."""
-        return cgutils.alloca_once_value(self.builder, self.address(row, column))
-
-    def walk(self, walker, rows):
-        """Move on by a number of rows; returns where it was."""
-        builder = self.builder
-        here = builder.load(walker)
-        builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
-        return here
-
-    def beside(self, address, columns):
-        """Address of an entry that many columns further."""
-        return self.builder.gep(address, [self.columns.type(columns)])
-
-
 def _registers(width, widest):
     """First column and width of each register, the widest first."""
     whole = width // widest * widest
@@ -204,53 +146,43 @@ def _as_known(*kinds):
     return tuple(kind if isinstance(kind, types.Literal) else types.intp for kind in kinds)
 
 
-@intrinsic(prefer_literal=True)
-def _convolve_in_registers(typing_context, series, order, inset, left, first, width, widest, pairs):
-    if not (isinstance(width, types.IntegerLiteral) and isinstance(widest, types.IntegerLiteral)):
-        return None
-    registers = _registers(width.literal_value, widest.literal_value)
+def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
+    """The instructions of ``convolve``, or of ``convolve_pairs``."""
+    registers = _registers(width, widest)
     sums_at_once = max(1, AT_ONCE // len(registers))
+    number = order.type
+    # The lowest orders of the columns come first: what was written last is the slowest to read.
+    factor = rows.walker(builder.sub(order, inset), left)
+    other = rows.walker(inset, first)
+    totals = [
+        [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for _, each in registers]
+        for _ in range(sums_at_once)
+    ]
 
-    def generate(context, builder, signature, arguments):
-        matrix, order, inset, left, first, *_ = arguments
-        rows = _Matrix(context, builder, signature.args[0], matrix)
-        number = order.type
-        # The lowest orders of the columns come first: what was written last is the slowest to read.
-        factor = rows.walker(builder.sub(order, inset), left)
-        other = rows.walker(inset, first)
-        totals = [
-            [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for _, each in registers]
-            for _ in range(sums_at_once)
-        ]
+    def add_term(row_of_totals):
+        a, b = rows.walk(factor, -1), rows.walk(other, 1)
+        for (place, each), total in zip(registers, row_of_totals, strict=True):
+            term = read(builder, rows.beside(b, place), each)
+            if pairs:
+                times = read(builder, rows.beside(a, place), each)
+            else:
+                times = everywhere(builder, builder.load(a), each)
+            builder.store(multiply_add(builder, times, term, builder.load(total)), total)
 
-        def add_term(row_of_totals):
-            a, b = rows.walk(factor, -1), rows.walk(other, 1)
-            for (place, each), total in zip(registers, row_of_totals, strict=True):
-                term = read(builder, rows.beside(b, place), each)
-                if pairs.literal_value:
-                    times = read(builder, rows.beside(a, place), each)
-                else:
-                    times = everywhere(builder, builder.load(a), each)
-                builder.store(multiply_add(builder, times, term, builder.load(total)), total)
-
-        terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
-        terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
-        with cgutils.for_range(builder, builder.udiv(terms, number(sums_at_once)), intp=number):
-            for each in totals:
-                add_term(each)
-        if sums_at_once > 1:
-            with cgutils.for_range(builder, builder.urem(terms, number(sums_at_once)), intp=number):
-                add_term(totals[0])
-        target = rows.address(order, first)
-        for i, (place, _) in enumerate(registers):
-            parts = [builder.load(each[i]) for each in totals]
-            while len(parts) > 1:
-                parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
-            write(builder, parts[0], rows.beside(target, place))
-        return context.get_dummy_value()
-
-    known = _as_known(order, inset, left, first, width, widest, pairs)
-    return types.void(series, *known), generate
+    terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
+    terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
+    with cgutils.for_range(builder, builder.udiv(terms, number(sums_at_once)), intp=number):
+        for each in totals:
+            add_term(each)
+    if sums_at_once > 1:
+        with cgutils.for_range(builder, builder.urem(terms, number(sums_at_once)), intp=number):
+            add_term(totals[0])
+    target = rows.address(order, first)
+    for i, (place, _) in enumerate(registers):
+        parts = [builder.load(each[i]) for each in totals]
+        while len(parts) > 1:
+            parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
+        write(builder, parts[0], rows.beside(target, place))
 
 
 @intrinsic(prefer_literal=True)
@@ -264,7 +196,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
 
     def generate(context, builder, signature, arguments):
         matrix, order, s, first, width, *_ = arguments
-        rows = _Matrix(context, builder, signature.args[0], matrix)
+        rows = matrix_of(context, builder, series, matrix)
         number = order.type
         factor = everywhere(builder, s, lanes)
         square = everywhere(builder, builder.fmul(s, s), lanes)
@@ -319,51 +251,46 @@ def _weighted_sum(builder, factors, terms):
     return total
 
 
-@intrinsic(prefer_literal=True)
-def _combine_in_registers(typing_context, series, order, table, width, numbers):
-    if not isinstance(width, types.IntegerLiteral):
-        return None
-    known = _as_known(order, table, width)
-    width = width.literal_value
-
-    def generate(context, builder, signature, arguments):
-        matrix, order, table, _, numbers = arguments
-        rows = _Matrix(context, builder, signature.args[0], matrix)
-        number, numbers = order.type, cgutils.unpack_tuple(builder, numbers)
-        target, source = rows.walker(number(0), number(0)), rows.walker(number(0), table)
-        with cgutils.for_range(builder, builder.add(order, number(1)), intp=number):
-            here, there = rows.walk(target, 1), rows.walk(source, 1)
-            for place, lanes in _registers(width, WIDE):
-                factors = [everywhere(builder, each, lanes) for each in numbers]
-                blocks = [rows.beside(there, width * c + place) for c in range(len(numbers))]
-                terms = [read(builder, block, lanes) for block in blocks]
-                write(builder, _weighted_sum(builder, factors, terms), rows.beside(here, place))
-        return context.get_dummy_value()
-
-    numbers = types.UniTuple(types.float64, len(numbers))
-    return types.void(series, *known, numbers), generate
+def write_combination(builder, rows, order, table, width, numbers):
+    """The instructions of ``combine``."""
+    number = order.type
+    target, source = rows.walker(number(0), number(0)), rows.walker(number(0), table)
+    with cgutils.for_range(builder, builder.add(order, number(1)), intp=number):
+        here, there = rows.walk(target, 1), rows.walk(source, 1)
+        for place, lanes in _registers(width, WIDE):
+            factors = [everywhere(builder, each, lanes) for each in numbers]
+            blocks = [rows.beside(there, width * c + place) for c in range(len(numbers))]
+            terms = [read(builder, block, lanes) for block in blocks]
+            write(builder, _weighted_sum(builder, factors, terms), rows.beside(here, place))
 
 
-@intrinsic(prefer_literal=True)
-def _combine_tangents_in_registers(typing_context, series, order, table, width, first, n):
-    if not (isinstance(width, types.IntegerLiteral) and isinstance(n, types.IntegerLiteral)):
-        return None
-    known = _as_known(order, table, width, first, n)
-    width, n = width.literal_value, n.literal_value
+def write_combination_of_tangents(builder, rows, order, table, width, first, n):
+    """The instructions of ``combine_tangents``."""
+    number = order.type
+    start = rows.address(number(0), first)
+    vectors = [read(builder, rows.beside(start, NARROW * j), NARROW) for j in range(n)]
+    target, source = rows.walker(number(1), first), rows.walker(number(1), table)
+    with cgutils.for_range(builder, order, intp=number):
+        here, there = rows.walk(target, 1), rows.walk(source, 1)
+        for i in range(n):
+            entries = [builder.load(rows.beside(there, width * j + i)) for j in range(n)]
+            factors = [everywhere(builder, entry, NARROW) for entry in entries]
+            write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
 
-    def generate(context, builder, signature, arguments):
-        matrix, order, table, _, first, _ = arguments
-        rows = _Matrix(context, builder, signature.args[0], matrix)
-        number = order.type
-        start = rows.address(number(0), first)
-        vectors = [read(builder, rows.beside(start, NARROW * j), NARROW) for j in range(n)]
-        target, source = rows.walker(number(1), first), rows.walker(number(1), table)
-        with cgutils.for_range(builder, order, intp=number):
-            here, there = rows.walk(target, 1), rows.walk(source, 1)
+
+def write_spread(builder, y, length, n, rows, first, stride):
+    """The instructions of ``spread_tangents``: lanes without a vector are zero."""
+    number = first.type
+    count = builder.sub(builder.sdiv(length, number(n)), number(1))
+    groups = builder.sdiv(builder.add(count, number(NARROW - 1)), number(NARROW))
+    with cgutils.for_range(builder, groups, intp=number) as group:
+        for lane in range(NARROW):
+            vector = builder.add(builder.mul(group.index, number(NARROW)), number(lane))
+            is_one = builder.icmp_signed("<", vector, count)
+            column = builder.add(builder.add(first, builder.mul(group.index, stride)), number(lane))
+            source = builder.select(is_one, builder.mul(number(n), builder.add(vector, number(1))), number(0))
+            start, target = builder.gep(y, [source]), rows.address(number(0), column)
             for i in range(n):
-                entries = [builder.load(rows.beside(there, width * j + i)) for j in range(n)]
-                factors = [everywhere(builder, entry, NARROW) for entry in entries]
-                write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
-        return context.get_dummy_value()
-
-    return types.void(series, *known), generate
+                value = builder.load(builder.gep(start, [number(i)]))
+                value = builder.select(is_one, value, value.type(0.0))
+                builder.store(value, rows.beside(target, NARROW * i))

@@ -5,12 +5,9 @@ and Oishi 2005, doi:10.1137/030601818).
 """
 
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, overload
 
 from hybrid.kernels.codes import NARROW
-from hybrid.kernels.lanes import HERE, LANES, built_in, everywhere, vector_of
+from hybrid.kernels.lanes import built_in, everywhere, vector_of
 
 # Times this, less the number itself, is a number with the upper half of its digits.
 UPPER_HALF = 2.0**27 + 1.0
@@ -46,40 +43,26 @@ def _halves(number):
     return upper, number - upper
 
 
-@overload(divided_dot_product, jit_options=HERE)
-def _overload_divided_dot_product(factors, highs, lows, by):
-    return lambda factors, highs, lows, by: _divided_dot_product_in_registers(factors, highs, lows, by)
+def write_divided_dot_product(builder, factors, highs, lows, by):
+    """The instructions of ``divided_dot_product``; returns both parts."""
+    zero = vector_of(NARROW)([0.0] * NARROW)
+    add, subtract, divide = builder.fadd, builder.fsub, builder.fdiv
 
+    def lost(factor, lanes, product):
+        negative = subtract(vector_of(NARROW)([-0.0] * NARROW), product)
+        return built_in(builder, "fma", NARROW, factor, lanes, negative)
 
-@intrinsic
-def _divided_dot_product_in_registers(typing_context, factors, highs, lows, by):
-    """Written out at once: the compiler would take as long for each operation as for all of these."""
-
-    def generate(context, builder, signature, arguments):
-        zero = vector_of(NARROW)([0.0] * NARROW)
-        add, subtract, divide = builder.fadd, builder.fsub, builder.fdiv
-
-        def lost(factor, lanes, product):
-            negative = subtract(vector_of(NARROW)([-0.0] * NARROW), product)
-            return built_in(builder, "fma", NARROW, factor, lanes, negative)
-
-        *tuples, by = arguments
-        by = everywhere(builder, by, NARROW)
-        total, rest = zero, zero
-        for factor, high, low in zip(*(cgutils.unpack_tuple(builder, each) for each in tuples), strict=True):
-            factor = everywhere(builder, factor, NARROW)
-            product = builder.fmul(factor, high)
-            longer = add(total, product)
-            part = subtract(longer, total)
-            of_sum = add(subtract(total, subtract(longer, part)), subtract(product, part))
-            of_product = add(lost(factor, high, product), builder.fmul(factor, low))
-            total, rest = longer, add(rest, add(of_sum, of_product))
-        quotient = divide(total, by)
-        low = divide(subtract(rest, lost(by, quotient, total)), by)
-        whole = add(quotient, low)
-        parts = whole, subtract(low, subtract(whole, quotient))
-        return context.make_tuple(builder, signature.return_type, parts)
-
-    count = len(factors)
-    numbers, lanes = types.UniTuple(types.float64, count), types.UniTuple(LANES, count)
-    return types.UniTuple(LANES, 2)(numbers, lanes, lanes, types.float64), generate
+    by = everywhere(builder, by, NARROW)
+    total, rest = zero, zero
+    for factor, high, low in zip(factors, highs, lows, strict=True):
+        factor = everywhere(builder, factor, NARROW)
+        product = builder.fmul(factor, high)
+        longer = add(total, product)
+        part = subtract(longer, total)
+        of_sum = add(subtract(total, subtract(longer, part)), subtract(product, part))
+        of_product = add(lost(factor, high, product), builder.fmul(factor, low))
+        total, rest = longer, add(rest, add(of_sum, of_product))
+    quotient = divide(total, by)
+    low = divide(subtract(rest, lost(by, quotient, total)), by)
+    whole = add(quotient, low)
+    return whole, subtract(low, subtract(whole, quotient))

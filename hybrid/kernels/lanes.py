@@ -62,11 +62,37 @@ def multiply_add(builder, a, b, c):
     return builder.fadd(c, builder.fmul(a, b, flags=FUSED), flags=FUSED)
 
 
-def place(context, builder, matrix_type, matrix, row, column):
-    """Address of an entry of a matrix."""
-    array = context.make_array(matrix_type)(context, builder, matrix)
-    columns = cgutils.unpack_tuple(builder, array.shape)[1]
-    return builder.gep(array.data, [builder.add(builder.mul(row, columns), column)])
+class Matrix:
+    """Writes the instructions that find the entries of a matrix: where its data begin, and its columns."""
+
+    def __init__(self, builder, data, columns):
+        self.builder, self.data, self.columns = builder, data, columns
+
+    def address(self, row, column):
+        """Address of an entry."""
+        builder = self.builder
+        return builder.gep(self.data, [builder.add(builder.mul(row, self.columns), column)])
+
+    def walker(self, row, column):
+        """A variable that holds the address of an entry."""
+        return cgutils.alloca_once_value(self.builder, self.address(row, column))
+
+    def walk(self, walker, rows):
+        """Move on by a number of rows; returns where it was."""
+        builder = self.builder
+        here = builder.load(walker)
+        builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
+        return here
+
+    def beside(self, address, columns):
+        """Address of an entry that many columns further."""
+        return self.builder.gep(address, [self.columns.type(columns)])
+
+
+def matrix_of(context, builder, kind, matrix):
+    """A matrix of numba's."""
+    array = context.make_array(kind)(context, builder, matrix)
+    return Matrix(builder, array.data, cgutils.unpack_tuple(builder, array.shape)[1])
 
 
 def read(builder, address, width):
@@ -125,7 +151,9 @@ def _overload_store(matrix, row, column, lanes):
 @intrinsic
 def _read_register(typing_context, matrix, row, column):
     def generate(context, builder, signature, arguments):
-        return read(builder, place(context, builder, signature.args[0], *arguments), NARROW)
+        return read(
+            builder, matrix_of(context, builder, matrix, arguments[0]).address(*arguments[1:]), NARROW
+        )
 
     return LANES(matrix, types.intp, types.intp), generate
 
@@ -135,52 +163,30 @@ def _write_register(typing_context, matrix, row, column, lanes):
     kind = LANES if lanes == LANES else types.float64
 
     def generate(context, builder, signature, arguments):
-        *where, value = arguments
+        array, row, column, value = arguments
         vector = value if kind == LANES else everywhere(builder, value, NARROW)
-        write(builder, vector, place(context, builder, signature.args[0], *where))
+        write(builder, vector, matrix_of(context, builder, matrix, array).address(row, column))
         return context.get_dummy_value()
 
     return types.void(matrix, types.intp, types.intp, kind), generate
 
 
-@overload(store_down, jit_options=HERE)
-def _overload_store_down(matrix, row, column, stride, lanes):
-    return lambda matrix, row, column, stride, lanes: _write_apart(matrix, row, column, stride, lanes)
+def write_down(builder, matrix, row, column, stride, lanes):
+    """The instructions of ``store_down``."""
+    address = matrix.address(row, column)
+    for lane in range(NARROW):
+        builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
+        address = builder.gep(address, [stride])
 
 
-@intrinsic
-def _write_apart(typing_context, matrix, row, column, stride, lanes):
-    def generate(context, builder, signature, arguments):
-        matrix, row, column, stride, lanes = arguments
-        address = place(context, builder, signature.args[0], matrix, row, column)
-        for lane in range(NARROW):
-            builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
-            address = builder.gep(address, [stride])
-        return context.get_dummy_value()
-
-    return types.void(matrix, types.intp, types.intp, types.intp, LANES), generate
-
-
-@overload(store_row, jit_options=HERE)
-def _overload_store_row(matrix, row, column, numbers):
-    return lambda matrix, row, column, numbers: _write_row(matrix, row, column, numbers)
-
-
-@intrinsic
-def _write_row(typing_context, matrix, row, column, numbers):
-    def generate(context, builder, signature, arguments):
-        *where, numbers = arguments
-        values = cgutils.unpack_tuple(builder, numbers)
-        address = place(context, builder, signature.args[0], *where)
-        for i, width in enumerate(_widths(len(values))):
-            vector = vector_of(width)([0.0] * width)
-            for lane, value in enumerate(values[WIDE * i : WIDE * (i + 1)]):
-                vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
-            write(builder, vector, builder.gep(address, [ir.IntType(64)(WIDE * i)]))
-        return context.get_dummy_value()
-
-    count = len(numbers)
-    return types.void(matrix, types.intp, types.intp, types.UniTuple(types.float64, count)), generate
+def write_row(builder, matrix, row, column, numbers):
+    """The instructions of ``store_row``."""
+    address = matrix.address(row, column)
+    for i, width in enumerate(_widths(len(numbers))):
+        vector = vector_of(width)([0.0] * width)
+        for lane, value in enumerate(numbers[WIDE * i : WIDE * (i + 1)]):
+            vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
+        write(builder, vector, matrix.beside(address, WIDE * i))
 
 
 def square_root(lanes):

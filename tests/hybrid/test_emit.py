@@ -4,18 +4,20 @@ import os
 import subprocess
 import sys
 
-import numba
 import numpy as np
 import pytest
 
 from hybrid.compile import compile_system
+from hybrid.compiler.functions import ROLES as ALL_ROLES
+from hybrid.compiler.functions import functions_of
 from hybrid.derivative import sample_points
 from hybrid.emit import emit
 from hybrid.errors import ModelError
 from hybrid.names import parameter_view, state_values
-from hybrid.opaque import READONLY, OpaqueFunction, namespace_of
+from hybrid.opaque import READONLY, OpaqueFunction
 from hybrid.roles import field_role, guard_role, reset_role
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
+from tests.hybrid.text import called
 
 ROLES = ("flow", "flow_jacobian", "guard", "guard_gradient", "reset", "reset_jacobian")
 
@@ -23,15 +25,12 @@ ROLES = ("flow", "flow_jacobian", "guard", "guard_gradient", "reset", "reset_jac
 def load(emitted, *, compiled):
     """The six roles as functions."""
     if compiled:
-        scope = namespace_of(emitted)
-    else:
-        scope = {k: v.function if isinstance(v, OpaqueFunction) else v for k, v in emitted.opaque.items()}
-        scope[READONLY] = lambda x: x
-        exec(emitted.source, scope)
-    functions = (scope[name] for name in ROLES)
-    return dict(
-        zip(ROLES, (numba.njit(f, error_model="numpy") if compiled else f for f in functions), strict=True)
-    )
+        everything = dict(zip(ALL_ROLES, map(called, functions_of(emitted)), strict=True))
+        return {name: everything[name] for name in ROLES}
+    scope = {k: v.function if isinstance(v, OpaqueFunction) else v for k, v in emitted.opaque.items()}
+    scope[READONLY] = lambda x: x
+    exec(emitted.source, scope)
+    return {name: scope[name] for name in ROLES}
 
 
 def run(function, shape, index, t, x, p):

@@ -9,7 +9,7 @@ import hybrid
 import lyapunov
 import models
 from hybrid import run
-from hybrid.compile import roles_of
+from hybrid.compiler.functions import roles_of
 from hybrid.testing import variants
 
 

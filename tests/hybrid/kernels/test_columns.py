@@ -1,33 +1,18 @@
 """Compiled arithmetic on columns of series against its plain definition."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 from numba import float64, int64, njit, void
 
 from hybrid.kernels.columns import (
-    combine,
-    combine_tangents,
-    convolve,
-    convolve_pairs,
     evaluate,
     evaluate_with_sizes,
     gather_tangents,
-    spread_tangents,
 )
 from hybrid.kernels.layout import MATRIX
+from tests.hybrid.text import both
 
-
-@cache
-def compiled_convolve(function, width, widest):
-    """The width of a convolution and its registers' are known when it is compiled."""
-
-    @njit(void(MATRIX, int64, int64, int64, int64))
-    def compiled(series, order, inset, left, first):
-        function(series, order, inset, left, first, width, widest)
-
-    return compiled
+NOTHING = np.zeros(1)
 
 
 @njit(void(MATRIX, int64, float64, int64, int64))
@@ -45,32 +30,24 @@ def pair(columns=44):
     return series, series.copy()
 
 
-@pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 7, 28])
-@pytest.mark.parametrize("inset", [1, 2])
-@pytest.mark.parametrize(("widest", "function"), [(4, convolve), (8, convolve), (8, convolve_pairs)])
-def test_convolve(order, width, inset, widest, function):
-    series, plain = pair(80)
-    compiled_convolve(function, width, widest)(series, order, inset, 3, 43)
-    function(plain, order, inset, 3, 43, width, widest)
-    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
-
-
-def test_what_was_compiled_for_one_width_does_not_serve_another():
-    """Compiled once more, under other options, it is still written for its own width."""
-
-    def wide(series):
-        convolve(series, 9, 1, 3, 7, 16, 8)
-
-    def narrow(series):
-        convolve(series, 9, 1, 3, 7, 4, 8)
-
-    series, plain = pair()
-    for function, fastmath in ((wide, False), (narrow, False), (wide, {"nsz"})):
-        series[:] = plain
-        njit(void(MATRIX), fastmath=fastmath)(function)(series)
-    wide(plain)
-    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+def test_convolve():
+    """The width of a convolution and its registers' are known from the text; each is a branch of its own."""
+    cases = [
+        (width, inset, widest, name)
+        for width in (4, 8, 12, 20, 36)
+        for inset in (1, 2)
+        for widest, name in ((4, "convolve"), (8, "convolve"), (8, "convolve_pairs"))
+    ]
+    lines = []
+    for i, (width, inset, widest, name) in enumerate(cases):
+        lines += [f"if index == {i}:", f"    {name}(out, order, {inset}, 3, 43, {width}, {widest})"]
+    as_python, as_machine_code = both(lines, fused=True)
+    for i in range(len(cases)):
+        for order in (1, 2, 3, 4, 7, 28):
+            series, plain = pair(80)
+            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
+            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
 
 
 @pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
@@ -90,45 +67,52 @@ def test_evaluate(order, width, plain_function, compiled):
         np.testing.assert_allclose(series[order + 2, 2 : 2 + width], powers @ abs(terms), rtol=1e-12)
 
 
-@pytest.mark.parametrize("width", [4, 8, 12])
 @pytest.mark.parametrize("count", [1, 2, 7])
-@pytest.mark.parametrize("order", [1, 2, 28])
-def test_combine(order, count, width):
-    numbers = tuple(np.random.default_rng(count).normal(size=count))
-
-    @njit
-    def compiled(series):
-        combine(series, order, 14, width, numbers)
-
-    series, plain = pair(100)
-    compiled(series)
-    combine(plain, order, 14, width, numbers)
-    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
-    expected = sum(number * plain[order, 14 + width * c] for c, number in enumerate(numbers))
-    assert series[order, 0] == pytest.approx(expected, rel=1e-13, abs=1e-14)
+def test_combine(count):
+    numbers = tuple(np.random.default_rng(count).normal(size=count).tolist())
+    widths = (4, 8, 12)
+    lines = []
+    for i, width in enumerate(widths):
+        lines += [
+            f"if index == {i}:",
+            f"    combine(out, order, 14, {width}, ({', '.join(map(repr, map(float, numbers)))},))",
+        ]
+    as_python, as_machine_code = both(lines, fused=True)
+    for i, width in enumerate(widths):
+        for order in (1, 2, 28):
+            series, plain = pair(100)
+            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
+            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+            expected = sum(number * plain[order, 14 + width * c] for c, number in enumerate(numbers))
+            assert series[order, 0] == pytest.approx(expected, rel=1e-13, abs=1e-14)
 
 
 @pytest.mark.parametrize(("n", "width"), [(1, 4), (2, 8), (4, 8), (7, 12)])
 def test_combine_tangents(n, width):
-    @njit
-    def compiled(series):
-        combine_tangents(series, 9, 5, width, 100, n)
-
+    as_python, as_machine_code = both([f"combine_tangents(out, order, 5, {width}, 100, {n})"], fused=True)
     series, plain = pair(140)
-    compiled(series)
-    combine_tangents(plain, 9, 5, width, 100, n)
+    as_python(0, 0.0, NOTHING, NOTHING, 9, plain)
+    as_machine_code(0, 0.0, NOTHING, NOTHING, 9, series)
     np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
     matrix = plain[9, 5 : 5 + width * n].reshape(n, width)[:, :n].T
     vectors = plain[0, 100 : 100 + 4 * n].reshape(n, 4)
     np.testing.assert_allclose(series[9, 100 : 100 + 4 * n].reshape(n, 4), matrix @ vectors, rtol=1e-12)
 
 
-@pytest.mark.parametrize("count", [1, 4, 6])
+@pytest.mark.parametrize("count", [0, 1, 4, 6])
 def test_tangent_vectors_there_and_back(count):
+    """Vectors that fill no whole register are followed by zeros."""
     y = np.random.default_rng(count).normal(size=3 * (1 + count))
-    series, back = np.zeros((2, 60)), y.copy()
-    spread_tangents(y, 3, series, 8, 20)
-    back[3:] = 0.0
-    gather_tangents(series, 0, 3, 8, 20, back)
-    np.testing.assert_array_equal(back, y)
-    assert series[0, 8 + 4] == y[4]
+    runs = both(["vectors = 8", "spread_tangents(x, 3, out, vectors, 20)"])
+    found = []
+    for run in runs:
+        series, back = np.full((2, 60), 7.0), y.copy()
+        run(0, 0.0, y, NOTHING, 1, series)
+        back[3:] = 0.0
+        gather_tangents(series, 0, 3, 8, 20, back)
+        np.testing.assert_array_equal(back, y)
+        assert count == 0 or series[0, 8 + 4] == y[4]
+        assert not count % 4 or np.all(series[0, 8 + (count // 4) * 20 :][count % 4 : 12 : 4] == 0.0)
+        found.append(series)
+    np.testing.assert_array_equal(*found)

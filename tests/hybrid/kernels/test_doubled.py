@@ -4,31 +4,30 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from numba import njit
 
-from hybrid.kernels.doubled import divided_dot_product
-from hybrid.kernels.lanes import four_times, load, store, store_down
+from tests.hybrid.text import both
+
+# Row 0 holds two times four numbers, row 1 their dot product with a and b, row 2 one of all of these.
+TEXT = [
+    "a, b, by = p[0], p[1], p[2]",
+    "first, second, nothing = load(out, 0, 0), load(out, 0, 4), four_times(0.0)",
+    "high, low = divided_dot_product((a, b, ), (first, second, ), (nothing, nothing, ), 1.0)",
+    "store(out, 1, 0, high)",
+    "store(out, 1, 4, low)",
+    "high, low = divided_dot_product((b, a, ), (high, second, ), (low, nothing, ), by)",
+    "store(out, 2, 0, high)",
+    "store(out, 2, 4, low)",
+]
 
 
-def compute(matrix, a, b, by):
-    """Row 0 holds two times four numbers, row 1 their dot product with a and b, row 2 one of all of these."""
-    first, second, nothing = load(matrix, 0, 0), load(matrix, 0, 4), four_times(0.0)
-    high, low = divided_dot_product((a, b), (first, second), (nothing, nothing), 1.0)
-    store(matrix, 1, 0, high)
-    store(matrix, 1, 4, low)
-    high, low = divided_dot_product((b, a), (high, second), (low, nothing), by)
-    store(matrix, 2, 0, high)
-    store(matrix, 2, 4, low)
-
-
-@pytest.mark.parametrize("run", [compute, njit(fastmath={"contract"})(compute)], ids=["Python", "compiled"])
+@pytest.mark.parametrize("run", both(TEXT, fused=True), ids=["Python", "compiled"])
 @pytest.mark.parametrize("seed", range(20))
 def test_twice_the_digits(run, seed):
     rng = np.random.default_rng(seed)
     matrix = np.zeros((3, 8))
     matrix[0] = rng.normal(size=8) * 10.0 ** rng.integers(-5, 5, 8)
     a, b, by = float(rng.normal()), float(rng.normal()), float(rng.integers(1, 40))
-    run(matrix, a, b, by)
+    run(0, 0.0, np.zeros(1), np.array([a, b, by]), 0, matrix)
     for lane in range(4):
         first, second = Fraction(matrix[0, lane]), Fraction(matrix[0, 4 + lane])
         once = Fraction(a) * first + Fraction(b) * second
@@ -39,16 +38,3 @@ def test_twice_the_digits(run, seed):
             assert abs(found - exact) <= size * Fraction(2) ** -96
             # The first part is the whole, rounded.
             assert matrix[row, lane] == float(exact)
-
-
-def test_writing_down_a_column():
-    @njit
-    def compiled(matrix):
-        store_down(matrix, 1, 2, 5, load(matrix, 0, 0))
-
-    matrix = np.arange(60.0).reshape(3, 20)
-    expected = matrix.copy()
-    store_down(expected, 1, 2, 5, load(expected, 0, 0))
-    compiled(matrix)
-    np.testing.assert_array_equal(matrix, expected)
-    np.testing.assert_array_equal(matrix[1, [2, 7, 12, 17]], matrix[0, :4])

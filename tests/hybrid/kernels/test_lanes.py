@@ -13,8 +13,8 @@ from hybrid.kernels.lanes import (
     magnitude,
     square_root,
     store,
-    store_row,
 )
+from tests.hybrid.text import both
 
 EXPRESSIONS = {
     "sum": lambda a, b, s: a + b,
@@ -61,14 +61,32 @@ def test_the_largest_wherever_it_is(place):
 def test_a_row_is_written_in_whole_registers(count, filled):
     """What is not a whole register is filled up with zeros, and nothing behind it is touched."""
     numbers = tuple(1.0 + i for i in range(count))
-
-    @njit
-    def compiled(matrix):
-        store_row(matrix, 1, 2, numbers)
-
-    matrix = np.full((3, 20), np.nan)
-    compiled(matrix)
     expected = np.full((3, 20), np.nan)
-    expected[1, 2 : 2 + filled] = 0.0
-    store_row(expected, 1, 2, numbers)
-    np.testing.assert_array_equal(matrix, expected)
+    expected[1, 2 : 2 + count], expected[1, 2 + count : 2 + filled] = numbers, 0.0
+    for run in both([f"store_row(out, 1, 2, {numbers})"]):
+        matrix = np.full((3, 20), np.nan)
+        run(0, 0.0, np.zeros(1), np.zeros(1), 0, matrix)
+        np.testing.assert_array_equal(matrix, expected)
+
+
+def test_a_register_is_written_down_a_column():
+    expected = np.arange(60.0).reshape(3, 20)
+    expected[1, [2, 7, 12, 17]] = expected[0, :4]
+    for run in both(["store_down(out, 1, 2, 5, load(out, 0, 0))"]):
+        matrix = np.arange(60.0).reshape(3, 20)
+        run(0, 0.0, np.zeros(1), np.zeros(1), 0, matrix)
+        np.testing.assert_array_equal(matrix, expected)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a + b", "a - b", "a*b", "a/b", "-a", "s*a + (s - b)", "(a - s)/2.0 + b*s", "four_times(s)*a", "s"],
+)
+def test_arithmetic_of_generated_text(text):
+    lines = ["s = p[0]", "a, b = load(out, 0, 1), load(out, 1, 2)", f"store(out, 2, 3, {text})"]
+    found = []
+    for run in both(lines):
+        matrix = np.random.default_rng(1).normal(size=(3, 8))
+        run(0, 0.0, np.zeros(1), np.array([0.3]), 0, matrix)
+        found.append(matrix)
+    np.testing.assert_array_equal(*found)

@@ -1,0 +1,107 @@
+"""The compiled functions of a model, from their text or from what an earlier process has kept of them."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybrid.cache import keep, kept, say, source_key
+from hybrid.compiler.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, parsed
+from hybrid.compiler.machine import load, machine_code, processor
+from hybrid.kept import models_folder
+from hybrid.opaque import namespace_of, refusal_of
+
+if TYPE_CHECKING:
+    from hybrid.compiler.machine import Compiled
+    from hybrid.emitted import Emitted
+
+ROLES = (
+    "flow",
+    "flow_jacobian",
+    "variational_flow",
+    "guard",
+    "guard_gradient",
+    "reset",
+    "reset_jacobian",
+    "series",
+)
+# Models whose machine code stays in memory after their systems are gone.
+MOST_SOURCES = 64
+SIGNATURES = {"flow_jacobian": MATRIX_ROLE, "reset_jacobian": MATRIX_ROLE, "series": SERIES_ROLE}
+# The products of series may be fused into their sums; in a guard that could make a difference of equal terms
+# differ from zero.
+FUSED = ("series",)
+# Division by zero is infinite, not an error.
+IEEE = {"error_model": "numpy"}
+
+
+def functions_of(emitted: Emitted) -> tuple[Any, ...]:
+    """The compiled functions in the order of ``ROLES``; each has an ``address``.
+
+    Raises
+    ------
+    ModelError
+        If a function that tracing could not follow cannot be compiled as it is.
+    """
+    if not emitted.opaque:
+        return roles_of(emitted.source)
+    functions = parsed(emitted.source)
+    own = [name for name in ROLES if _names(functions[name]) & emitted.opaque.keys()]
+    compiled = dict(load(_code(functions, set(ROLES) - {*own}), [each for each in ROLES if each not in own]))
+    return tuple((compiled | _by_numba(emitted, own))[name] for name in ROLES)
+
+
+@lru_cache(maxsize=MOST_SOURCES)
+def roles_of(source: str) -> tuple[Compiled, ...]:
+    """The compiled functions of a text that calls no function of the user's, shared by all who have it."""
+    path = models_folder() / f"model_{source_key(source, processor())}.o"
+    code = _checked(path)
+    if code is None:
+        code = _code(parsed(source), ROLES)
+        keep(path, hashlib.sha256(code).digest() + code)
+    found = load(code, ROLES)
+    return tuple(found[name] for name in ROLES)
+
+
+def _code(functions: Mapping[str, ast.FunctionDef], names: Iterable[str]) -> bytes:
+    return machine_code(
+        [(functions[name], SIGNATURES.get(name, VECTOR_ROLE), name in FUSED) for name in sorted(names)]
+    )
+
+
+def _checked(path: Path) -> bytes | None:
+    """What is kept at a place if it is what was written there."""
+    content = kept(path)
+    if content is None:
+        return None
+    size = hashlib.sha256().digest_size
+    digest, code = content[:size], content[size:]
+    if hashlib.sha256(code).digest() == digest:
+        return code
+    say(f"hybrid: compiled code in {path.parent} is damaged and is made again.")
+    return None
+
+
+def _names(function: ast.FunctionDef) -> set[str]:
+    return {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
+
+
+def _by_numba(emitted: Emitted, names: Iterable[str]) -> dict[str, Any]:
+    """Roles that call functions of the user's: numba infers what they do. They are never kept."""
+    from numba import cfunc
+
+    from hybrid.kernels import layout
+
+    types = {MATRIX_ROLE: layout.MATRIX_ROLE, VECTOR_ROLE: layout.VECTOR_ROLE}
+    namespace = namespace_of(emitted)
+    try:
+        return {
+            name: cfunc(types[SIGNATURES.get(name, VECTOR_ROLE)].signature, **IEEE)(namespace[name])
+            for name in names
+        }
+    except Exception as error:
+        raise refusal_of(emitted, namespace, error) from error

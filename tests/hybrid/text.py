@@ -1,0 +1,39 @@
+"""Generated text run twice: as the Python that it is, and as machine code."""
+
+import ctypes
+
+import numpy as np
+
+from hybrid.compiler.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, parsed
+from hybrid.compiler.machine import load, machine_code
+from hybrid.printer import IMPORTS
+
+SIGNATURES = (VECTOR_ROLE, MATRIX_ROLE, SERIES_ROLE)
+
+
+def both(lines, kind=SERIES_ROLE, *, fused=False):
+    """Functions of the same arguments that run a text as Python, and as machine code."""
+    head = f"def role({', '.join(kind.names)}):\n"
+    source = head + "".join(f"    {line}\n" for line in lines)
+    scope = {}
+    exec(IMPORTS + source, scope)
+    code = machine_code([(parsed(source)["role"], kind, fused)])
+    return scope["role"], called(load(code, ["role"])["role"])
+
+
+def called(compiled):
+    """A compiled function to be called with numbers and arrays."""
+
+    def call(*arguments):
+        words = [word for argument in arguments for word in _words(argument)]
+        kinds = [ctypes.c_double if isinstance(word, float) else ctypes.c_int64 for word in words]
+        ctypes.CFUNCTYPE(None, *kinds)(compiled.address)(*words)
+
+    return call
+
+
+def _words(argument):
+    """A number itself; of an array who keeps it, its sizes and where its data begin."""
+    if not isinstance(argument, np.ndarray):
+        return [argument]
+    return [0, 0, argument.size, argument.itemsize, argument.ctypes.data, *argument.shape, *argument.strides]
