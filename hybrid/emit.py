@@ -16,12 +16,11 @@ import attrs
 import sympy
 
 from hybrid.continuity import jumps_of, may_jump
-from hybrid.derivative import COMPLEX_STEP, complex_step_error, symbolic_jacobian
+from hybrid.derivative import complex_step_error, symbolic_jacobian
 from hybrid.emitted import Emitted, Propagator
 from hybrid.errors import ModelError
 from hybrid.kernels.codes import WIDE
-from hybrid.names import PARAMETERS, STATE, plain_class
-from hybrid.opaque import READONLY, OpaqueFunction, check_plain
+from hybrid.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.periodicity import is_periodic
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
@@ -136,7 +135,7 @@ class _Writer:
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
         self.symbols: Symbols = model_symbols(system.dimension, len(system.parameters))
-        self.opaque: dict[str, object] = {}
+        self.opaque: dict[str, OpaqueFunction] = {}
 
     def write(self, role: Role) -> _Written:
         targets = ["out[0]"] if role.size is None else [f"out[{i}]" for i in range(role.size)]
@@ -190,35 +189,18 @@ class _Writer:
         return _Written(value, self._complex_step(role, reason))
 
     def _opaque_value(self, role: Role, targets: Sequence[str], reason: ModelError) -> list[str]:
-        name = self._opaque_name(role.title, role.function, reason)
-        lines = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
-        lines += [f"{target} = {'v' if role.size is None else f'v[{i}]'}" for i, target in enumerate(targets)]
-        return _or_nan(lines, targets)
+        shape = () if role.size is None else (role.size,)
+        name = self._opaque_name(role.title, role.function, reason, shape)
+        return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
 
     def _complex_step(self, role: Role, reason: ModelError) -> list[str]:
-        n, name = self.system.dimension, self._opaque_name(role.title, role.function, reason)
-        lines = []
-        if isinstance(self.system.state, int):
-            lines.append(f"z = x[:{n}].astype(np.complex128)")
-        for j in range(n + 1):
-            time = f"complex(t, {COMPLEX_STEP!r})" if j == n else "complex(t, 0.0)"
-            if not isinstance(self.system.state, int):
-                parts = (f"complex(x[{i}], {COMPLEX_STEP if i == j else 0.0})" for i in range(n))
-                lines.append(f"v{j} = {name}({time}, State({', '.join(parts)}), {self._parameters()})")
-                continue
-            if j < n:
-                lines.append(f"z[{j}] = complex(x[{j}], {COMPLEX_STEP!r})")
-            # a copy, since the function may hand back a view of its argument
-            lines.append(f"v{j} = {name}({time}, {READONLY}(z.copy()), {self._parameters()})")
-            if j < n:
-                lines.append(f"z[{j}] = complex(x[{j}], 0.0)")
-        targets = self._cells(role)
-        cells = iter(targets)
-        for i in range(role.rows):
-            for j in range(n + 1):
-                value = f"v{j}" if role.size is None else f"v{j}[{i}]"
-                lines.append(f"{next(cells)} = {value}.imag / {COMPLEX_STEP!r}")
-        return _or_nan(lines, targets)
+        shape = () if role.size is None else (role.size,)
+        name, columns = self._opaque_name(role.title, role.function, reason, shape), self.system.dimension + 1
+        self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
+        lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
+        cells = iter(self._cells(role))
+        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(role.rows) for j in range(columns)]
+        return lines
 
     def _given_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
         n, cells = self.system.dimension, self._cells(role)
@@ -233,15 +215,15 @@ class _Writer:
 
     def _opaque_derivative(self, role: Role, derivative: Callable[..., Any], reason: ModelError) -> list[str]:
         n = self.system.dimension
-        name = self._opaque_name(role.derivative_title, derivative, reason)
-        lines = [f"v = {name}(t, {self._state()}, {self._parameters()})"]
         width = n + 1 if derivative_has_time_column(self.system, role) else n
-        targets = self._cells(role)
-        cells = iter(targets)
+        shape = (width,) if role.size is None else (role.size, width)
+        name = self._opaque_name(role.derivative_title, derivative, reason, shape)
+        cells = iter(self._cells(role))
+        lines = [f"r = {name}(t, x, p)"]
         for i in range(role.rows):
-            row = "v" if role.size is None else f"v[{i}]"
-            lines += [f"{next(cells)} = {f'{row}[{j}]' if j < width else '0.0'}" for j in range(n + 1)]
-        return _or_nan(lines, targets)
+            entries = [*(f"r[{i * width + j}]" for j in range(width)), *["0.0"] * (n + 1 - width)]
+            lines += [f"{next(cells)} = {entry}" for entry in entries]
+        return lines
 
     def _cells(self, role: Role) -> list[str]:
         columns = range(self.system.dimension + 1)
@@ -249,32 +231,17 @@ class _Writer:
             return [f"out[{j}]" for j in columns]
         return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
 
-    def _opaque_name(self, title: str, function: Callable[..., Any], reason: ModelError) -> str:
+    def _opaque_name(
+        self, title: str, function: Callable[..., Any], reason: ModelError, shape: tuple[int, ...]
+    ) -> str:
         for name, known in self.opaque.items():
-            if isinstance(known, OpaqueFunction) and known.function is function:
+            if known.function is function and known.shape == shape:
                 return name
         check_plain(title, function)
-        name = f"model_{sum(key.startswith('model_') for key in self.opaque)}"
-        self.opaque[name] = OpaqueFunction(title, function, str(reason).rstrip("."))
+        name, names = f"model_{len(self.opaque)}", tuple(self.system.parameters)
+        why = str(reason).rstrip(".")
+        self.opaque[name] = OpaqueFunction(title, function, why, self.system.state, names, shape)
         return name
-
-    def _state(self) -> str:
-        state = self.system.state
-        if isinstance(state, int):
-            return f"{READONLY}(x[:{state}])"
-        self.opaque["State"] = plain_class(STATE, state)
-        return f"State({', '.join(f'x[{i}]' for i in range(len(state)))})"
-
-    def _parameters(self) -> str:
-        names = tuple(self.system.parameters)
-        self.opaque["Parameters"] = plain_class(PARAMETERS, names)
-        return f"Parameters({', '.join(f'p[{i}]' for i in range(len(names)))})"
-
-
-def _or_nan(lines: Sequence[str], targets: Sequence[str]) -> list[str]:
-    """Statements that store nan where a function raises an error, which compiled code has nobody to tell."""
-    failed = [f"    {target} = np.nan" for target in targets]
-    return ["try:", *(f"    {line}" for line in lines), "except Exception:", *failed]
 
 
 def _check_printable(expressions: Iterable[sympy.Expr]) -> None:

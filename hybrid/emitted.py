@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 
 from hybrid.kernels.codes import PROPAGATORS
+from hybrid.opaque import OpaqueFunction
 
 
 @attrs.frozen
@@ -81,8 +82,7 @@ class Emitted:
         guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
         model gives the same text, in any process.
     opaque
-        What the text refers to by name: the model functions that tracing could not follow, each an
-        ``OpaqueFunction``, and the named tuples they take. Empty if all were traced.
+        The model functions that tracing could not follow, by their names in the text.
     affine_guard
         By transition: whether the guard's gradient, its slope in time included, is proved to depend on
         parameters only.
@@ -110,7 +110,7 @@ class Emitted:
     """
 
     source: str
-    opaque: dict[str, object]
+    opaque: dict[str, OpaqueFunction]
     affine_guard: tuple[bool, ...]
     guard_in_series: tuple[bool, ...]
     programs: Programs

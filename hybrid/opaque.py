@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import dis
+import math
 from collections.abc import Callable, Mapping
 from types import FunctionType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 
+from hybrid.derivative import COMPLEX_STEP
 from hybrid.errors import ModelError
+from hybrid.names import PARAMETERS, STATE, plain_class
 
-if TYPE_CHECKING:
-    from hybrid.emitted import Emitted
-
-# In generated code, by which arrays are handed to these functions.
-READONLY = "readonly"
 LONGEST_REASON = 300
+# In generated text, behind the name of a function: its derivative along one of the variables.
+SLOPES = "_slopes"
 
 
 @attrs.frozen
 class OpaqueFunction:
     """A model function that is compiled as it is.
+
+    Generated text calls it by a name: ``r = model_0(t, x, p)`` gives all its numbers in one row, and
+    ``r = model_0_slopes(t, x, p, j)`` their derivatives along state ``j``, or along time for ``j = n``.
 
     Attributes
     ----------
@@ -31,11 +34,26 @@ class OpaqueFunction:
         The user's function.
     reason
         What stopped tracing.
+    state, parameters
+        Names of the states, or their number, and names of the parameters.
+    shape
+        Shape of what it returns.
+    slopes
+        Whether its derivatives are asked for, which are taken by the complex step.
     """
 
     title: str
     function: Callable[..., Any]
     reason: str
+    state: int | tuple[str, ...]
+    parameters: tuple[str, ...]
+    shape: tuple[int, ...]
+    slopes: bool = False
+
+    @property
+    def size(self) -> int:
+        """How many numbers it returns."""
+        return math.prod(self.shape)
 
 
 def check_plain(title: str, function: Callable[..., Any]) -> None:
@@ -58,20 +76,79 @@ def check_plain(title: str, function: Callable[..., Any]) -> None:
         )
 
 
-def namespace_of(emitted: Emitted) -> dict[str, Any]:
-    """The generated roles, with the functions that they call compiled by their first call."""
-    from numba import njit
+def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
+    """A function and its derivative, compiled, by their names in generated text; they never raise.
 
+    They fill their last argument, with nan if the function raises an error, which nobody could be told.
+
+    Raises
+    ------
+    ModelError
+        If numba cannot compile the function.
+    """
+    from numba import cfunc, float64, int64, njit, void
+
+    from hybrid.kernels.layout import VECTOR
     from hybrid.whole import WholeNumberCompiler, readonly
 
     compiled = njit(error_model="numpy", boundscheck=True, pipeline_class=WholeNumberCompiler)
-    namespace: dict[str, Any] = {
-        name: compiled(_own_copy(value.function)) if isinstance(value, OpaqueFunction) else value
-        for name, value in emitted.opaque.items()
-    }
-    namespace[READONLY] = readonly
-    exec(compile(emitted.source, "<hybrid model>", "exec"), namespace)
-    return namespace
+    function = compiled(_own_copy(opaque.function))
+    scope: dict[str, Any] = {"function": function, "readonly": readonly}
+    if isinstance(opaque.state, tuple):
+        scope["State"] = plain_class(STATE, opaque.state)
+    scope["Parameters"] = plain_class(PARAMETERS, opaque.parameters)
+    exec(_text(opaque), scope)
+    signatures = {"value": void(float64, VECTOR, VECTOR, VECTOR)}
+    if opaque.slopes:
+        signatures["slopes"] = void(float64, VECTOR, VECTOR, int64, VECTOR)
+    names = {"value": name, "slopes": name + SLOPES}
+    try:
+        return {
+            names[each]: cfunc(signature, error_model="numpy")(scope[each])
+            for each, signature in signatures.items()
+        }
+    except Exception as error:
+        raise _refusal(opaque, scope, error) from error
+
+
+def _text(opaque: OpaqueFunction) -> str:
+    """The functions ``value`` and ``slopes``, which call the user's with what it expects."""
+    state, step = opaque.state, repr(COMPLEX_STEP)
+    n = state if isinstance(state, int) else len(state)
+    p = f"Parameters({', '.join(f'p[{i}]' for i in range(len(opaque.parameters)))})"
+    shift = f"{step} if column == {{}} else 0.0"
+    if isinstance(state, int):
+        x, lines = f"readonly(x[:{n}])", [f"z = x[:{n}].astype(np.complex128)"]
+        lines.append(f"if column < {n}: z[column] = complex(x[column], {step})")
+        z = "readonly(z)"
+    else:
+        x, lines = f"State({', '.join(f'x[{i}]' for i in range(n))})", []
+        z = f"State({', '.join(f'complex(x[{i}], {shift.format(i)})' for i in range(n))})"
+    value = [f"v = function(t, {x}, {p})"]
+    slopes = [*lines, f"v = function(complex(t, {shift.format(n)}), {z}, {p})"]
+    for place in range(opaque.size):
+        entry = "v" + "".join(f"[{i}]" for i in _indices(place, opaque.shape))
+        value.append(f"out[{place}] = {entry}")
+        slopes.append(f"out[{place}] = {entry}.imag / {step}")
+    written = [("value", "t, x, p, out", value)]
+    if opaque.slopes:
+        written.append(("slopes", "t, x, p, column, out", slopes))
+    text = "import numpy as np\n"
+    for name, arguments, body in written:
+        text += f"def {name}({arguments}):\n    try:\n"
+        text += "".join(f"        {line}\n" for line in body)
+        text += (
+            f"    except Exception:\n        for i in range({opaque.size}):\n            out[i] = np.nan\n"
+        )
+    return text
+
+
+def _indices(place: int, shape: tuple[int, ...]) -> list[int]:
+    indices: list[int] = []
+    for length in reversed(shape):
+        place, index = divmod(place, length)
+        indices.insert(0, index)
+    return indices
 
 
 def _own_copy(function: Callable[..., Any]) -> FunctionType:
@@ -90,18 +167,14 @@ def _own_copy(function: Callable[..., Any]) -> FunctionType:
     return copy
 
 
-def refusal_of(emitted: Emitted, namespace: Mapping[str, Any], error: Exception) -> ModelError:
+def _refusal(opaque: OpaqueFunction, scope: Mapping[str, Any], error: Exception) -> ModelError:
     """What to tell of an error of the compiler: which function, what was met, what to write instead."""
-    told = [(value, _error_alone(emitted, namespace, name)) for name, value in _functions(emitted)]
-    found = [(value, alone) for value, alone in told if alone is not None]
-    if not found:
-        values = ", ".join(value.title for value, _ in told)
+    alone = _error_alone(opaque, scope)
+    if alone is None:
         return ModelError(
-            f"{values}: what it returns cannot be compiled: {_short(error)}. Return a tuple or an array of "
-            "numbers."
+            f"{opaque.title}: what it returns cannot be compiled: {_short(error)}. Return a tuple or an "
+            "array of numbers."
         )
-    opaque, alone = found[0]
-    assert alone is not None
     return ModelError(
         f"{opaque.title} can neither be traced nor compiled as it is. Tracing stopped: {opaque.reason}. "
         f"The compiler stopped: {_short(alone)}. Write it with NumPy functions on numbers (np.sin, "
@@ -109,28 +182,18 @@ def refusal_of(emitted: Emitted, namespace: Mapping[str, Any], error: Exception)
     )
 
 
-def _functions(emitted: Emitted) -> list[tuple[str, OpaqueFunction]]:
-    return [(name, value) for name, value in emitted.opaque.items() if isinstance(value, OpaqueFunction)]
-
-
-def _error_alone(emitted: Emitted, namespace: Mapping[str, Any], name: str) -> Exception | None:
-    """The error of compiling one function by itself, for numbers, then for complex ones if it takes them."""
+def _error_alone(opaque: OpaqueFunction, scope: Mapping[str, Any]) -> Exception | None:
+    """The error of compiling the function by itself, for numbers, then for complex ones if it takes them."""
     from numba import complex128, float64, typeof, types
 
-    state = emitted.opaque.get("State")
-    parameters = emitted.opaque["Parameters"]
-    assert isinstance(parameters, type)
-    p = typeof(parameters(*(0.0 for _ in parameters._fields)))  # type: ignore[attr-defined]
-    for scalar in (float64, complex128):
-        if scalar is complex128 and f"{name}(complex(" not in emitted.source:
-            continue
-        if isinstance(state, type):
-            fields = state._fields  # type: ignore[attr-defined]
-            x = typeof(state(*(0.0 if scalar is float64 else 0j for _ in fields)))
+    p = typeof(scope["Parameters"](*(0.0 for _ in opaque.parameters)))
+    for scalar in (float64, complex128)[: 1 + opaque.slopes]:
+        if isinstance(opaque.state, tuple):
+            x = typeof(scope["State"](*(0.0 if scalar is float64 else 0j for _ in opaque.state)))
         else:
             x = types.Array(scalar, 1, "C", readonly=True)
         try:
-            namespace[name].compile((scalar, x, p))
+            scope["function"].compile((scalar, x, p))
         except Exception as error:
             return error
     return None

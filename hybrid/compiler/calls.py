@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import attrs
@@ -89,10 +90,6 @@ def _store(builder: Any, matrix: Any, row: Any, column: Any, value: Any) -> None
     write(builder, lanes, matrix.address(row, column))
 
 
-def _convolve_pairs(builder: Any, *arguments: Any) -> None:
-    write_convolution(builder, *arguments, pairs=True)
-
-
 def _spread(builder: Any, y: Any, n: int, matrix: Any, first: Any, stride: Any) -> None:
     write_spread(builder, y.data, y.length, n, matrix, first, stride)
 
@@ -117,7 +114,7 @@ CALLS = {
     "store_row": Call(write_row),
     "four_times": Call(lambda builder, number: everywhere(builder, number, NARROW)),
     "convolve": Call(write_convolution, known=(5, 6)),
-    "convolve_pairs": Call(_convolve_pairs, known=(5, 6)),
+    "convolve_pairs": Call(partial(write_convolution, pairs=True), known=(5, 6)),
     "combine": Call(write_combination, known=(3,)),
     "combine_tangents": Call(write_combination_of_tangents, known=(3, 5)),
     "divided_dot_product": Call(write_divided_dot_product),

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cache import keep, kept, say, source_key
-from hybrid.compiler.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, parsed
+from hybrid.compiler.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, OwnFunction, parsed
 from hybrid.compiler.machine import load, machine_code, processor
 from hybrid.kept import models_folder
-from hybrid.opaque import namespace_of, refusal_of
+from hybrid.opaque import compiled_functions
 
 if TYPE_CHECKING:
     from hybrid.compiler.machine import Compiled
@@ -35,8 +34,6 @@ SIGNATURES = {"flow_jacobian": MATRIX_ROLE, "reset_jacobian": MATRIX_ROLE, "seri
 # The products of series may be fused into their sums; in a guard that could make a difference of equal terms
 # differ from zero.
 FUSED = ("series",)
-# Division by zero is infinite, not an error.
-IEEE = {"error_model": "numpy"}
 
 
 def functions_of(emitted: Emitted) -> tuple[Any, ...]:
@@ -49,10 +46,13 @@ def functions_of(emitted: Emitted) -> tuple[Any, ...]:
     """
     if not emitted.opaque:
         return roles_of(emitted.source)
-    functions = parsed(emitted.source)
-    own = [name for name in ROLES if _names(functions[name]) & emitted.opaque.keys()]
-    compiled = dict(load(_code(functions, set(ROLES) - {*own}), [each for each in ROLES if each not in own]))
-    return tuple((compiled | _by_numba(emitted, own))[name] for name in ROLES)
+    own: dict[str, tuple[Any, int]] = {}
+    for name, opaque in emitted.opaque.items():
+        own |= {each: (code, opaque.size) for each, code in compiled_functions(name, opaque).items()}
+    # Their addresses are of this process, so what calls them is not kept.
+    calls = {name: OwnFunction(code.address, size) for name, (code, size) in own.items()}
+    found = load(_code(emitted.source, calls), ROLES, needs=[code for code, _ in own.values()])
+    return tuple(found[name] for name in ROLES)
 
 
 @lru_cache(maxsize=MOST_SOURCES)
@@ -61,16 +61,16 @@ def roles_of(source: str) -> tuple[Compiled, ...]:
     path = models_folder() / f"model_{source_key(source, processor())}.o"
     code = _checked(path)
     if code is None:
-        code = _code(parsed(source), ROLES)
+        code = _code(source, {})
         keep(path, hashlib.sha256(code).digest() + code)
     found = load(code, ROLES)
     return tuple(found[name] for name in ROLES)
 
 
-def _code(functions: Mapping[str, ast.FunctionDef], names: Iterable[str]) -> bytes:
-    return machine_code(
-        [(functions[name], SIGNATURES.get(name, VECTOR_ROLE), name in FUSED) for name in sorted(names)]
-    )
+def _code(source: str, calls: Mapping[str, OwnFunction]) -> bytes:
+    functions = parsed(source)
+    roles = [(functions[name], SIGNATURES.get(name, VECTOR_ROLE), name in FUSED) for name in ROLES]
+    return machine_code(roles, calls)
 
 
 def _checked(path: Path) -> bytes | None:
@@ -84,24 +84,3 @@ def _checked(path: Path) -> bytes | None:
         return code
     say(f"hybrid: compiled code in {path.parent} is damaged and is made again.")
     return None
-
-
-def _names(function: ast.FunctionDef) -> set[str]:
-    return {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
-
-
-def _by_numba(emitted: Emitted, names: Iterable[str]) -> dict[str, Any]:
-    """Roles that call functions of the user's: numba infers what they do. They are never kept."""
-    from numba import cfunc
-
-    from hybrid.kernels import layout
-
-    types = {MATRIX_ROLE: layout.MATRIX_ROLE, VECTOR_ROLE: layout.VECTOR_ROLE}
-    namespace = namespace_of(emitted)
-    try:
-        return {
-            name: cfunc(types[SIGNATURES.get(name, VECTOR_ROLE)].signature, **IEEE)(namespace[name])
-            for name in names
-        }
-    except Exception as error:
-        raise refusal_of(emitted, namespace, error) from error

@@ -8,7 +8,7 @@ four numbers in a register; so nothing has to be inferred, and a role is ready i
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import reduce
 from typing import Any, ClassVar
 
@@ -54,6 +54,17 @@ class Vector:
 
 
 @attrs.frozen
+class OwnFunction:
+    """A function of the user's: where its machine code begins, and how many numbers it fills in."""
+
+    address: int
+    size: int
+
+
+NO_CALLS: Mapping[str, OwnFunction] = {}
+
+
+@attrs.frozen
 class Signature:
     """Names and types of the arguments of a role; an array is told by the number of its axes."""
 
@@ -66,7 +77,14 @@ MATRIX_ROLE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 2
 SERIES_ROLE = Signature(("index", "t", "x", "p", "order", "out"), (WHOLE, NUMBER, 1, 1, WHOLE, 2))
 
 
-def lower(module: Any, role: ast.FunctionDef, signature: Signature, *, fused: bool) -> None:
+def lower(
+    module: Any,
+    role: ast.FunctionDef,
+    signature: Signature,
+    *,
+    fused: bool,
+    calls: Mapping[str, OwnFunction] = NO_CALLS,
+) -> None:
     """Add a role to a module of LLVM's.
 
     Parameters
@@ -79,6 +97,8 @@ def lower(module: Any, role: ast.FunctionDef, signature: Signature, *, fused: bo
         Types of its arguments.
     fused
         Whether products may be fused into their sums.
+    calls
+        Functions of the user's that the text may call besides.
 
     Raises
     ------
@@ -91,14 +111,17 @@ def lower(module: Any, role: ast.FunctionDef, signature: Signature, *, fused: bo
     kinds = [ARRAYS.get(kind, kind) for kind in signature.types]
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), role.name)
     function.attributes.add("nounwind")
-    _Body(function, signature, ("contract",) if fused else ()).write(role.body)
+    _Body(function, signature, ("contract",) if fused else (), calls).write(role.body)
 
 
 class _Body:
     """Writes the instructions of one function."""
 
-    def __init__(self, function: Any, signature: Signature, flags: tuple[str, ...]) -> None:
-        self.flags = flags
+    def __init__(
+        self, function: Any, signature: Signature, flags: tuple[str, ...], calls: Mapping[str, OwnFunction]
+    ) -> None:
+        self.flags, self.calls = flags, calls
+        self.arguments = dict(zip(signature.names, function.args, strict=True))
         # Variables live in the first block, where LLVM looks for those that need no memory.
         self.front = ir.IRBuilder(function.append_basic_block("front"))
         self.builder = ir.IRBuilder(function.append_basic_block("body"))
@@ -156,6 +179,9 @@ class _Body:
     def _store_variable(self, name: str, value: Any) -> None:
         if name in self.values:
             raise LoweringError(f"{name} is an argument, and fixed")
+        if isinstance(value, tuple):
+            self.variables[name] = value
+            return
         variable = self.variables.get(name)
         if variable is None:
             variable = self.variables[name] = self.front.alloca(value.type, name=name)
@@ -174,8 +200,7 @@ class _Body:
         builder, before, made = self.builder, dict(self.variables), dict(self.variables)
         end = builder.append_basic_block("end")
         rest: list[ast.stmt] = [node]
-        while len(rest) == 1 and isinstance(rest[0], ast.If):
-            [each] = rest
+        while len(rest) == 1 and isinstance(each := rest[0], ast.If):
             then, otherwise = builder.append_basic_block("then"), builder.append_basic_block("else")
             builder.cbranch(self.truth(each.test), then, otherwise)
             builder.position_at_end(then)
@@ -223,7 +248,8 @@ class _Body:
         if node.id in self.values:
             return self.values[node.id]
         if node.id in self.variables:
-            return self.builder.load(self.variables[node.id])
+            variable = self.variables[node.id]
+            return variable if isinstance(variable, tuple) else self.builder.load(variable)
         if node.id == "inf":
             return NUMBER(float("inf"))
         return self._unknown(node)
@@ -239,6 +265,9 @@ class _Body:
         return self.builder.gep(array.data, [index])
 
     def _subscript(self, node: ast.Subscript) -> Any:
+        value = self.value(node.value)
+        if isinstance(value, tuple):
+            return value[ast.literal_eval(node.slice)]
         return self.builder.load(self._place(node))
 
     def _negative(self, node: ast.UnaryOp) -> Any:
@@ -327,11 +356,31 @@ class _Body:
         if name == "len":
             [array] = (self.value(each) for each in node.args)
             return array.length
+        if name in self.calls:
+            return self._own_call(self.calls[name], node.args)
         call: Call | None = CALLS.get(name)
         if call is None:
             return self._unknown(node)
         arguments = [self._argument(call, i, each) for i, each in enumerate(node.args)]
         return call(self.builder, *arguments)
+
+    def _own_call(self, function: OwnFunction, nodes: Sequence[ast.expr]) -> tuple[Any, ...]:
+        """The numbers that a function of the user's fills in; arrays are handed on as they came."""
+        names = [node.id if isinstance(node, ast.Name) else "" for node in nodes]
+        pairs = zip(names, nodes, strict=True)
+        arguments = [self.arguments[name] if name in self.arguments else self.value(n) for name, n in pairs]
+        numbers = self.front.alloca(NUMBER, WHOLE(function.size))
+        row = ARRAYS[1](ir.Undefined)
+        size, width = WHOLE(function.size), WHOLE(8)
+        nobody = ir.IntType(8).as_pointer()(None)
+        for place, part in enumerate((nobody, nobody, size, width, numbers)):
+            row = self.builder.insert_value(row, part, place)
+        for place, part in ((SHAPE, size), (SHAPE + 1, width)):
+            row = self.builder.insert_value(row, part, [place, 0])
+        arguments.append(row)
+        kind = ir.FunctionType(ir.VoidType(), [each.type for each in arguments])
+        self.builder.call(self.builder.inttoptr(WHOLE(function.address), kind.as_pointer()), arguments)
+        return tuple(self.builder.load(self.builder.gep(numbers, [WHOLE(i)])) for i in range(function.size))
 
     def _argument(self, call: Call, place: int, node: ast.expr) -> Any:
         if place in call.known:

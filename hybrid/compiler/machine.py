@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 from llvmlite import binding, ir
 
-from hybrid.compiler.lowering import Signature, lower
+from hybrid.compiler.lowering import NO_CALLS, OwnFunction, Signature, lower
 
 # As far as LLVM goes: more does not make generated code faster.
 SPEED = 3
@@ -18,10 +18,10 @@ SPEED = 3
 
 @attrs.frozen(eq=False)
 class Compiled:
-    """A function of loaded machine code; the code lives as long as this."""
+    """A function of loaded machine code; the code and what it calls live as long as this."""
 
     address: int
-    engine: Any = attrs.field(repr=False)
+    needs: Any = attrs.field(repr=False)
 
 
 def _new_target() -> Any:
@@ -48,13 +48,18 @@ def processor() -> str:
     return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
 
-def machine_code(roles: Sequence[tuple[ast.FunctionDef, Signature, bool]]) -> bytes:
-    """The contents of an object file with these functions; the truth value says which may be fused."""
+def machine_code(
+    roles: Sequence[tuple[ast.FunctionDef, Signature, bool]], calls: Mapping[str, OwnFunction] = NO_CALLS
+) -> bytes:
+    """The contents of an object file with these functions.
+
+    The truth value says of each whether it may be fused; ``calls`` are functions of the user's.
+    """
     module = ir.Module("model")
     module.triple = binding.get_default_triple()
     module.data_layout = str(_target().target_data)
     for role, signature, fused in roles:
-        lower(module, role, signature, fused=fused)
+        lower(module, role, signature, fused=fused, calls=calls)
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
     tuning = binding.create_pipeline_tuning_options(speed_level=SPEED)
@@ -65,10 +70,10 @@ def machine_code(roles: Sequence[tuple[ast.FunctionDef, Signature, bool]]) -> by
     return code
 
 
-def load(code: bytes, names: Sequence[str]) -> Mapping[str, Compiled]:
-    """The functions of an object file, ready to be called by their addresses."""
+def load(code: bytes, names: Sequence[str], needs: Sequence[Any] = ()) -> dict[str, Compiled]:
+    """The functions of an object file, ready to be called; ``needs`` is what else must stay for them."""
     # An engine frees its target when it is freed itself.
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _new_target())
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    return {name: Compiled(engine.get_function_address(name), engine) for name in names}
+    return {name: Compiled(engine.get_function_address(name), (engine, *needs)) for name in names}

@@ -13,8 +13,7 @@ from hybrid.compiler.functions import functions_of
 from hybrid.derivative import sample_points
 from hybrid.emit import emit
 from hybrid.errors import ModelError
-from hybrid.names import parameter_view, state_values
-from hybrid.opaque import READONLY, OpaqueFunction
+from hybrid.names import PARAMETERS, STATE, named_values, parameter_view, state_values
 from hybrid.roles import field_role, guard_role, reset_role
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
 from tests.hybrid.text import called
@@ -27,10 +26,35 @@ def load(emitted, *, compiled):
     if compiled:
         everything = dict(zip(ALL_ROLES, map(called, functions_of(emitted)), strict=True))
         return {name: everything[name] for name in ROLES}
-    scope = {k: v.function if isinstance(v, OpaqueFunction) else v for k, v in emitted.opaque.items()}
-    scope[READONLY] = lambda x: x
+    scope = {}
+    for name, own in emitted.opaque.items():
+        scope |= {name: in_python(own), f"{name}_slopes": slopes_in_python(own)}
     exec(emitted.source, scope)
     return {name: scope[name] for name in ROLES}
+
+
+def in_python(own):
+    """What generated text calls, without a compiler: all numbers of a function in one row."""
+
+    def values(t, x, p):
+        parameters = named_values(PARAMETERS, own.parameters, p)
+        state = (
+            x[: own.state]
+            if isinstance(own.state, int)
+            else named_values(STATE, own.state, x[: len(own.state)])
+        )
+        return np.ravel(np.array(own.function(t, state, parameters)))
+
+    return values
+
+
+def slopes_in_python(own):
+    def slopes(t, x, p, column):
+        n = own.state if isinstance(own.state, int) else len(own.state)
+        z = np.append(x[:n], t) + 1e-30j * (np.arange(n + 1) == column)
+        return in_python(own)(z[n], z[:n], p).imag / 1e-30
+
+    return slopes
 
 
 def run(function, shape, index, t, x, p):
