@@ -12,7 +12,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.agreement import check_agreement
 from hybrid.cache import announced
-from hybrid.compiler.functions import ROLES, functions_of
+from hybrid.compiler import ROLES
 from hybrid.errors import ArgumentError
 from hybrid.kept import traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
@@ -260,6 +260,9 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     compiled: CompiledSystem | None = system._compiled
     if compiled is None:
         load_kernels()
+        # What imports LLVM waits until a model is compiled.
+        from hybrid.compiler.functions import functions_of
+
         emitted = traced_or_kept(system)
         with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
             compiled = CompiledSystem(system, emitted, functions_of(emitted))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cache import keep, kept, say, source_key
+from hybrid.compiler import ROLES
 from hybrid.compiler.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, OwnFunction, parsed
 from hybrid.compiler.machine import load, machine_code, processor
 from hybrid.kept import models_folder
@@ -18,16 +19,6 @@ if TYPE_CHECKING:
     from hybrid.compiler.machine import Compiled
     from hybrid.emitted import Emitted
 
-ROLES = (
-    "flow",
-    "flow_jacobian",
-    "variational_flow",
-    "guard",
-    "guard_gradient",
-    "reset",
-    "reset_jacobian",
-    "series",
-)
 # Models whose machine code stays in memory after their systems are gone.
 MOST_SOURCES = 64
 SIGNATURES = {"flow_jacobian": MATRIX_ROLE, "reset_jacobian": MATRIX_ROLE, "series": SERIES_ROLE}

@@ -217,18 +217,17 @@ def check_sum_rule(case: Case) -> None:
 def _divergence(case: Case) -> tuple[float, float]:
     """Integral of ``div f`` along the run, by Gauss quadrature over each step; and of its magnitude."""
     arc, system = case.run.arc, case.system
-    model = compile_system(system).model(case.parameters)
-    jacobian = np.zeros((system.dimension, system.dimension + 1))
+    compiled, parameters = compile_system(system), system.parameter_values(case.parameters)
     total = size = 0.0
     for i in range(len(arc.t) - 1):
         h = arc.t[i + 1] - arc.t[i]
         if arc.j[i] != arc.j[i + 1] or h <= 0.0:
             continue
         mode = system.mode_index(str(arc.mode[i]))
+        role = field_role(system, system.modes[mode])
         times = arc.t[i] + 0.5 * h * (1.0 + GAUSS_NODES)
         for t, x, weight in zip(times, arc(times), GAUSS_WEIGHTS, strict=True):
-            model.flow_jacobian(mode, t, x, model.parameters, jacobian)
-            term = 0.5 * h * weight * np.trace(jacobian)
+            term = 0.5 * h * weight * np.trace(compiled.derivative(role, mode, t, x, parameters))
             total += term
             size += abs(term)
     return float(total), float(size)

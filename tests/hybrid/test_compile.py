@@ -6,7 +6,7 @@ import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
-from hybrid.compiler.functions import ROLES
+from hybrid.compiler import ROLES
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
 

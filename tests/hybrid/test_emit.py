@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybrid.compile import compile_system
-from hybrid.compiler.functions import ROLES as ALL_ROLES
+from hybrid.compiler import ROLES as ALL_ROLES
 from hybrid.compiler.functions import functions_of
 from hybrid.derivative import sample_points
 from hybrid.emit import emit

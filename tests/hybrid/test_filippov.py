@@ -11,6 +11,7 @@ import pytest
 import hybrid
 import lyapunov
 from hybrid.filippov import filippov
+from hybrid.roles import field_role
 from models import stick_slip
 from tests.reference.load import reference
 
@@ -444,12 +445,11 @@ class TestModel:
             lambda t, x, p: x.x * x.y - np.cos(p.k * t) * np.sqrt(1 + x.z**2),
         )
         compiled = hybrid.compile_system(system)
-        model = compiled.model()
+        sliding = field_role(system, system.modes[2])
         rng = np.random.default_rng(3)
         for _ in range(5):
             t, x = rng.uniform(0, 3), rng.uniform(0.5, 1.5, 3)
-            field = np.zeros(3)
-            model.flow(2, t, x, model.parameters, field)
+            field = compiled.value(sliding, 2, t, x, np.array([0.7]))
 
             def h(s, t=t, x=x, field=field):
                 x, y, z = x + s * field
