@@ -250,8 +250,8 @@ class _Body:
         if node.id in self.variables:
             variable = self.variables[node.id]
             return variable if isinstance(variable, tuple) else self.builder.load(variable)
-        if node.id == "inf":
-            return NUMBER(float("inf"))
+        if node.id in ("inf", "nan"):
+            return NUMBER(float(node.id))
         return self._unknown(node)
 
     def _tuple(self, node: ast.Tuple) -> tuple[Any, ...]:

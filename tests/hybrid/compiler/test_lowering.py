@@ -1,0 +1,185 @@
+"""Generated text computes as machine code what it computes as Python, to the last bit."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hybrid import symbolic as sym
+from hybrid.compiler.lowering import MATRIX_ROLE, VECTOR_ROLE, LoweringError, parsed
+from hybrid.compiler.machine import machine_code
+from hybrid.printer import MATH_FUNCTIONS, assignments
+from tests.hybrid.text import both
+
+X = np.array([0.7, -1.3, 0.0, 2.5])
+P = np.array([0.3])
+
+
+def results(lines, x=X, kind=VECTOR_ROLE, index=0, size=4):
+    """What both leave in ``out``."""
+    found = []
+    for run in both(lines, kind):
+        out = np.full(size if kind is VECTOR_ROLE else (size, size), 7.0)
+        with np.errstate(all="ignore"):
+            run(index, 0.25, np.array(x, dtype=float), P, out)
+        found.append(out)
+    return found
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "out[0] = x[0] + x[1]*t - x[3]/p[0]",
+        "out[0] = -x[1]",
+        "out[0] = 3 + 2*1.5",
+        "out[0] = x[1]/x[2]",
+        "out[0] = x[1] % x[0]",
+        "out[0] = x[0] % x[1]",
+        "out[0] = (-x[3]) % 2.5",
+        "out[0] = np.fmod(x[1], x[0])",
+        "out[0] = x[0]**1.7",
+        "out[0] = max(x[0], x[1], x[3], 1e-300)",
+        "out[0] = abs(x[1]) + sqrt(x[3])",
+        "out[0] = np.floor(x[1]) + np.ceil(x[1]) + np.trunc(x[1])",
+        "out[0] = (1.0 if x[0] < x[3] else 0.0)",
+        "out[0] = (1.0 if x[0] < x[3] <= 2.0 else sqrt(x[3]))",
+        "out[0] = (x[0] if (x[0] > 1.0) or (not (x[1] >= 0.0)) else x[1])",
+        "out[0] = (1.0 if (x[0] == 0.7) and (x[1] != 0.7) else 0.0)",
+        "out[0] = copysign(x[0], x[1])",
+        "out[len(x) - 1] = inf",
+        "out[0], out[1] = x[1], x[0]",
+        "pass",
+    ],
+)
+def test_a_statement(line):
+    np.testing.assert_array_equal(*results([line]))
+
+
+@pytest.mark.parametrize("name", sorted({name for name in MATH_FUNCTIONS.values() if "." not in name}))
+def test_functions_of_mathematics(name):
+    """Python calls the same library; LLVM may round the last bit otherwise."""
+    first = "1.7" if name == "acosh" else "0.6"
+    arguments = f"{first}, 0.8" if name in ("atan2", "hypot", "copysign") else f"{first}*x[3]/2.5"
+    found = results([f"out[0] = {name}({arguments})"])
+    np.testing.assert_allclose(*found, rtol=4e-16)
+
+
+def test_a_comparison_with_nan_is_false():
+    lines = [
+        "u = x[0]",
+        "out[0] = (1.0 if u > 0.0 else -1.0 if u < 0.0 else u)",
+        "out[1] = (2.0 if u != u else 3.0)",
+    ]
+    out = results(lines, x=[math.nan] * 4)
+    np.testing.assert_array_equal(*out)
+    assert math.isnan(out[1][0])
+    assert out[1][1] == 2.0
+
+
+def test_nothing_is_fused_where_it_is_not_allowed():
+    """``a*b - a*b`` is zero, not what rounding took from the product."""
+    found = results(["a = x[0]*x[1]", "out[0] = x[0]*x[1] - a"])
+    assert found[0][0] == found[1][0] == 0.0
+
+
+def test_loops_count_as_python_does():
+    lines = [
+        "s = 0.0",
+        "for i in range(4):",
+        "    for j in range(1, len(x), 2):",
+        "        s = s + (i + 10*j)*x[j]",
+        "    out[i] = s",
+        "for k in range(3, 3):",
+        "    out[k] = 99.0",
+    ]
+    np.testing.assert_array_equal(*results(lines))
+
+
+def test_matrices():
+    lines = ["r = len(x) - 2", "out[r, 1] = x[0]", "out[1, r + 1] = out[r, 1]*2.0"]
+    np.testing.assert_array_equal(*results(lines, kind=MATRIX_ROLE))
+
+
+@pytest.mark.parametrize("index", [0, 1, -1])
+def test_branches(index):
+    """A variable of one branch has nothing to do with that of another."""
+    lines = ["if index == 0:", "    y = x[0]", "    out[0] = y", "elif index == 1:", "    y = len(x)"]
+    lines += ["    out[0] = y", "else:", "    out[0] = 5.0"]
+    np.testing.assert_array_equal(*results(lines, index=index))
+
+
+def test_as_many_branches_as_a_model_has_transitions():
+    """A chain of choices is no nest: it may be longer than Python goes down."""
+    lines = [f"{'if' if i == 0 else 'elif'} index == {i}:\n        out[0] = {i}.0" for i in range(300)]
+    _, run = both(lines, VECTOR_ROLE)
+    for index in (0, 150, 299):
+        out = np.zeros(1)
+        run(index, 0.0, X, P, out)
+        assert out[0] == index
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("out[0] = x[0].real", "x[0].real"),
+        ("out[0] = unknown(x[0])", "unknown"),
+        ("out[0] = y", "'y'"),
+        ("while t < 1.0: pass", "while"),
+        ("out[0] = x[0] @ x[1]", "x[0] @ x[1]"),
+        ("t = 1.0", "t is an argument"),
+        ("index = 1", "index is an argument"),
+        ("out[0] = 1.0 if x[0] else 0.0", "x[0]"),
+        ("out[0] = 'a'", "'a'"),
+    ],
+)
+def test_other_text_is_refused(line, told):
+    with pytest.raises(LoweringError) as error:
+        both([line], VECTOR_ROLE)
+    assert told in str(error.value)
+
+
+def test_a_variable_keeps_its_type():
+    with pytest.raises(LoweringError, match="n is i64 in one place and double in another"):
+        both(["n = 1", "n = x[0]"], VECTOR_ROLE)
+    role = parsed("def role(a, b):\n    pass")["role"]
+    with pytest.raises(LoweringError, match=r"takes \('a', 'b'\); a role of its kind takes \('index'"):
+        machine_code([(role, VECTOR_ROLE, False)])
+
+
+NAMES = sympy.symbols("x[0] x[1] x[3] p[0] t", real=True)
+LEAVES = st.one_of(st.sampled_from(NAMES), st.floats(-3.0, 3.0).map(sym.number))
+
+
+def grown(inner):
+    two = st.tuples(inner, inner)
+    return st.one_of(
+        two.map(lambda e: e[0] + e[1]),
+        two.map(lambda e: e[0] * e[1]),
+        two.map(lambda e: sym.Maximum(*e)),
+        two.map(lambda e: sym.Minimum(*e)),
+        two.map(lambda e: sym.Remainder(*e)),
+        two.map(lambda e: sym.Less(*e)),
+        two.map(lambda e: sym.Or(*e)),
+        st.tuples(inner, inner, inner).map(lambda e: sym.Select(*e)),
+        inner.map(lambda e: e**3),
+        inner.map(lambda e: sym.Absolute(e) ** sympy.Rational(3, 2)),
+        inner.map(sym.Step),
+        inner.map(sym.Sign),
+        inner.map(sym.Floor),
+        inner.map(sym.Absolute),
+    )
+
+
+@settings(max_examples=15)
+@given(st.lists(st.recursive(LEAVES, grown, max_leaves=12), min_size=4, max_size=4))
+def test_any_expression(expressions):
+    """Whatever the printer writes of sums, products, choices and jumps; no bit differs."""
+    lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions)
+    try:
+        np.testing.assert_array_equal(*results(lines))
+    except (ZeroDivisionError, OverflowError):
+        # Python raises where IEEE has an answer.
+        return
