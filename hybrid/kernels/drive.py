@@ -36,8 +36,9 @@ from hybrid.kernels.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.guards import allowed, widen_scale
+from hybrid.kernels.guards import allowed, may_jump, widen_scale
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
+from hybrid.kernels.onset import BY_STEP
 from hybrid.kernels.series import series_step
 from hybrid.kernels.sides import side_of
 from hybrid.kernels.tangent import keep_apart
@@ -67,7 +68,10 @@ def arrived(model, run, work):
         before = run.side[transition]
         if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
             continue
-        now, _ = side_of(model, run, mode, transition, t, run.y, before, False, work)
+        now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
+        if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
+            # An event at a jump lies beyond its near side.
+            now = -before
         crossed = now == -before and crosses_towards(model.direction[transition], now)
         if crossed and allowed(model, transition, t, run.y, work.scalar):
             found = transition

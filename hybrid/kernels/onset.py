@@ -10,9 +10,13 @@ the side is the one from which the guard has not crossed yet. A guard whose firs
 has crossed: at the start of the step if its side there is not certain, else in between. The transition that
 has just fired does not fire again at the start.
 
+A guard that jumps across zero has no derivative to go by, and is never small: its side is its sign.
+
 A guard that lies on the other side of zero at the start, beyond rounding, has been passed by the rounding of
 the last step: it crosses at the start. Where no other step follows, the end of the run fires it.
 """
+
+import math
 
 from numba import njit
 
@@ -32,9 +36,13 @@ def is_zero(on_guard):
 
 @njit(**INLINE)
 def known_part(value, slope, on_guard):
-    """What rounding has made of a guard at the start of a step: its value, and a slope that is hidden."""
-    hidden = on_guard in (BY_ACCELERATION, BY_STEP)
-    return value if is_zero(on_guard) else 0.0, slope if hidden and abs(slope) < 1e300 else 0.0
+    """What rounding has made of a guard at the start of a step: its value, and a slope that is hidden.
+
+    Nothing of it where the guard jumps.
+    """
+    if not is_zero(on_guard) or not abs(slope) < math.inf:
+        return 0.0, 0.0
+    return value, slope if on_guard != BY_SPEED else 0.0
 
 
 @njit(**INLINE)

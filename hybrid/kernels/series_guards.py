@@ -315,10 +315,10 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if model.guard_in_series[transition] == 0:
             if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
                 continue
-            run.on_guard[transition] = 0
             theta, side, share = crossing_on_path(
                 model, method, run, transition, series, order, clock, t, 1.0, h, kind == EXACT, work
             )
+            run.on_guard[transition] = 0
             proved = min(proved, share)
             if theta == NO_ROOT:
                 run.side[transition] = side

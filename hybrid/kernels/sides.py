@@ -9,12 +9,13 @@ from hybrid.kernels.guards import (
     guard_acceleration,
     guard_speed,
     guard_value,
+    may_jump,
     rounding_band,
     smooth_band,
     speed_rounding,
 )
 from hybrid.kernels.layout import KERNEL
-from hybrid.kernels.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING
+from hybrid.kernels.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 
 # How the state came to the point: a run starts there, the flow led there, or a reset put it there.
 STARTED, FLOWED, LANDED = range(3)
@@ -65,9 +66,15 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
             return 1 if value > 0.0 else -1, JUMPING
         trend, order = speed, BY_SPEED
         if abs(speed) <= speed_rounding(model, run, mode, t, work):
-            trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
-            if abs(trend) <= acceleration_rounding(model, run, t, work):
+            if may_jump(model, run, transition, t, x, work):
+                # In the middle of the jump, where neither side is.
+                if was_on and before != 0:
+                    return before, JUMPING
                 trend, order = 0.0, BY_STEP
+            else:
+                trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
+                if abs(trend) <= acceleration_rounding(model, run, t, work):
+                    trend, order = 0.0, BY_STEP
     direction = model.direction[transition]
     if trend > 0.0:
         return 1, order
@@ -142,7 +149,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         own = came == LANDED and left == mode and transition == fired
         now, order = side_of(model, run, mode, transition, t, x, before, was_on, work)
         if came == STARTED:
-            crossed = order > 0 and direction != 0 and now == direction
+            crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
             crossed = order in (BY_SPEED, JUMPING) and before == -now and (direction == 0 or now == direction)
         else:
