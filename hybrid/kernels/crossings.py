@@ -96,6 +96,18 @@ def certain_sign(model, transition, path, order, clock, start, pace, place, base
 
 
 @njit(**KERNEL)
+def _still_hidden(model, transition, path, order, clock, start, pace, place, side, base, tilt, work):
+    """What is taken out of a guard from a place on: nothing once the whole guard is on its side for certain.
+
+    Its later roots, which may be flat, are those of the guard itself.
+    """
+    whole = certain_sign(model, transition, path, order, clock, start, pace, place, 0.0, 0.0, work)
+    if whole == side:
+        return 0.0, 0.0
+    return base, tilt
+
+
+@njit(**KERNEL)
 def root_in_bracket(
     model, transition, path, order, clock, start, pace, low, high, side, on_guard, base, tilt, work
 ):
@@ -223,6 +235,10 @@ def first_change(
         smooth = bounded and low < middle < high and side != 0
         if clear and not (smooth and nearest <= CLOSE * farthest):
             sure = high
+            if base != 0.0 or tilt != 0.0:
+                base, tilt = _still_hidden(
+                    model, transition, path, order, clock, start, pace, high, side, base, tilt, work
+                )
             top -= 1
             continue
         tolerated = 0.0
@@ -290,6 +306,10 @@ def first_change(
             if crosses_towards(direction, after) and not again:
                 return place, side, length
         side, sure = after, high
+        if base != 0.0 or tilt != 0.0:
+            base, tilt = _still_hidden(
+                model, transition, path, order, clock, start, pace, high, side, base, tilt, work
+            )
     if touch != NOWHERE:
         _note_touch(run, transition, touch, depth * side, length)
     return NOWHERE, side, length

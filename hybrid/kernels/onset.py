@@ -3,7 +3,7 @@
 A guard that rounding cannot tell from zero at the start of a step *is* zero there, and so are its derivatives
 below its order (``Run.on_guard``). Only what is left of it, ``g(s) - sum(g_k s^k, k < order)``, decides what
 follows. A guard that is a polynomial is divided by its variable (``bernstein.divide_by_theta``); any other
-guard is shifted by its ``known_part``.
+guard is shifted by its ``known_part``, until the guard itself is certain to be on its side.
 
 The run knows a side of the guard from the derivative of that order. Where rounding hides three derivatives,
 the side is the one from which the guard has not crossed yet. A guard whose first certain sign is not its side
