@@ -28,6 +28,9 @@ from hybrid.kernels.intervals import (
 )
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL, MATRIX, PART, PROGRAMS, VECTOR
 
+# A radius over which no slope makes a range narrower.
+FAR = 1e300
+
 
 @njit(**INLINE)
 def _narrowed(row, radius):
@@ -322,7 +325,8 @@ def bound_guard(programs, transition, path, order, clock, start, pace, middle, r
 def spread_by_rounding(programs, transition, t, x, scale, share, registers):
     """How far a guard may be from its value at ``(t, x)`` when each argument is off by its rounding.
 
-    That is ``share`` of the sizes in ``scale (n,)`` for the state, and of the time for the time.
+    That is ``share`` of the sizes in ``scale (n,)`` for the state, and of the time for the time. The distance
+    has a minus sign where the guard may jump within that.
     """
     first = programs.first[transition]
     for place in range(first, programs.first[transition + 1]):
@@ -333,10 +337,11 @@ def spread_by_rounding(programs, transition, t, x, scale, share, registers):
             spread = share * (scale[a] if code == op.STATE else abs(t))
             _bound_constant(row, value)
             row[LOW], row[HIGH] = value - spread, value + spread
-            # There is no path, and no slope that could narrow a range.
-            row[LEAST_SLOPE], row[MOST_SLOPE] = -math.inf, math.inf
+            row[LEAST_SLOPE], row[MOST_SLOPE] = -spread, spread
         else:
             _constant_leaf(programs, place, row)
-    last = registers[_run(programs, transition, registers, 1.0)]
+    last = registers[_run(programs, transition, registers, FAR)]
     low, high = last[LOW] - last[HIGH_MIDDLE], last[HIGH] - last[LOW_MIDDLE]
-    return max(abs(low), abs(high))
+    jumps = not last[MOST_SLOPE] - last[LEAST_SLOPE] < math.inf
+    distance = max(abs(low), abs(high))
+    return -distance if jumps else distance

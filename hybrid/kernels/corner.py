@@ -24,11 +24,13 @@ from hybrid.kernels.guards import (
     guard_acceleration,
     guard_speed,
     guard_value,
+    has_program,
     keep_grazing,
     speed_rounding,
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
+from hybrid.kernels.onset import BY_SPEED, JUMPING
 from hybrid.kernels.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 
 MOST_JUMPS = 50
@@ -137,7 +139,10 @@ def first_in_order(model, run, record, fired, work):
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
     direction = model.direction[fired]
     run.side[fired] = direction if direction != 0 else -before
-    run.on_guard[fired] = max(run.on_guard[fired], 1)
+    if run.on_guard[fired] == 0:
+        # A guard that is not small although it has just crossed zero has jumped.
+        by_bounds = has_program(model, fired) and model.guard_in_series[fired] == 0
+        run.on_guard[fired] = JUMPING if by_bounds else BY_SPEED
     run.due[fired] = 0 if touched else 1
     if touched:
         value = guard_value(model, fired, t, run.y, work.scalar)

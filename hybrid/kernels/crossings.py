@@ -17,16 +17,15 @@ from hybrid.kernels.codes import (
     GRAZING_VALUE,
     HIGH,
     HIGH_MIDDLE,
-    LAST_FIRED,
     LEAST_SLOPE,
     LOW,
     LOW_MIDDLE,
     MOST_SLOPE,
-    SINCE_ENTRY,
     UNPROVED,
 )
 from hybrid.kernels.guards import error_band, guard_value, has_program, rounding_band
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.onset import BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
 from hybrid.kernels.path import state_at, time_at
 
 # Instead of a place on the step.
@@ -49,42 +48,91 @@ MOST_ROOT_STEPS = 200
 SETTLED = 64.0 * EPSILON
 # Parts of a step at whose ends a guard that could not be traced is looked at.
 SAMPLES = 32
-# What ``Run.on_guard`` is for a guard whose speed and acceleration are zero too, and in how many places of a
-# step such a guard is looked at.
-AT_REST = 3
+# In how many places of a step a guard is looked at whose speed and acceleration are zero too.
 PLACES_AT_REST = 8
 
 
 @njit(**INLINE)
-def _row_at(model, transition, path, order, clock, start, pace, place, work):
-    """Row of ``work.registers`` with the bounds of a guard at one place: what rounding leaves unknown."""
-    return model.bound(
+def _shifted(row, base, tilt, low, high):
+    """Take ``base + tilt * place`` out of the bounds over the places from ``low`` to ``high``."""
+    middle = 0.5 * (low + high)
+    row[LOW] -= base + max(tilt * low, tilt * high)
+    row[HIGH] -= base + min(tilt * low, tilt * high)
+    row[LOW_MIDDLE] -= base + tilt * middle
+    row[HIGH_MIDDLE] -= base + tilt * middle
+    row[LEAST_SLOPE] -= tilt
+    row[MOST_SLOPE] -= tilt
+
+
+@njit(**INLINE)
+def _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work):
+    """Row of ``work.registers`` with the bounds of a guard at one place: what rounding leaves unknown.
+
+    The guard is looked at without ``base + tilt * place``, its ``onset.known_part``.
+    """
+    last = model.bound(
         model.programs, transition, path, order, clock, start, pace, place, 0.0, work.registers
     )
+    if base != 0.0 or tilt != 0.0:
+        _shifted(work.registers[last], base, tilt, place, place)
+    return last
+
+
+@njit(**INLINE)
+def _value_of(row, side):
+    """Value of a guard from its bounds at one place, where the guard comes from ``side``."""
+    slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE])
+    if not abs(slope) < math.inf and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
+        # It jumps somewhere within rounding of this place: the event is beyond.
+        return float(side)
+    return 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
 
 
 @njit(**KERNEL)
-def certain_sign(model, transition, path, order, clock, start, pace, place, work):
+def certain_sign(model, transition, path, order, clock, start, pace, place, base, tilt, work):
     """Sign of a guard at a place of the step, 0 if rounding could have made it."""
-    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)]
     return 1 if row[LOW] > 0.0 else (-1 if row[HIGH] < 0.0 else 0)
 
 
 @njit(**KERNEL)
-def root_in_bracket(model, transition, path, order, clock, start, pace, low, high, side, work):
+def _still_hidden(model, transition, path, order, clock, start, pace, place, side, base, tilt, work):
+    """What is taken out of a guard from a place on: nothing once the whole guard is on its side for certain.
+
+    Its later roots, which may be flat, are those of the guard itself.
+    """
+    whole = certain_sign(model, transition, path, order, clock, start, pace, place, 0.0, 0.0, work)
+    if whole == side:
+        return 0.0, 0.0
+    return base, tilt
+
+
+@njit(**KERNEL)
+def root_in_bracket(
+    model, transition, path, order, clock, start, pace, low, high, side, on_guard, base, tilt, work
+):
     """Where a guard changes its sign between two places; it is on ``side`` at ``low`` and not at ``high``.
 
     Newton's method on the guard, kept in the bracket; halving where it does not settle. The place returned is
-    the end of the bracket beyond the change of sign, or the root.
+    the end of the bracket beyond the change of sign, or the root. At the start of the step the guard may be
+    on the other side already: that is where it crosses.
     """
+    if low == 0.0:
+        row = work.registers[
+            _row_at(model, transition, path, order, clock, start, pace, 0.0, base, tilt, work)
+        ]
+        if is_zero(on_guard):
+            if not side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE]):
+                return 0.0
+        elif _value_of(row, side) * side <= 0.0:
+            return 0.0
     place, last = 0.5 * (low + high), high - low
     for trial in range(MOST_ROOT_STEPS):
-        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
-        value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
+        row = work.registers[
+            _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)
+        ]
+        value = _value_of(row, side)
         slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE])
-        if not abs(slope) < math.inf and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
-            # It jumps somewhere within rounding of this place: the event is beyond.
-            value = float(side)
         if value * side > 0.0:
             low = place
         else:
@@ -106,10 +154,12 @@ def root_in_bracket(model, transition, path, order, clock, start, pace, low, hig
 
 
 @njit(**KERNEL)
-def _turn_between(model, transition, path, order, clock, start, pace, low, high, side, work):
+def _turn_between(model, transition, path, order, clock, start, pace, low, high, side, base, tilt, work):
     """Where a guard on ``side`` comes closest to zero between two places, or NOWHERE if that is an end."""
     for place, towards in ((low, True), (high, False)):
-        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+        row = work.registers[
+            _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)
+        ]
         slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side
         if not abs(slope) < math.inf or (slope < 0.0) != towards:
             return NOWHERE
@@ -117,7 +167,9 @@ def _turn_between(model, transition, path, order, clock, start, pace, low, high,
         place = 0.5 * (low + high)
         if not low < place < high:
             break
-        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, work)]
+        row = work.registers[
+            _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)
+        ]
         if 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side < 0.0:
             low = place
         else:
@@ -157,6 +209,11 @@ def first_change(
     # The last place where the guard was on its side, beyond rounding, and where it came closest to zero.
     sure = 0.0
     touch, depth = NOWHERE, math.inf
+    base, tilt = 0.0, 0.0
+    if is_zero(on_guard):
+        row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
+        value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
+        base, tilt = known_part(value, 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]), on_guard)
     stack = work.intervals
     stack[0, 0], stack[0, 1] = SETTLED * length if on_guard > 0 else 0.0, length
     while top >= 0:
@@ -167,6 +224,8 @@ def first_change(
             model.programs, transition, path, order, clock, start, pace, middle, radius, work.registers
         )
         row = work.registers[last]
+        if base != 0.0 or tilt != 0.0:
+            _shifted(row, base, tilt, low, high)
         pieces += 1
         clear = row[LOW] * side > 0.0 and row[HIGH] * side > 0.0
         monotone = row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
@@ -176,6 +235,10 @@ def first_change(
         smooth = bounded and low < middle < high and side != 0
         if clear and not (smooth and nearest <= CLOSE * farthest):
             sure = high
+            if base != 0.0 or tilt != 0.0:
+                base, tilt = _still_hidden(
+                    model, transition, path, order, clock, start, pace, high, side, base, tilt, work
+                )
             top -= 1
             continue
         tolerated = 0.0
@@ -198,9 +261,13 @@ def first_change(
             run.count[UNPROVED] += 1
         turn = high
         if smooth and not monotone:
-            turn = _turn_between(model, transition, path, order, clock, start, pace, low, high, side, work)
+            turn = _turn_between(
+                model, transition, path, order, clock, start, pace, low, high, side, base, tilt, work
+            )
         if turn != NOWHERE and side != 0:
-            row = work.registers[_row_at(model, transition, path, order, clock, start, pace, turn, work)]
+            row = work.registers[
+                _row_at(model, transition, path, order, clock, start, pace, turn, base, tilt, work)
+            ]
             value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE]) * side
             within = value <= max(tolerated, 0.5 * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]))
             if shallow and low < turn < high and row[LOW] * side < 0.0 and row[HIGH] * side < 0.0:
@@ -210,23 +277,39 @@ def first_change(
             elif within and value < depth and on_guard == 0:
                 touch, depth = turn, value
         top -= 1
-        after = (
-            side if clear else certain_sign(model, transition, path, order, clock, start, pace, high, work)
-        )
+        after = side
+        if not clear:
+            after = certain_sign(model, transition, path, order, clock, start, pace, high, base, tilt, work)
         if after == 0:
             continue
         if after != side and side != 0:
             place = root_in_bracket(
-                model, transition, path, order, clock, start, pace, sure, high, side, work
+                model,
+                transition,
+                path,
+                order,
+                clock,
+                start,
+                pace,
+                sure,
+                high,
+                side,
+                on_guard,
+                base,
+                tilt,
+                work,
             )
             touch, depth = NOWHERE, math.inf
             side = after
             # Where it has just fired, the step only shows to which side the guard leaves zero.
-            same = on_guard > 0 and place <= SETTLED * length and run.count[LAST_FIRED] == transition
-            again = same and run.clock[SINCE_ENTRY] == 0.0
+            again = place <= SETTLED * length and has_just_fired(run, transition, on_guard)
             if crosses_towards(direction, after) and not again:
                 return place, side, length
         side, sure = after, high
+        if base != 0.0 or tilt != 0.0:
+            base, tilt = _still_hidden(
+                model, transition, path, order, clock, start, pace, high, side, base, tilt, work
+            )
     if touch != NOWHERE:
         _note_touch(run, transition, touch, depth * side, length)
     return NOWHERE, side, length
@@ -241,7 +324,7 @@ def _sample(model, transition, path, order, clock, start, pace, place, work):
 
 
 @njit(**KERNEL)
-def sampled_change(model, run, transition, path, order, clock, start, pace, length, side, work):
+def sampled_change(model, run, transition, path, order, clock, start, pace, length, side, on_guard, work):
     """As ``first_change`` for a guard that could not be traced: it is looked at in some places only."""
     run.count[UNPROVED] += 1
     direction, low = model.direction[transition], 0.0
@@ -250,6 +333,11 @@ def sampled_change(model, run, transition, path, order, clock, start, pace, leng
         value = _sample(model, transition, path, order, clock, start, pace, high, work)
         if value * side < 0.0:
             left, right = low, high
+            if low == 0.0 and not is_zero(on_guard):
+                first = _sample(model, transition, path, order, clock, start, pace, 0.0, work)
+                right = 0.0 if first * side <= 0.0 else high
+            elif low == 0.0 and on_guard == BY_STEP:
+                right = 0.0
             while right - left > 2.0 * EPSILON * right:
                 middle = 0.5 * (left + right)
                 if not left < middle < right:
@@ -259,7 +347,8 @@ def sampled_change(model, run, transition, path, order, clock, start, pace, leng
                 else:
                     right = middle
             side = -side
-            if crosses_towards(direction, side):
+            again = right <= SETTLED * length and has_just_fired(run, transition, on_guard)
+            if crosses_towards(direction, side) and not again:
                 return right, side, length
         elif side == 0 and value != 0.0:
             side = 1 if value > 0.0 else -1
@@ -273,7 +362,7 @@ def rests(model, run, transition, path, order, clock, start, pace, length, work)
 
     Zero at the end of the step alone says nothing: a guard may come back.
     """
-    if run.on_guard[transition] != AT_REST:
+    if run.on_guard[transition] != BY_STEP:
         return False
     for i in range(1, PLACES_AT_REST + 1):
         place = length * i / PLACES_AT_REST
@@ -295,7 +384,7 @@ def crossing_on_path(model, method, run, transition, path, order, clock, start, 
     side, on_guard = run.side[transition], run.on_guard[transition]
     if not has_program(model, transition):
         place, side, proved = sampled_change(
-            model, run, transition, path, order, clock, start, pace, length, side, work
+            model, run, transition, path, order, clock, start, pace, length, side, on_guard, work
         )
     else:
         place, side, proved = first_change(

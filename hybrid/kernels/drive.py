@@ -36,9 +36,11 @@ from hybrid.kernels.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, widen_scale
+from hybrid.kernels.guards import allowed, may_jump, widen_scale
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
+from hybrid.kernels.onset import BY_STEP
 from hybrid.kernels.series import series_step
+from hybrid.kernels.sides import side_of
 from hybrid.kernels.tangent import keep_apart
 
 # More jumps than this at one instant, in all or per transition, are not going to end.
@@ -48,10 +50,11 @@ MOST_JUMPS_EACH = 100
 
 @njit(**KERNEL)
 def arrived(model, run, work):
-    """Transition whose guard is reached, up to rounding, at the end of a run: it belongs to this run.
+    """Transition whose guard is reached or passed at the end of a run: it belongs to this run.
 
-    Rounding is judged as by a run that starts here, which knows nothing of the step that led here; but the
-    steps of Runge-Kutta methods can pass a guard by their own rounding without having found it.
+    Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
+    and takes a guard that it starts beyond as crossed; but the steps of Runge-Kutta methods can pass a guard
+    by their own rounding without having found it.
     """
     mode, t, found = run.count[MODE], run.clock[PHASE], NO_TRANSITION
     model.flow(mode, t, run.y, model.parameters, work.field)
@@ -62,15 +65,16 @@ def arrived(model, run, work):
     widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
-        value = guard_value(model, transition, t, run.y, work.scalar)
-        speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-        band = rounding_band(model, run, transition, t, run.y, work)
-        if run.on_guard[transition] == 0 and abs(value) <= band:
-            after = 1 if speed > 0.0 else -1
-            direction = model.direction[transition]
-            crossed = speed != 0.0 and after != run.side[transition] and crosses_towards(direction, after)
-            if found == NO_TRANSITION and crossed and allowed(model, transition, t, run.y, work.scalar):
-                found = transition
+        before = run.side[transition]
+        if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
+            continue
+        now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
+        if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
+            # An event at a jump lies beyond its near side.
+            now = -before
+        crossed = now == -before and crosses_towards(model.direction[transition], now)
+        if crossed and allowed(model, transition, t, run.y, work.scalar):
+            found = transition
     for i in range(model.dimension):
         run.scale[i] = max(run.scale[i], work.settled[i])
     return found

@@ -57,9 +57,18 @@ def rounding_band(model, run, transition, t, x, work):
     """
     if has_program(model, transition):
         share = ROUNDING_OF_STATE * EPSILON
-        band = model.spread(model.programs, transition, t, x, run.scale, share, work.registers)
+        band = abs(model.spread(model.programs, transition, t, x, run.scale, share, work.registers))
         return band if band >= 0.0 else 0.0
     return smooth_band(model, run, t, work)
+
+
+@njit(**KERNEL)
+def may_jump(model, run, transition, t, x, work):
+    """Whether a guard that has a program may jump between states that rounding cannot tell from ``x``."""
+    if not has_program(model, transition):
+        return False
+    share = ROUNDING_OF_STATE * EPSILON
+    return model.spread(model.programs, transition, t, x, run.scale, share, work.registers) < 0.0
 
 
 @njit(**INLINE)

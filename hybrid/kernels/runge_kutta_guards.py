@@ -9,6 +9,7 @@ from hybrid.kernels.codes import GRAZING_PLACE, MODE, NO_TRANSITION
 from hybrid.kernels.crossings import crossing_on_path, rests
 from hybrid.kernels.guards import error_band, guard_speed, guard_value, note_grazing, rounding_band
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.onset import BY_STEP, has_just_fired
 from hybrid.kernels.step import attempt_again
 
 # A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
@@ -81,6 +82,8 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
                 if farthest <= band:
                     continue
                 run.on_guard[transition] = 0
+                if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
+                    side = 0
             for _ in range(on_guard):
                 degree = divide_by_theta(work.polynomial, degree)
             band = error_band(method, run, work.gradient, model.dimension)

@@ -20,6 +20,7 @@ from hybrid.kernels.crossings import crossing_on_path, rests
 from hybrid.kernels.guards import error_band, note_grazing, rounding_band
 from hybrid.kernels.lanes import four_times, load, store
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.onset import BY_STEP, has_just_fired
 from hybrid.kernels.path import value_at
 
 # The error of the last step towards a root is taken to be this many times its estimate.
@@ -314,10 +315,10 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if model.guard_in_series[transition] == 0:
             if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
                 continue
-            run.on_guard[transition] = 0
             theta, side, share = crossing_on_path(
                 model, method, run, transition, series, order, clock, t, 1.0, h, kind == EXACT, work
             )
+            run.on_guard[transition] = 0
             proved = min(proved, share)
             if theta == NO_ROOT:
                 run.side[transition] = side
@@ -341,6 +342,8 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             if size <= rounding:
                 continue
             run.on_guard[transition] = 0
+            if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
+                side = 0
         # The second cheap proof: the leading powers keep to their side, even if the others are against it.
         degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
         leading_to_bernstein(work.polynomial, degree, work.stack)

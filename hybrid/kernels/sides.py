@@ -9,16 +9,16 @@ from hybrid.kernels.guards import (
     guard_acceleration,
     guard_speed,
     guard_value,
+    may_jump,
     rounding_band,
     smooth_band,
     speed_rounding,
 )
 from hybrid.kernels.layout import KERNEL
+from hybrid.kernels.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 
 # How the state came to the point: a run starts there, the flow led there, or a reset put it there.
 STARTED, FLOWED, LANDED = range(3)
-# The order of a guard that jumps across zero.
-JUMPING = 4
 # A guard larger than this many times what rounding makes of it through its gradient jumps.
 SMOOTH = 4.0
 # A reset that keeps less than this share of a guard's speed holds a state that is pushed through the guard.
@@ -64,11 +64,17 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
             if was_on and before != 0:
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
-        trend, order = speed, 1
+        trend, order = speed, BY_SPEED
         if abs(speed) <= speed_rounding(model, run, mode, t, work):
-            trend, order = guard_acceleration(model, run, transition, mode, t, x, work), 2
-            if abs(trend) <= acceleration_rounding(model, run, t, work):
-                trend, order = 0.0, 3
+            if may_jump(model, run, transition, t, x, work):
+                # In the middle of the jump, where neither side is.
+                if was_on and before != 0:
+                    return before, JUMPING
+                trend, order = 0.0, BY_STEP
+            else:
+                trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
+                if abs(trend) <= acceleration_rounding(model, run, t, work):
+                    trend, order = 0.0, BY_STEP
     direction = model.direction[transition]
     if trend > 0.0:
         return 1, order
@@ -143,15 +149,17 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         own = came == LANDED and left == mode and transition == fired
         now, order = side_of(model, run, mode, transition, t, x, before, was_on, work)
         if came == STARTED:
-            crossed = order > 0 and direction != 0 and now == direction
+            crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
-            crossed = order in (1, JUMPING) and before == -now and (direction == 0 or now == direction)
+            crossed = order in (BY_SPEED, JUMPING) and before == -now and (direction == 0 or now == direction)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
             # A guard that fires both ways and has been crossed has been taken back.
             crossed = crossed and not (direction == 0 and due[transition] == 1)
         beyond = now == (direction if direction != 0 else before)
-        pushed = came == LANDED and left == mode and was_on and not crossed and beyond and order == 2
+        pushed = (
+            came == LANDED and left == mode and was_on and not crossed and beyond and order == BY_ACCELERATION
+        )
         if pushed and due[transition] == 0 and model.marker[transition] == 0:
             pushed = is_held(model, run, transition, mode, t, x, work)
             # Another's reset has left the state where it rests: its own has to hold it once more.
@@ -164,7 +172,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         # A root of third order that was crossed without speed: the next step shows the side.
         flat = (
             own
-            and order == 3
+            and order == BY_STEP
             and abs(run.clock[LAST_TRANSVERSALITY]) <= speed_rounding(model, run, mode, t, work)
         )
         side[transition], zero[transition] = 0 if flat else now, order

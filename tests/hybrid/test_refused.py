@@ -41,12 +41,10 @@ def pulled(guard="affine", direction=+1, forced=False):
 @pytest.mark.parametrize("allowed", [0.0, 1.0])
 def test_a_guard_left_by_its_third_derivative(solver, forced, guard, direction, rounding, allowed):
     """Its acceleration at the start is rounding, of either sign, and so no reason to refuse, or to stay."""
-    if (isinstance(solver, Taylor), guard, direction, allowed) == (True, "bent", 1, 1.0) and rounding > 0:
-        pytest.xfail("a speed that is rounding alone turns a guard that is not affine back again and again")
     start = (1.0 + rounding, 0.0, 0.0, 0.0)
     system = pulled(guard, direction, forced)
     arc = simulate(system, start, (0.0, 2.0), mode="move", solver=solver, parameters={"open": allowed})
     assert arc.status.ok
     assert arc.x[-1, 0] == pytest.approx(1 + 2 - np.sin(2), abs=1e-9)
-    assert arc.x[-1, 3] == len(arc.jumps) <= allowed
+    assert arc.x[-1, 3] == len(arc.jumps) == (allowed if direction == 1 else 0)
     assert not np.any(arc.jumps.transversality * direction < 0)

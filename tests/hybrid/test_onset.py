@@ -1,0 +1,104 @@
+"""A guard within rounding of zero fires once for each change of side, wherever a run starts or is cut."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
+from tests.hybrid.systems import BALL_SYSTEM, OSCILLATOR_SYSTEM, pendulum
+
+SOLVERS = (Taylor(rtol=1e-12, atol=1e-14), DOP853(rtol=1e-12, atol=1e-14))
+GUARDS = {
+    "affine": lambda t, x, p: x.q - p.c,
+    "sine": lambda t, x, p: np.sin(x.q - p.c),
+    "difference of sines": lambda t, x, p: np.sin(x.q) - np.sin(p.c),
+    "product": lambda t, x, p: (x.q - p.c) * (2 + np.cos(x.q)),
+    "kink": lambda t, x, p: np.maximum(x.q - p.c, 3 * (x.q - p.c)),
+    "jump": lambda t, x, p: np.sign(x.q - p.c) * (1 + x.q * x.q),
+}
+
+
+def away(q, ulps):
+    for _ in range(abs(ulps)):
+        q = np.nextafter(q, np.inf * ulps)
+    return float(q)
+
+
+@cache
+def leaving(guard, direction):
+    """``q`` leaves ``c`` as the first, second or third power of time; ``n`` counts."""
+    return HybridSystem(
+        state=("q", "v", "a", "n"),
+        parameters={"c": 1.0, "z": 0.0},
+        modes=[Mode("move", lambda t, x, p: (x.v, x.a, p.z, 0.0))],
+        transitions=[
+            Transition(
+                "move",
+                "move",
+                Guard(GUARDS[guard], direction),
+                Reset(lambda t, x, p: (x.q, x.v, x.a, x.n + 1)),
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("guard", GUARDS)
+@settings(max_examples=60, deadline=None)
+@given(
+    direction=st.sampled_from([-1, 0, 1]),
+    ulps=st.integers(-8, 8),
+    power=st.sampled_from([1, 2, 3]),
+    towards=st.sampled_from([-1, 1]),
+    c=st.floats(0.55, 0.95),
+    split=st.floats(0.1, 0.9),
+)
+def test_a_start_beside_the_guard(solver, guard, direction, ulps, power, towards, c, split):
+    """The start is the guard itself up to rounding: only a motion in the guard's direction fires it, once.
+
+    A guard that jumps has no rounding: its sign at the start is its side.
+    """
+    pushed = [towards if power == i else 0.0 for i in (1, 2, 3)]
+    start = (away(c, ulps), pushed[0], pushed[1], 0.0)
+    options = {"mode": "move", "solver": solver, "parameters": {"c": c, "z": pushed[2]}}
+    system = leaving(guard, direction)
+    whole = simulate(system, start, (0.0, 1.0), **options)
+    assert whole.status.ok
+    fires = direction == towards
+    if guard == "jump" and ulps != 0:
+        fires = ulps * towards < 0 and direction in (0, towards)
+    assert len(whole.jumps) == whole.x[-1, 3] == fires
+    first = simulate(system, start, (0.0, split), **options)
+    second = simulate(system, first.x[-1], (split, 1.0), **options)
+    assert len(first.jumps) + len(second.jumps) == len(whole.jumps)
+
+
+@cache
+def cut(name):
+    """A system with its start, mode and end, and the jumps of both solvers."""
+    guard, _, ways = name.partition(", ")
+    systems = {
+        "ball": (BALL_SYSTEM, (1.0, 0.0), None, 3.0),
+        "oscillator": (OSCILLATOR_SYSTEM, (0.0, 0.0), None, 40.0),
+    }
+    case = systems.get(name)
+    if case is None:
+        case = (pendulum(GUARDS[guard], both=ways == "both"), (1.0, 0.5), "right", 20.0)
+    system, x0, mode, end = case
+    return *case, [simulate(system, x0, (0.0, end), mode=mode, solver=solver).jumps.t for solver in SOLVERS]
+
+
+@pytest.mark.parametrize("solver", [0, 1], ids=["Taylor", "DOP853"])
+@pytest.mark.parametrize("name", ["ball", "oscillator", *GUARDS, *(f"{guard}, both" for guard in GUARDS)])
+def test_a_run_cut_beside_a_jump(solver, name):
+    system, x0, mode, end, times = cut(name)
+    options = {"solver": SOLVERS[solver]}
+    for t in times[solver]:
+        for ulps in range(-8, 9):
+            split = away(t, ulps)
+            first = simulate(system, x0, (0.0, split), mode=mode, **options)
+            second = simulate(system, first.x[-1], (split, end), mode=first.mode[-1], **options)
+            assert len(first.jumps) + len(second.jumps) == len(times[solver]), (t, ulps)
