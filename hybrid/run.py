@@ -24,7 +24,8 @@ from hybrid.system import HybridSystem
 
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
-# Transitions remembered in the order in which they fired: enough to see which go round without end.
+# Transitions remembered in the order in which they fired, a power of two: enough to see which go round without
+# end.
 RECENT = 64
 # Solvers, and shapes of memory, that are kept for the next run.
 MOST_LAYOUTS = 64

@@ -30,7 +30,7 @@ from hybrid.kernels.guards import (
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
-from hybrid.kernels.onset import BY_SPEED, JUMPING
+from hybrid.kernels.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING
 from hybrid.kernels.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 
 MOST_JUMPS = 50
@@ -106,17 +106,20 @@ def order_matters(model, run, one, other, work):
 
 
 @njit(**KERNEL)
-def turns_back(model, run, transition, work):
-    """Whether a guard only touches zero here: it moves to where it was, or turns there if it is at rest.
+def turns_back(model, run, transition, before, work):
+    """Whether a guard only touches zero here: it moves to the side ``before`` again, or turns there at rest.
 
     At the bottom of a dip that is no deeper than rounding either end may be found first. A guard that is at
-    rest and turns no faster than rounding would have it has been crossed, by its third derivative.
+    rest and turns no faster than rounding would have it has been crossed, by its third derivative. The sides
+    have just been taken, which has told how the guard leaves zero, unless rounding has not left it at zero.
     """
+    order = run.on_guard[transition]
+    if order in (BY_SPEED, BY_ACCELERATION):
+        return run.side[transition] == before
+    if order == BY_STEP:
+        return False
     mode, t = run.count[MODE], run.clock[PHASE]
-    model.flow(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    direction = model.direction[transition]
-    before = run.side[transition] if direction == 0 else -direction
     if abs(speed) > speed_rounding(model, run, mode, t, work):
         return speed * before > 0.0
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
@@ -133,11 +136,14 @@ def first_in_order(model, run, record, fired, work):
     was refused.
     """
     mode, t, before = run.count[MODE], run.clock[PHASE], run.side[fired]
-    # Another guard has been proved to change its sign here.
-    may_touch = model.affine_guard[fired] == 1 and allowed(model, fired, t, run.y, work.scalar)
-    touched = may_touch and turns_back(model, run, fired, work)
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
     direction = model.direction[fired]
+    # A guard that is not affine has been proved to change its sign here.
+    touched = (
+        model.affine_guard[fired] == 1
+        and turns_back(model, run, fired, -direction if direction != 0 else before, work)
+        and allowed(model, fired, t, run.y, work.scalar)
+    )
     run.side[fired] = direction if direction != 0 else -before
     if run.on_guard[fired] == 0:
         # A guard that is not small although it has just crossed zero has jumped.

@@ -64,7 +64,7 @@ from hybrid.kernels.locked import (
     restore_tangents,
 )
 from hybrid.kernels.record import start_record
-from hybrid.kernels.rounds import limit_of_rounds, next_in_turn, remember_visit
+from hybrid.kernels.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
 from hybrid.kernels.tangent import COLLAPSED, STRAINED, log_abs_determinant, multiply, orthonormalise, strain
 
 
@@ -203,7 +203,7 @@ def move(model, run, transition, target, x_plus):
     run.count[JUMPS_HERE] = run.count[JUMPS_HERE] + 1 if here else 1
     run.clock[LAST_JUMP_PHASE] = run.clock[PHASE]
     run.clock[LAST_JUMP_CYCLE] = run.count[CYCLE]
-    run.recent[run.count[JUMPS] % run.recent.shape[0]] = transition
+    run.recent[slot_of(run, run.count[JUMPS])] = transition
     run.count[JUMPS] += 1
     run.count[LAST_FIRED] = transition
     run.stay[run.count[MODE]], run.clock[SINCE_ENTRY] = run.clock[SINCE_ENTRY], 0.0

@@ -9,7 +9,7 @@ from numba import njit
 
 from hybrid.kernels.codes import CHATTERING, CYCLE, JUMPS, NO_MODE, NO_TRANSITION, PHASE
 from hybrid.kernels.guards import guard_value
-from hybrid.kernels.layout import KERNEL
+from hybrid.kernels.layout import INLINE, KERNEL
 
 # Transitions in a round at most, and rounds that must have been seen.
 MOST_IN_TURN = 8
@@ -18,17 +18,24 @@ FEWEST_ROUNDS = 5
 FEWEST_JUMPS = 16
 # Largest change of the ratio from round to round, as a share of how far the ratio is from 1.
 STEADY = 0.1
+# Share that is left of a time where it has become shorter. Ratios closer to 1 are not told from it.
+SHORTER = 0.999
 # A share of the time since the chatter began that is too short for the limit to change any more.
 NOTHING_LEFT = 1e-7
 # How far, in sizes of the state, guards may be from zero and resets from the identity at a limit.
 ROUGH = 1e-6
 
 
+@njit(**INLINE)
+def slot_of(run, jumps):
+    """Where the visit after so many jumps, and the transition of the next one, are kept."""
+    return jumps & (run.visits.shape[0] - 1)
+
+
 @njit(**KERNEL)
 def remember_visit(model, run):
     """Keep the time and the state right after a jump."""
-    row = run.visits[run.count[JUMPS] % run.visits.shape[0]]
-    n = model.dimension
+    row, n = run.visits[slot_of(run, run.count[JUMPS])], model.dimension
     for i in range(n):
         row[i] = run.y[i]
     row[n], row[n + 1] = run.clock[PHASE], run.count[CYCLE]
@@ -37,15 +44,15 @@ def remember_visit(model, run):
 @njit(**KERNEL)
 def time_before(model, run, back, further):
     """Time from the jump ``further`` before the last one to the one ``back`` before it."""
-    n, jumps, rows = model.dimension, run.count[JUMPS], run.visits.shape[0]
-    later, earlier = run.visits[(jumps - back) % rows], run.visits[(jumps - further) % rows]
+    n, jumps = model.dimension, run.count[JUMPS]
+    later, earlier = run.visits[slot_of(run, jumps - back)], run.visits[slot_of(run, jumps - further)]
     return later[n] - earlier[n] + model.period * (later[n + 1] - earlier[n + 1])
 
 
 @njit(**KERNEL)
 def fired_before(run, back):
     """Transition of the jump ``back`` before the last one."""
-    return run.recent[(run.count[JUMPS] - 1 - back) % run.recent.shape[0]]
+    return run.recent[slot_of(run, run.count[JUMPS] - 1 - back)]
 
 
 @njit(**KERNEL)
@@ -78,22 +85,21 @@ def transitions_in_turn(model, run):
         seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
         if run.count[JUMPS] <= seen:
             return 0
-        same = True
+        left, _ = time_left_of_rounds(model, run, turn, 0)
+        same = left > 0.0
         for back in range(seen - turn):
-            if fired_before(run, back) != fired_before(run, back + turn):
-                same = False
+            same = same and fired_before(run, back) == fired_before(run, back + turn)
+            if not same:
                 break
         if same:
-            left, _ = time_left_of_rounds(model, run, turn, 0)
-            if left > 0.0:
-                return 0 if turn == 1 and run.count[CHATTERING] > 0 else turn
+            return 0 if turn == 1 and run.count[CHATTERING] > 0 else turn
     return 0
 
 
 @njit(**KERNEL)
 def extrapolate(model, run, turn, back, left, out):
     """The state at the limit into ``out (n,)``, from three jumps of one transition, ``back`` the last."""
-    rows, jumps = run.visits.shape[0], run.count[JUMPS]
+    jumps, visits = run.count[JUMPS], run.visits
     a = left
     b = a + time_before(model, run, back, back + turn)
     c = b + time_before(model, run, back + turn, back + 2 * turn)
@@ -102,9 +108,9 @@ def extrapolate(model, run, turn, back, left, out):
     third = a * b / ((a - c) * (b - c))
     for i in range(model.dimension):
         out[i] = (
-            first * run.visits[(jumps - back) % rows, i]
-            + second * run.visits[(jumps - back - turn) % rows, i]
-            + third * run.visits[(jumps - back - 2 * turn) % rows, i]
+            first * visits[slot_of(run, jumps - back), i]
+            + second * visits[slot_of(run, jumps - back - turn), i]
+            + third * visits[slot_of(run, jumps - back - 2 * turn), i]
         )
 
 
@@ -141,7 +147,7 @@ def size_of_visits(model, run, seen, out):
     for i in range(model.dimension):
         out[i] = run.scale[i]
         for back in range(seen):
-            out[i] = max(out[i], abs(run.visits[(run.count[JUMPS] - back) % run.visits.shape[0], i]))
+            out[i] = max(out[i], abs(run.visits[slot_of(run, run.count[JUMPS] - back), i]))
 
 
 @njit(**KERNEL)
@@ -154,7 +160,7 @@ def limit_of_rounds(model, method, run, work):
     if run.count[JUMPS] <= FEWEST_JUMPS:
         return 0.0, 0
     half = FEWEST_JUMPS // 2
-    if not time_before(model, run, 0, half) < time_before(model, run, half, FEWEST_JUMPS):
+    if not time_before(model, run, 0, half) < SHORTER * time_before(model, run, half, FEWEST_JUMPS):
         return 0.0, 0
     turn = transitions_in_turn(model, run)
     if turn == 0:
