@@ -184,8 +184,7 @@ def advance(
         if orthonormal and 0.0 < span < remaining:
             keep_apart(model, run, mode, tangents, work.jacobian)
         fired = run.count[PENDING]
-        past = time_left(model, run, stop_cycle, stop_phase) < 0.0
-        if past or (span >= remaining and fired == NO_TRANSITION):
+        if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
         if fired != NO_TRANSITION:
             run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
