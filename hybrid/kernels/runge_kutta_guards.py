@@ -133,10 +133,11 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     s = method.b.shape[0]
     low, high = 0.0, h
     before = guard_value(model, transition, t, y, work.scalar) * side > 0.0
-    after = guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
-    length, last, reach = theta * h, math.inf, FIRST_REACH * h
     # Along the step an affine guard is as smooth as the state. Another one may have kinks, jumps, flat roots.
+    # It may cross again before the end of the step, which is no end of a bracket then.
     smooth = model.affine_guard[transition] == 1
+    after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
+    length, last, reach = theta * h, math.inf, FIRST_REACH * h
     for trial in range(MOST_LANDINGS):
         attempt_again(parts, model, method, mode, t, length, y, tangents, work)
         if length == 0.0:
@@ -171,8 +172,8 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
         elif smooth:
             break
         else:
-            # Only one side has been seen: look for the other one, farther and farther from the root.
-            length = theta * h + (reach if before else -reach)
+            # Only one side has been seen: look for the other one, farther and farther from there.
+            length = low + reach if before else high - reach
             reach *= 8.0
             if not low < length < high:
                 break
