@@ -36,7 +36,14 @@ from hybrid.kernels.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.guards import allowed, guard_speed, guard_value, rounding_band, widen_scale
+from hybrid.kernels.guards import (
+    allowed,
+    guard_speed,
+    guard_value,
+    is_forced,
+    rounding_band,
+    widen_scale,
+)
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.series import series_step
 from hybrid.kernels.tangent import keep_apart
@@ -172,7 +179,14 @@ def advance(
                 parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
             )
         else:
-            code, span = series_step(model, method, run, record, tangents, remaining, work)
+            code, span = series_step(parts.attempts, model, method, run, record, tangents, remaining, work)
+            if code == NON_FINITE and is_forced(model, mode):
+                # Terms of the series overflow far from a pulse, ``cosh`` in ``1 / cosh``; the field does not.
+                run.count[PHASE_OF_RUN] = STALE
+                code, span = parts.runge_kutta_step(
+                    parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
+                )
+                run.count[PHASE_OF_RUN] = STALE
         if code != GO_ON:
             return int(code)
         forward(run, model.period, span)
