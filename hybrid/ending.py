@@ -59,7 +59,8 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
 
 def _unresolved(trajectory: Trajectory) -> Iterator[str]:
     """What is to be said of steps on which the forcing could not be resolved."""
-    steps = trajectory.run.count.item(codes.UNRESOLVED)
+    count = trajectory.run.count
+    steps = count.item(codes.UNRESOLVED) + count.item(codes.COARSE)
     if steps:
         yield (
             f"On {steps} steps the forcing is not resolved: it changes, or its bounds are wide, over times "

@@ -61,9 +61,9 @@ def _parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator[Forci
 def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
     """Whether an expression in time has no pulse that is narrower than what a solver resolves of it anyway.
 
-    Harmless are polynomials and exponentials of linear functions of time, and products of few sines and
-    cosines of such: a polynomial and an exponential have no pulses, and a sine is as large in every period as
-    in any other, so a solver never sees it rest. Everything else may rest and then pulse.
+    Harmless are polynomials, exponentials of linear functions of time, and products of these with a few sines
+    and cosines of polynomials: polynomials and exponentials have no pulses, and a sine is as large in every
+    period as in any other, so a solver never sees it rest. Everything else may rest and then pulse.
     """
     harmonics = _harmonics(expression, t)
     return harmonics is not None and harmonics <= MOST_HARMONICS
@@ -82,7 +82,8 @@ def _harmonics(node: sympy.Expr, t: sympy.Symbol) -> int | None:
     if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
         factor = _harmonics(node.base, t)
         return None if factor is None else factor * int(node.exp)
-    if isinstance(node, sympy.sin | sympy.cos | sympy.exp | sympy.sinh | sympy.cosh):
-        is_linear = not node.args[0].diff(t).has(t)
-        return int(isinstance(node, sympy.sin | sympy.cos)) if is_linear else None
+    if isinstance(node, sympy.sin | sympy.cos):
+        return 1 if node.args[0].is_polynomial(t) else None
+    if isinstance(node, sympy.exp | sympy.sinh | sympy.cosh):
+        return None if node.args[0].diff(t).has(t) else 0
     return None

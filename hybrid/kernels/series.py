@@ -274,6 +274,8 @@ def series_step(parts, model, method, run, record, tangents, remaining, work):
         h = min(h, 1e100)
     if is_forced(model, mode):
         h = parts.explained_series(model, method, run, tangents, order, clock, h, work)
+        if not h > 0.0:
+            return NON_FINITE, 0.0
     evaluate_with_sizes(series, order, h, 0, front)
     total = 0.0
     for i in range(n):
