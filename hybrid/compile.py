@@ -16,7 +16,7 @@ from hybrid.compiler import ROLES
 from hybrid.errors import ArgumentError
 from hybrid.kept import traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE
-from hybrid.load import address, entry, load_kernels
+from hybrid.load import Absent, address, entry, load_kernels
 from hybrid.periodicity import period_fault
 from hybrid.roles import CONDITION, Role
 from hybrid.surface import is_paired
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 # The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
 ROLE_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
 GRADIENT = 3
+UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
 # Parameter vectors to remember.
 REMEMBERED = 10_000
 UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
@@ -61,8 +62,12 @@ class CompiledSystem:
         system = self.system
         lines = [f"CompiledSystem of {system.name or 'a system'}: {system.dimension} states"]
         modes = zip(system.mode_names, self.emitted.propagators, self.emitted.discontinuities, strict=True)
-        for name, propagator, jumps in modes:
+        for mode, (name, propagator, jumps) in enumerate(modes):
             lines.append(f"  mode {name}: {propagator}")
+            if not self.emitted.pulses_excluded(mode):
+                lines.append(f"    {UNBOUNDED}")
+            elif self.emitted.has_forcing(mode):
+                lines.append("    its forcing is bounded on each step, no pulse in time is stepped over")
             if jumps:
                 lines.append(f"    its field jumps where {jumps}: {UNCARRIED}")
         for index, name in enumerate(system.transition_names):
@@ -159,6 +164,7 @@ class CompiledSystem:
         programs = self.emitted.programs
         return Programs(
             rows=np.array(programs.rows, dtype=np.int64).reshape(-1, 4),
+            checked=_indices(programs.checked),
             numbers=np.array(programs.numbers, dtype=float),
             first=_indices(programs.first),
             parameters=self.system.parameter_values(),
@@ -186,6 +192,8 @@ class CompiledSystem:
             guard_in_series=_indices(self.emitted.guard_in_series),
             programs=self._programs,
             **_program_runners(bool(self.emitted.programs.rows)),
+            first_forcing=_indices(self.emitted.first_forcing),
+            forcing_component=_indices(self.emitted.forcing_component),
             surface=_indices(self.emitted.surface),
             orientation=_indices(self.emitted.orientation),
             paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
@@ -222,17 +230,10 @@ def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.nd
     return _indices(first), _indices(indices)
 
 
-@attrs.frozen
-class _Absent:
-    """Stands for a kernel that is never called."""
-
-    address: int = 0
-
-
 def _program_runners(needed: bool) -> dict[str, Any]:
-    """The kernels that run the programs of guards; they are not loaded where no guard has a program."""
+    """The kernels that run programs; they are not loaded where there are none."""
     if not needed:
-        return {"bound": _Absent(), "spread": _Absent()}
+        return {"bound": Absent(), "spread": Absent()}
     bounds = load_kernels("hybrid.kernels.bounds")
     return {"bound": address(bounds.bound_guard), "spread": address(bounds.spread_by_rounding)}
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -19,6 +20,7 @@ from hybrid.continuity import jumps_of, may_jump
 from hybrid.derivative import complex_step_error, symbolic_jacobian
 from hybrid.emitted import Emitted, Propagator
 from hybrid.errors import ModelError
+from hybrid.forcing import forcings
 from hybrid.kernels.codes import WIDE
 from hybrid.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.periodicity import is_periodic
@@ -76,13 +78,18 @@ def emit(system: HybridSystem) -> Emitted:
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     surface, orientation = surfaces([transition.guard.function for transition in system.transitions], traced)
+    pulses = [forcings(field.expressions, symbols) for field in fields]
+    forcing = [each for of_mode in pulses for each in of_mode]
     not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
     return Emitted(
         source="\n\n".join((IMPORTS, *functions)),
         opaque=writer.opaque,
         affine_guard=affine,
         guard_in_series=_guards_in_series(system, propagators),
-        programs=programs(not_affine, symbols),
+        programs=programs(not_affine, [each.expression for each in forcing], symbols),
+        first_forcing=tuple(accumulate(map(len, pulses), initial=0)),
+        forcing_component=tuple(each.component for each in forcing),
+        traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,
         affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),

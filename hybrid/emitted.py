@@ -46,21 +46,24 @@ class Propagator:
 
 @attrs.frozen
 class Programs:
-    """The programs of all guards of a system, one after the other.
+    """The programs of all guards of a system, one after the other, and behind them those of its forcings.
 
     Attributes
     ----------
     rows
         Operations with their operands (see ``hybrid.kernels.operations``). Operands count from the start of
         their own program.
+    checked
+        By row: 1 for the rows of a forcing that could hide a pulse.
     numbers
         The numbers that the operations refer to.
     first
-        By transition: the first of its rows, and behind them the number of all rows. A guard without rows is
-        affine, or could not be traced.
+        By transition, then by forcing: the first of its rows, and behind them the number of all rows. A guard
+        without rows is affine, or could not be traced.
     """
 
     rows: tuple[tuple[int, int, int, int], ...]
+    checked: tuple[int, ...]
     numbers: tuple[float, ...]
     first: tuple[int, ...]
 
@@ -89,7 +92,13 @@ class Emitted:
     guard_in_series
         By transition: whether the series of its mode hold its guard in a column, which is a polynomial then.
     programs
-        The guards that are neither affine nor opaque, as lists of operations.
+        The guards that are neither affine nor opaque, and the forcings, as lists of operations.
+    first_forcing
+        By mode: the first of its forcings, and behind them the number of all.
+    forcing_component
+        By forcing: the component of the state whose rate it is a term of, or -1.
+    traced_field
+        By mode: whether tracing could follow the field.
     affine_mode
         By mode: whether the field's derivative in the state is proved not to depend on the state.
     surface, orientation
@@ -114,6 +123,9 @@ class Emitted:
     affine_guard: tuple[bool, ...]
     guard_in_series: tuple[bool, ...]
     programs: Programs
+    first_forcing: tuple[int, ...]
+    forcing_component: tuple[int, ...]
+    traced_field: tuple[bool, ...]
     surface: tuple[int, ...]
     orientation: tuple[int, ...]
     affine_mode: tuple[bool, ...]
@@ -128,3 +140,13 @@ class Emitted:
         """Whether the crossings of a guard are only sampled: tracing could not follow it."""
         first = self.programs.first
         return not self.affine_guard[transition] and first[transition] == first[transition + 1]
+
+    def has_forcing(self, mode: int) -> bool:
+        """Whether the field of a mode has parts in time alone that are bounded over each step."""
+        return self.first_forcing[mode] < self.first_forcing[mode + 1]
+
+    def pulses_excluded(self, mode: int) -> bool:
+        """Whether no pulse in time alone can be stepped over in a mode: all of its forcing can be bounded."""
+        first, guards = self.programs.first, len(self.affine_guard)
+        forcings = range(self.first_forcing[mode], self.first_forcing[mode + 1])
+        return self.traced_field[mode] and all(first[guards + i] < first[guards + i + 1] for i in forcings)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     status = _status(trajectory, code)
-    notes = [*_start_beyond(trajectory), *_unproved(trajectory)]
+    notes = [*_start_beyond(trajectory), *_unproved(trajectory), *_unresolved(trajectory)]
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
 
 
@@ -54,6 +54,17 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
         yield (
             f"On {steps} steps the crossings of a guard are not proved: it is too close to zero for too "
             "long, so its signs at the ends of pieces of the step decided."
+        )
+
+
+def _unresolved(trajectory: Trajectory) -> Iterator[str]:
+    """What is to be said of steps on which the forcing could not be resolved."""
+    count = trajectory.run.count
+    steps = count.item(codes.UNRESOLVED) + count.item(codes.COARSE)
+    if steps:
+        yield (
+            f"On {steps} steps the forcing is not resolved: it changes, or its bounds are wide, over times "
+            "as short as the rounding of time. A pulse may have been stepped over there."
         )
 
 

@@ -166,10 +166,14 @@ def _read(path: Path) -> Emitted | None:
     try:
         found: dict[str, Any] = json.loads(text)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        for name in (*of_transitions, "affine_mode", "autonomous", "discontinuities", "timed_guard"):
+        of_modes = ("affine_mode", "autonomous", "discontinuities", "first_forcing", "traced_field")
+        for name in (*of_transitions, *of_modes, "timed_guard", "forcing_component"):
             found[name] = tuple(found[name])
-        rows, numbers, first = (found["programs"][name] for name in ("rows", "numbers", "first"))
-        found["programs"] = Programs(tuple(map(tuple, rows)), tuple(map(float, numbers)), tuple(first))
+        names = ("rows", "checked", "numbers", "first")
+        rows, checked, numbers, first = (found["programs"][name] for name in names)
+        found["programs"] = Programs(
+            tuple(map(tuple, rows)), tuple(checked), tuple(map(float, numbers)), tuple(first)
+        )
         for each in found["propagators"]:
             each["statements"], each["guards"] = tuple(each["statements"]), tuple(each["guards"])
         found["propagators"] = tuple(Propagator(**each) for each in found["propagators"])

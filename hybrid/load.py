@@ -96,6 +96,12 @@ def entry(kernel: Any) -> Any:
     return compiled.entry_point
 
 
+class Absent:
+    """Stands for a kernel that is never called."""
+
+    address = 0
+
+
 @cache
 def address(kernel: Any) -> Any:
     """A compiled kernel as a first-class function for an argument or for a structure."""

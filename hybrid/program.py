@@ -1,7 +1,8 @@
-"""A guard's expression as a list of operations, which the kernels run on intervals.
+"""The expression of a guard or of a forcing as a list of operations, which the kernels run on intervals.
 
-A program needs no compiler: it is data. ``hybrid.kernels.bounds`` runs it to bound the guard over a piece of
-a step, which proves where the guard has a zero and where it has none.
+A program needs no compiler: it is data. ``hybrid.kernels.bounds`` runs it to bound the expression over a
+piece of a step. This proves where a guard has a zero and where it has none, and that no pulse of a forcing
+is hidden.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
 from hybrid import symbolic as sym
 from hybrid.emitted import Programs
+from hybrid.forcing import is_harmless
 from hybrid.kernels import operations as op
 from hybrid.trace import Symbols
 
@@ -62,17 +64,25 @@ class NoProgram(Exception):
     """An expression has a function without interval arithmetic; the text names it."""
 
 
-def programs(guards: Sequence[sympy.Expr | None], symbols: Symbols) -> Programs:
-    """Programs of the guards' expressions; None has no rows, nor has what has no interval arithmetic."""
+def programs(
+    guards: Sequence[sympy.Expr | None], forcings: Sequence[sympy.Expr], symbols: Symbols
+) -> Programs:
+    """Programs of the guards' expressions and, behind them, of the forcings.
+
+    None has no rows, and neither has an expression without interval arithmetic.
+    """
     rows: list[tuple[int, int, int, int]] = []
+    checked: list[int] = []
     numbers: dict[float, int] = {}
     first = [0]
-    for guard in guards:
-        if guard is not None:
+    for place, expression in enumerate([*guards, *forcings]):
+        if expression is not None:
+            writer = _Writer(symbols, numbers)
             with suppress(NoProgram):
-                rows += _Writer(symbols, numbers).written(guard)
+                rows += writer.written(expression)
+                checked += writer.checked() if place >= len(guards) else [0] * len(writer.rows)
         first.append(len(rows))
-    return Programs(tuple(rows), tuple(numbers), tuple(first))
+    return Programs(tuple(rows), tuple(checked), tuple(numbers), tuple(first))
 
 
 class _Writer:
@@ -93,6 +103,15 @@ class _Writer:
             # The expression is a leaf or a part of another that came first.
             self._add(op.SUM, last, self._number(0.0))
         return self.rows
+
+    def checked(self) -> list[int]:
+        """By row: 1 for a subexpression that could hide a pulse, and for the last row."""
+        time = next(iter(self.leaves))
+        marks = [0] * (len(self.rows) - 1) + [1]
+        for expression, row in self.places.items():
+            if not is_harmless(expression, time):
+                marks[row] = 1
+        return marks
 
     def place(self, expression: sympy.Expr) -> int:
         """Row of a subexpression."""

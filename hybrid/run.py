@@ -16,16 +16,17 @@ from hybrid.errors import ArgumentError
 from hybrid.first_mode import choose_mode
 from hybrid.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
 from hybrid.kernels import codes
-from hybrid.load import address, entry, load_kernels
+from hybrid.load import Absent, address, entry, load_kernels
 from hybrid.periods import check_time, split_time
 from hybrid.solvers import RungeKutta, Taylor
+from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 from hybrid.status import Status
 from hybrid.system import HybridSystem
 
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
-# Transitions remembered in the order in which they fired, a power of two: enough to see which go round without
-# end.
+# Transitions remembered in the order in which they fired: enough to see which go round without end. A power
+# of two.
 RECENT = 64
 # Solvers, and shapes of memory, that are kept for the next run.
 MOST_LAYOUTS = 64
@@ -48,6 +49,9 @@ def kernel_method(solver: RungeKutta) -> Any:
         quadrature=tableau.quadrature,
         interpolant=tableau.interpolant,
         powers=tableau.powers,
+        nodes=tableau.nodes,
+        series_nodes=SERIES_NODES,
+        series_weights=SERIES_WEIGHTS,
         implicit=int(tableau.implicit),
         order=solver.order if isinstance(solver, Taylor) else 0,
         exponent=1.0 / tableau.error_order,
@@ -58,8 +62,8 @@ def kernel_method(solver: RungeKutta) -> Any:
 
 
 @cache
-def driver_parts(series_only: bool, implicit: bool) -> Any:
-    """The pieces that the driver is handed; steps that the run does not take are not loaded."""
+def driver_parts(series_only: bool, implicit: bool, forced: bool) -> Any:
+    """The pieces that the driver is handed; what the run does not need is not loaded."""
     from hybrid.kernels.layout import Attempts, Parts
 
     jumps, corners = load_kernels("hybrid.kernels.jump"), load_kernels("hybrid.kernels.corner")
@@ -67,12 +71,20 @@ def driver_parts(series_only: bool, implicit: bool) -> Any:
         attempt = load_kernels("hybrid.kernels.radau").attempt_radau
     else:
         attempt = load_kernels("hybrid.kernels.step").no_attempt
-    if series_only:
+    if series_only and not forced:
         step = load_kernels("hybrid.kernels.step").no_step
     else:
         step = load_kernels("hybrid.kernels.runge_kutta").runge_kutta_step
+    explained_step, explained_series = Absent(), Absent()
+    if forced:
+        forcing = load_kernels("hybrid.kernels.forcing")
+        explained_step, explained_series = map(address, (forcing.explained_step, forcing.explained_series))
     return Parts(
-        attempts=Attempts(attempt_implicit=address(attempt)),
+        attempts=Attempts(
+            attempt_implicit=address(attempt),
+            explained_step=explained_step,
+            explained_series=explained_series,
+        ),
         runge_kutta_step=address(step),
         enter=address(corners.enter),
         jump=address(jumps.jump),
@@ -152,6 +164,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "series": (codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0),
         "weights": (1, width_of_series),
         "registers": (rows, codes.REGISTERS),
+        "samples": (max(len(method.nodes), len(method.series_nodes)) + 1, 2 * rows),
     }
     return Layout(Work, shapes)
 
@@ -438,7 +451,11 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
         kinds, is_taylor = propagator_kinds(compiled, solver), isinstance(solver, Taylor)
         plan = Plan(
             method,
-            driver_parts(codes.RUNGE_KUTTA not in kinds, bool(solver.tableau.implicit)),
+            driver_parts(
+                codes.RUNGE_KUTTA not in kinds,
+                bool(solver.tableau.implicit),
+                bool(compiled.emitted.forcing_component),
+            ),
             None if is_taylor else np.array(kinds, dtype=np.int64),
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),

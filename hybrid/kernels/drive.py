@@ -36,7 +36,7 @@ from hybrid.kernels.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.guards import allowed, may_jump, widen_scale
+from hybrid.kernels.guards import allowed, is_forced, may_jump, widen_scale
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.onset import BY_STEP
 from hybrid.kernels.series import series_step
@@ -176,7 +176,14 @@ def advance(
                 parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
             )
         else:
-            code, span = series_step(model, method, run, record, tangents, remaining, work)
+            code, span = series_step(parts.attempts, model, method, run, record, tangents, remaining, work)
+            if code == NON_FINITE and is_forced(model, mode):
+                # Terms of the series overflow far from a pulse, ``cosh`` in ``1 / cosh``; the field does not.
+                run.count[PHASE_OF_RUN] = STALE
+                code, span = parts.runge_kutta_step(
+                    parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
+                )
+                run.count[PHASE_OF_RUN] = STALE
         if code != GO_ON:
             return int(code)
         forward(run, model.period, span)

@@ -48,6 +48,12 @@ def has_program(model, transition):
     return model.programs.first[transition + 1] > model.programs.first[transition]
 
 
+@njit(**INLINE)
+def is_forced(model, mode):
+    """Whether the field of a mode has parts in time alone that are bounded over each step."""
+    return model.first_forcing[mode + 1] > model.first_forcing[mode]
+
+
 @njit(**KERNEL)
 def rounding_band(model, run, transition, t, x, work):
     """How far from zero rounding alone can leave a guard at ``(t, x)``; ``work.gradient`` is current.

@@ -23,13 +23,15 @@ MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 
 
 class Programs(Structure):
-    """The expressions of guards as operations (see ``operations``), with the parameters they refer to.
+    """The expressions of guards and forcings as operations (see ``operations``), with their parameters.
 
     ``rows[first[i]:first[i + 1]]`` is the program of transition ``i``, empty for a guard that is affine or
-    that could not be traced; ``numbers`` are the constants in them.
+    that could not be traced; those of the forcings follow. ``checked`` is 1 for the rows of a forcing that
+    could hide a pulse; ``numbers`` are the constants in the programs.
     """
 
     rows: INDEX_MATRIX
+    checked: INDICES
     numbers: VECTOR
     first: INDICES
     parameters: VECTOR
@@ -57,6 +59,8 @@ class Model(Structure):
     ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
     surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0.
+    ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of all transitions;
+    ``forcing_component`` is the component of the state whose rate a forcing is a term of, or -1.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
@@ -83,6 +87,8 @@ class Model(Structure):
     programs: PROGRAMS
     bound: BOUND
     spread: SPREAD
+    first_forcing: INDICES
+    forcing_component: INDICES
     surface: INDICES
     orientation: INDICES
     paired: INDICES
@@ -109,7 +115,9 @@ class Method(Structure):
     interpolant @ stages``, ``powers (d + 1, S)`` those of its powers but for ``y0``. With ``implicit`` 1, row
     0 is the derivative at the start, rows 1 to ``s`` are coupled and have the weights ``b``, and ``error[0]``
     is also the coefficient of the estimate's filter.
-    ``order`` is that of Taylor series.
+    ``order`` is that of Taylor series. ``nodes`` are the places of a step, 0 and 1 among them, at which the
+    method looks at a function of time; at ``series_nodes``, with ``series_weights`` for an integral, a series
+    is compared with the field.
     """
 
     a: MATRIX
@@ -120,6 +128,9 @@ class Method(Structure):
     quadrature: VECTOR
     interpolant: MATRIX
     powers: MATRIX
+    nodes: VECTOR
+    series_nodes: VECTOR
+    series_weights: VECTOR
     implicit: int64
     order: int64
     exponent: float64
@@ -180,7 +191,8 @@ class Work(Structure):
     along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
     (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``saltation (n, n)``;
     ``path (d + 1, n)``, the powers of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack``
-    and ``intervals`` for its isolation; ``registers (r, 6)``, what is known of each row of a guard's program.
+    and ``intervals`` for its isolation; ``registers (r, 6)``, what is known of each row of a program, and
+    ``samples (nodes + 1, 2 r)`` the ranges of these rows at the nodes of a step and what they have in common.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -210,6 +222,7 @@ class Work(Structure):
     stack: MATRIX
     intervals: MATRIX
     registers: MATRIX
+    samples: MATRIX
     systems: MATRIX
     pivots: INDICES
     series: MATRIX
@@ -247,9 +260,15 @@ RECORD = Record.numba_type
 
 
 class Attempts(Structure):
-    """The step of an implicit method, which need not be compiled where the method is explicit."""
+    """What a step may need: parts that are not compiled where they are not called.
+
+    ``attempt_implicit`` is the step of an implicit method; ``explained_step`` and ``explained_series``
+    shorten a step so that no pulse of the forcing is hidden from it.
+    """
 
     attempt_implicit: types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
+    explained_step: types.FunctionType(float64(MODEL, METHOD, RUN, float64, WORK))
+    explained_series: types.FunctionType(float64(MODEL, METHOD, RUN, int64, int64, int64, float64, WORK))
 
 
 ATTEMPTS = Attempts.numba_type

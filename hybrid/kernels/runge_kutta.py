@@ -26,7 +26,7 @@ from hybrid.kernels.codes import (
     STEP_TOO_SMALL,
     STEPS,
 )
-from hybrid.kernels.guards import sides_at
+from hybrid.kernels.guards import is_forced, sides_at
 from hybrid.kernels.layout import ATTEMPTS, EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RECORD, RUN, WORK
 from hybrid.kernels.path import state_at
 from hybrid.kernels.record import remember_grazing, start_record
@@ -207,6 +207,9 @@ def runge_kutta_step(parts, model, method, run, record, tangents, orthonormal, r
     proposed = min(run.clock[NEXT_STEP], method.max_step)
     last = proposed >= remaining
     h = remaining if last else proposed
+    if is_forced(model, mode):
+        h = parts.explained_step(model, method, run, h, work)
+        last = last and h == remaining
     ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
     if orthonormal and method.implicit != 0 and ratio <= 1.0:
         ratio = max(ratio, alignment_ratio(method, model.dimension, tangents, work))

@@ -34,7 +34,7 @@ from hybrid.kernels.codes import (
     WIDE,
 )
 from hybrid.kernels.columns import evaluate, evaluate_with_sizes, gather_tangents
-from hybrid.kernels.guards import guard_speed, guard_value, sides_at
+from hybrid.kernels.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.lanes import (
     four_times,
     larger,
@@ -239,7 +239,7 @@ def project_on_guard(model, run, transition, t, work):
 
 
 @njit(**KERNEL)
-def series_step(model, method, run, record, tangents, remaining, work):
+def series_step(parts, model, method, run, record, tangents, remaining, work):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
     An event is left in ``PENDING``.
@@ -272,6 +272,10 @@ def series_step(model, method, run, record, tangents, remaining, work):
             h = unhurried(series, n, run)
     else:
         h = min(h, 1e100)
+    if is_forced(model, mode):
+        h = parts.explained_series(model, method, run, tangents, order, clock, h, work)
+        if not h > 0.0:
+            return NON_FINITE, 0.0
     evaluate_with_sizes(series, order, h, 0, front)
     total = 0.0
     for i in range(n):

@@ -10,6 +10,10 @@ import numpy as np
 
 Row = Mapping[int, float]
 
+# Places of a step, and the weights of an integral over it, at which a series is compared with its field.
+SERIES_NODES = (1 - np.cos(np.pi * np.arange(6) / 5)) / 2
+SERIES_WEIGHTS = np.linalg.solve(np.vander(SERIES_NODES, increasing=True).T, 1 / np.arange(1.0, 7.0))
+
 
 @attrs.frozen(eq=False)
 class Tableau:
@@ -50,6 +54,12 @@ class Tableau:
     def quadrature(self) -> np.ndarray:
         """``(s + 1,)`` weights of all stages in an integral over the step."""
         return np.concatenate([[0.0], self.b] if self.implicit else [self.b, [0.0]])
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Places of the step, from 0 to 1, at which the method looks at a function of time alone."""
+        counts = (self.quadrature != 0) | (self.error != 0) | (self.second_error != 0)
+        return np.unique([0.0, 1.0, *self.c[: len(counts)][counts]])
 
     @property
     def powers(self) -> np.ndarray:
