@@ -98,6 +98,35 @@ def test_estimates_hold_the_rounding_of_polynomial_flight(rtol, method):
     assert ratio < 50.0
 
 
+def test_the_absolute_tolerance_is_tightened_too():
+    """Where it rules, runs at tighter relative tolerances alone would all make the same error."""
+    swing = hybrid.HybridSystem(state=("q", "v"), modes=[hybrid.Mode("swing", lambda t, x, p: (x.v, -x.q))])
+    found = global_error(swing, (1.0, 0.0), (0.0, 20.0), solver=DOP853(rtol=1e-11, atol=1e-4))
+    errors = np.abs(found.arc.x[-1] - (np.cos(20.0), -np.sin(20.0)))
+    assert errors.max() > 1e-6
+    assert np.all(errors <= found.x)
+    assert found.x.max() < 10 * errors.max()
+
+
+def test_tighter_runs_start_aside_by_the_rounding_of_a_run(monkeypatch):
+    """Sixteen units in the last place of the largest values, times the root of the number of steps."""
+    starts = []
+
+    def simulate(system, x0, *arguments, **options):
+        starts.append(np.array(x0, dtype=float))
+        return hybrid.simulate(system, x0, *arguments, **options)
+
+    monkeypatch.setattr("hybrid.accuracy.simulate", simulate)
+    fall = {"x0": (1.0, 2.0), "t_span": (0.0, 0.4), "parameters": {"g": 10.0}}
+    arc = global_error(models.bouncing_ball(), solver=DOP853(rtol=1e-9), **fall).arc
+    aside = 16 * np.finfo(float).eps * np.sqrt(1 + arc.steps) * np.abs(arc.x).max(axis=0)
+    tighter, tightest = starts[1] - starts[0], starts[2] - starts[0]
+    np.testing.assert_allclose(np.abs(tighter), aside, rtol=0.1)
+    # In two directions, so that no component's difference is zero for all.
+    np.testing.assert_allclose(np.abs(tightest), aside, rtol=0.1)
+    assert np.sign(tighter[0] * tightest[0]) == -np.sign(tighter[1] * tightest[1])
+
+
 def test_a_chaotic_run_beyond_its_digits_says_so():
     """After 80 units of time an error has grown by e^40."""
     found = global_error(models.solvable_oscillator(), (0.3, 0.0), (0.0, 80.25), mode="plus")
