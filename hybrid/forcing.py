@@ -31,7 +31,7 @@ class Forcing:
 def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forcing, ...]:
     """The largest parts of a field in time and parameters alone, without what is harmless in them.
 
-    None if the field was not traced, of which nothing is known.
+    Empty for a field that was not traced, of which nothing is known.
     """
     if field is None:
         return ()

@@ -105,11 +105,11 @@ def _is_steady(model, program, path, order, clock, start, h, negligible, work):
 def _take_samples(model, program, path, order, clock, start, nodes, h, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
 
-    The row behind the nodes takes the largest low end and the smallest high end of each.
+    The last row takes the largest low end and the smallest high end of each.
     """
-    samples, count = work.samples, len(nodes)
-    common = samples[count]
-    for j in range(count):
+    samples = work.samples
+    common = samples[samples.shape[0] - 1]
+    for j in range(len(nodes)):
         last = model.bound(
             model.programs, program, path, order, clock, start, 1.0, nodes[j] * h, 0.0, work.registers
         )
@@ -185,12 +185,8 @@ def _first_hidden(model, program, path, order, clock, start, nodes, h, tolerance
         return h, h, 0.0
     last = programs.first[program + 1] - 1 - first
     _take_samples(model, program, path, order, clock, start, nodes, h, work)
-    # The last row of the samples is where ``_judged`` expects what they have in common.
-    count, behind = len(nodes), work.samples.shape[0] - 1
-    for i in range(2 * (last + 1) if count < behind else 0):
-        work.samples[behind, i] = work.samples[count, i]
     stack, pieces, coarse = work.intervals, 0, 0.0
-    for j in range(count - 1):
+    for j in range(len(nodes) - 1):
         top, whole = 0, True
         stack[0, 0], stack[0, 1] = nodes[j] * h, nodes[j + 1] * h
         while top >= 0:
@@ -274,7 +270,8 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
             place, other, rest = _first_hidden(
                 model, program, path, order, clock, start, nodes, explained, tolerance, finest, work
             )
-            coarse = coarse or rest > COARSE_PIECE * (tolerance if component >= 0 else method.rtol)
+            # What multiplies other forcings is not known, and neither is what they add to the state.
+            coarse = coarse or (component >= 0 and rest > COARSE_PIECE * tolerance)
             if place < explained:
                 explained, beyond = place, other
         if explained >= h:

@@ -287,6 +287,40 @@ def test_a_pulse_in_one_mode_of_two(solver):
     np.testing.assert_allclose(times, reference.jumps.t, rtol=0, atol=1e-5)
 
 
+def test_a_pulse_during_a_contact():
+    """On a clock of its own a mode resolves the pulses of time, too."""
+    system = HybridSystem(
+        state=("x", "v"),
+        parameters={"a": 60.0, "w": 1e-3, "K": 1e4},
+        modes=[
+            Mode(
+                "contact",
+                lambda t, x, p: (
+                    x.v,
+                    1.0
+                    - 0.5 * x.v
+                    - p.K * np.maximum(x.x, 0) ** 1.5
+                    - 0.01 / p.w * np.exp(-(((t - p.a) / p.w) ** 2)),
+                ),
+            ),
+            Mode("free", lambda t, x, p: (x.v, 1.0 - 0.5 * x.v)),
+        ],
+        transitions=[
+            Transition("contact", "free", Guard(lambda t, x, p: x.x, -1)),
+            Transition("free", "contact", Guard(lambda t, x, p: x.x, +1)),
+        ],
+    )
+    start, span = ((1e-4) ** (2 / 3), 0.0), (0.0, 61.0)
+    for width in (1e-3, 1e-4):
+        arcs = [
+            simulate(system, start, span, mode="contact", parameters={"w": width}, solver=solver)
+            for solver in (Taylor(), DOP853(max_step=width))
+        ]
+        assert all(arc.status.ok for arc in arcs)
+        assert len(arcs[0].jumps) == len(arcs[1].jumps)
+        np.testing.assert_allclose(arcs[0].x[-1], arcs[1].x[-1], rtol=0, atol=1e-6)
+
+
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("width", [1e-7, 1e-8, 2e-9, 3e-10, 1e-12])
 def test_a_pulse_as_narrow_as_the_rounding_of_time_is_seen_or_reported(solver, width):
