@@ -1,0 +1,166 @@
+"""``python -m benchmarks.mutants hybrid/accuracy.py`` plants faults, one at a time, and runs the nearest tests.
+
+A fault is one operator, comparison, constant or condition changed. It is noticed if a test fails, or if the
+tests do not end. The copy that is changed lies in a temporary folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.common import ROOT, heading, table
+
+COPIED = ("hybrid", "lyapunov", "models", "tests", "docs", "benchmarks", "pyproject.toml", "README.md")
+OTHER_OPERATOR = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Mod: ast.Add}
+OTHER_COMPARISON = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
+OTHER_NAME = {"min": "max", "max": "min", "any": "all", "all": "any"}
+
+
+class Fault(NamedTuple):
+    """A changed source, and what was changed."""
+
+    path: Path
+    line: int
+    change: str
+    source: str
+
+
+def faults(path: Path) -> Iterator[Fault]:
+    """Every fault that can be planted in a file; what only errors and texts say is left alone."""
+    tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    skipped = {id(each) for node in ast.walk(tree) if _is_silent(node) for each in ast.walk(node)}
+    for place, node in enumerate(ast.walk(tree)):
+        if id(node) in skipped:
+            continue
+        for change in _changes(node):
+            changed = copy.deepcopy(tree)
+            target = next(each for i, each in enumerate(ast.walk(changed)) if i == place)
+            before = ast.unparse(target)
+            change(target)
+            after = ast.unparse(target)
+            if after != before:
+                told = f"{before[:60]} -> {after[:60]}"
+                yield Fault(path, getattr(node, "lineno", 0), told, ast.unparse(changed))
+
+
+def _is_silent(node: ast.AST) -> bool:
+    """Whether a fault here changes no result: texts, annotations, imports, errors' own words."""
+    if isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.AnnAssign):
+        return True
+    if isinstance(node, ast.FunctionDef) and node.name in ("__repr__", "__getattr__"):
+        return True
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+
+
+def _changes(node: ast.AST) -> list[Callable[[ast.AST], None]]:
+    def set_field(name: str, value: object) -> Callable[[ast.AST], None]:
+        return lambda target: setattr(target, name, value)
+
+    if isinstance(node, ast.BinOp) and type(node.op) in OTHER_OPERATOR:
+        return [set_field("op", OTHER_OPERATOR[type(node.op)]())]
+    if isinstance(node, ast.Compare) and type(node.ops[0]) in OTHER_COMPARISON:
+        return [set_field("ops", [OTHER_COMPARISON[type(node.ops[0])](), *node.ops[1:]])]
+    if isinstance(node, ast.BoolOp):
+        return [set_field("op", ast.Or() if isinstance(node.op, ast.And) else ast.And())]
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return [set_field("op", ast.UAdd())]
+    if isinstance(node, ast.If | ast.IfExp | ast.While):
+        return [set_field("test", ast.UnaryOp(ast.Not(), node.test))]
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float, bool):
+        other = not node.value if isinstance(node.value, bool) else node.value * 2 if node.value else 1
+        return [set_field("value", other)]
+    if isinstance(node, ast.Name) and node.id in OTHER_NAME:
+        return [set_field("id", OTHER_NAME[node.id])]
+    return []
+
+
+def nearest_tests(path: Path) -> list[str]:
+    """Test files of the same name, else those that import the module, no more than four."""
+    folder = ROOT / "tests"
+    same = sorted(folder.rglob(f"test_{path.stem}.py"))
+    module = ".".join(path.with_suffix("").parts)
+    importing = [p for p in sorted(folder.rglob("test_*.py")) if module in p.read_text(encoding="utf-8")]
+    return [str(p.relative_to(ROOT)) for p in (same or importing)[:4]]
+
+
+def is_noticed(fault: Fault, seconds: float) -> bool:
+    """Whether the nearest tests fail on a copy with the fault."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for each in COPIED:
+            source = ROOT / each
+            if source.is_dir():
+                shutil.copytree(source, folder / each, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
+            else:
+                shutil.copy(source, folder / each)
+        (folder / fault.path).write_text(fault.source, encoding="utf-8")
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--no-header"]
+        environment = {**os.environ, "PYTHONPATH": name, "PYTHONDONTWRITEBYTECODE": "1"}
+        try:
+            done = subprocess.run(
+                [*command, *nearest_tests(fault.path)],
+                cwd=folder,
+                env=environment,
+                capture_output=True,
+                timeout=seconds,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return True
+        return done.returncode != 0
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="+", type=Path, help="sources, from the top of the project")
+    parser.add_argument("--each", type=int, default=8, help="faults in each file, drawn at random")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seconds", type=float, default=300.0, help="after which tests count as not ending")
+    parser.add_argument("--processes", type=int, default=1)
+    given = parser.parse_args(arguments)
+    heading("Faults planted one at a time, and how many of them the nearest tests notice.")
+    rows, planted, noticed = [], 0, 0
+    for path in given.files:
+        if not nearest_tests(path):
+            rows.append([str(path), "no tests of its own", "", ""])
+            continue
+        found = list(faults(path))
+        drawn = random.Random(f"{given.seed} {path}").sample(found, min(given.each, len(found)))
+        with ThreadPoolExecutor(given.processes) as pool:
+            results = list(pool.map(lambda fault: is_noticed(fault, given.seconds), drawn))
+        for fault, seen in zip(drawn, results, strict=True):
+            if not seen:
+                print(f"not noticed: {path}:{fault.line}: {fault.change}", flush=True)
+        planted, noticed = planted + len(drawn), noticed + sum(results)
+        rows.append([str(path), str(len(found)), str(len(drawn)), str(sum(results))])
+        print(f"{path}: {sum(results)} of {len(drawn)}", flush=True)
+    rows.append(["all", "", str(planted), str(noticed)])
+    print()
+    table(["file", "possible faults", "planted", "noticed"], rows)
+
+
+if __name__ == "__main__":
+    main()
