@@ -1,4 +1,4 @@
-"""``python -m benchmarks.mutants hybrid/accuracy.py`` plants faults, one at a time, and runs the nearest tests.
+"""``python -m benchmarks.mutants hybrid/accuracy.py`` plants faults, one at a time, for the nearest tests.
 
 A fault is one operator, comparison, constant or condition changed. It is noticed if a test fails, or if the
 tests do not end. The copy that is changed lies in a temporary folder.

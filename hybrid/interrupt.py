@@ -11,9 +11,9 @@ from typing import Any, Protocol
 from hybrid.kernels import codes
 from hybrid.status import Status, StatusCode
 
-# Steps of the first burst, which takes a millisecond for most models, and how long later ones take:
+# Steps of the first burst, which takes less than a millisecond for most models, and how long later ones take:
 # a step may become ten times slower from one burst to the next, where numbers leave the normal range.
-FIRST_BURST = 1024
+FIRST_BURST = 256
 SECONDS = 0.02
 
 
@@ -111,7 +111,7 @@ class Bursts:
         """The code of a kernel: GO_ON if only the burst has ended, INTERRUPTED if the run is to stop."""
         seconds = perf_counter() - self.begin
         if seconds < SECONDS:
-            self.steps *= 4 if seconds < SECONDS / 8 else 2
+            self.steps *= 2
         elif seconds > 2 * SECONDS:
             self.steps = max(1, int(self.steps * SECONDS / seconds))
         ended = code == codes.MAX_STEPS and all(run.steps < self.limit for run in self.runs)

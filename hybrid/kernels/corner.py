@@ -30,7 +30,7 @@ from hybrid.kernels.guards import (
     widen_scale,
 )
 from hybrid.kernels.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
-from hybrid.kernels.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING
+from hybrid.kernels.onset import BY_SPEED, JUMPING
 from hybrid.kernels.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 
 MOST_JUMPS = 50
@@ -111,13 +111,10 @@ def turns_back(model, run, transition, before, work):
 
     At the bottom of a dip that is no deeper than rounding either end may be found first. A guard that is at
     rest and turns no faster than rounding would have it has been crossed, by its third derivative. The sides
-    have just been taken, which has told how the guard leaves zero, unless rounding has not left it at zero.
+    have just been taken, and tell what the speed decides.
     """
-    order = run.on_guard[transition]
-    if order in (BY_SPEED, BY_ACCELERATION):
+    if run.on_guard[transition] == BY_SPEED:
         return run.side[transition] == before
-    if order == BY_STEP:
-        return False
     mode, t = run.count[MODE], run.clock[PHASE]
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     if abs(speed) > speed_rounding(model, run, mode, t, work):

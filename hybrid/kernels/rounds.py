@@ -16,8 +16,6 @@ MOST_IN_TURN = 8
 FEWEST_ROUNDS = 5
 # No limit is taken before this many jumps.
 FEWEST_JUMPS = 16
-# Every so many jumps a limit is looked for: most jumps are not of a chatter.
-LOOKED_AT = 4
 # Largest change of the ratio from round to round, as a share of how far the ratio is from 1.
 STEADY = 0.1
 # Share that is left of a time where it has become shorter. Ratios closer to 1 are not told from it.
@@ -159,7 +157,7 @@ def limit_of_rounds(model, method, run, work):
     To be called after each jump. The limit is known once two estimates, a round apart, agree up to the
     tolerances, or once there is next to nothing left. The limit state goes to ``work.settled``.
     """
-    if run.count[JUMPS] <= FEWEST_JUMPS or run.count[JUMPS] % LOOKED_AT != 0:
+    if run.count[JUMPS] <= FEWEST_JUMPS:
         return 0.0, 0
     half = FEWEST_JUMPS // 2
     if not time_before(model, run, 0, half) < SHORTER * time_before(model, run, half, FEWEST_JUMPS):
