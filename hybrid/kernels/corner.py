@@ -111,11 +111,12 @@ def turns_back(model, run, transition, before, work):
 
     At the bottom of a dip that is no deeper than rounding either end may be found first. A guard that is at
     rest and turns no faster than rounding would have it has been crossed, by its third derivative. The sides
-    have just been taken, and tell what the speed decides.
+    have just been taken: most guards are known to move on.
     """
-    if run.on_guard[transition] == BY_SPEED:
-        return run.side[transition] == before
+    if run.on_guard[transition] == BY_SPEED and run.side[transition] != before:
+        return False
     mode, t = run.count[MODE], run.clock[PHASE]
+    model.flow(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     if abs(speed) > speed_rounding(model, run, mode, t, work):
         return speed * before > 0.0
