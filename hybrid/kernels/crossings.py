@@ -195,6 +195,18 @@ def _note_touch(run, transition, place, value, length):
 
 
 @njit(**KERNEL)
+def _returns(model, transition, path, order, clock, start, pace, side, on_guard, work):
+    """Whether a guard that the start of a step finds beyond zero moves to the side that the run knows.
+
+    It has not been passed: the rounding of the last jump has left it there.
+    """
+    if on_guard > 0:
+        return False
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
+    return row[LEAST_SLOPE] * side > 0.0 and row[MOST_SLOPE] * side > 0.0
+
+
+@njit(**KERNEL)
 def first_change(
     model, method, run, transition, path, order, clock, start, pace, length, side, on_guard, exact, work
 ):
@@ -300,9 +312,12 @@ def first_change(
                 work,
             )
             touch, depth = NOWHERE, math.inf
-            side = after
             # Where it has just fired, the step only shows to which side the guard leaves zero.
-            again = place <= SETTLED * length and has_just_fired(run, transition, on_guard)
+            again = place <= SETTLED * length and (
+                has_just_fired(run, transition, on_guard)
+                or _returns(model, transition, path, order, clock, start, pace, side, on_guard, work)
+            )
+            side = after
             if crosses_towards(direction, after) and not again:
                 return place, side, length
         side, sure = after, high
