@@ -23,7 +23,7 @@ from hybrid.kernels.codes import (
     MOST_SLOPE,
     UNPROVED,
 )
-from hybrid.kernels.guards import error_band, guard_value, has_program, rounding_band
+from hybrid.kernels.guards import error_band, guard_value, has_program, rounding_band, was_left_behind
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.onset import BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
 from hybrid.kernels.path import state_at, time_at
@@ -195,15 +195,13 @@ def _note_touch(run, transition, place, value, length):
 
 
 @njit(**KERNEL)
-def _returns(model, transition, path, order, clock, start, pace, side, on_guard, work):
-    """Whether a guard that the start of a step finds beyond zero moves to the side that the run knows.
-
-    It has not been passed: the rounding of the last jump has left it there.
-    """
+def _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work):
+    """Whether the rounding of a jump has left the guard beyond zero, where the step starts."""
     if on_guard > 0:
         return False
     row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
-    return row[LEAST_SLOPE] * side > 0.0 and row[MOST_SLOPE] * side > 0.0
+    slope = row[LEAST_SLOPE] if side > 0 else row[MOST_SLOPE]
+    return was_left_behind(model, run, transition, start, run.y, slope, side, work)
 
 
 @njit(**KERNEL)
@@ -315,7 +313,7 @@ def first_change(
             # Where it has just fired, the step only shows to which side the guard leaves zero.
             again = place <= SETTLED * length and (
                 has_just_fired(run, transition, on_guard)
-                or _returns(model, transition, path, order, clock, start, pace, side, on_guard, work)
+                or _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work)
             )
             side = after
             if crosses_towards(direction, after) and not again:

@@ -36,7 +36,14 @@ from hybrid.kernels.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.guards import allowed, guard_speed, is_forced, may_jump, widen_scale
+from hybrid.kernels.guards import (
+    allowed,
+    guard_speed,
+    is_forced,
+    may_jump,
+    was_left_behind,
+    widen_scale,
+)
 from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 from hybrid.kernels.onset import BY_STEP
 from hybrid.kernels.series import series_step
@@ -74,8 +81,7 @@ def arrived(model, run, work):
             now = -before
         elif now == -before and order == 0:
             speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-            if speed * before > 0.0:
-                # It has not been passed: the rounding of the last jump has left it there.
+            if was_left_behind(model, run, transition, t, run.y, speed, before, work):
                 now = before
         crossed = now == -before and crosses_towards(model.direction[transition], now)
         if crossed and allowed(model, transition, t, run.y, work.scalar):

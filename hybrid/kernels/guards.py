@@ -16,6 +16,8 @@ from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 
 # Share of a component's size, in units of rounding, that rounding may have changed it by.
 ROUNDING_OF_STATE = 16
+# A jump may leave a guard that far from zero, in units of what rounding alone makes of it.
+LEFT_BEHIND = 16.0
 
 
 @njit(**INLINE)
@@ -75,6 +77,18 @@ def may_jump(model, run, transition, t, x, work):
         return False
     share = ROUNDING_OF_STATE * EPSILON
     return model.spread(model.programs, transition, t, x, run.scale, share, work.registers) < 0.0
+
+
+@njit(**KERNEL)
+def was_left_behind(model, run, transition, t, x, speed, side, work):
+    """Whether the rounding of a jump has left a guard beyond zero that moves back to the known ``side``.
+
+    It has not been passed then. Rounding has not left a guard there that jumps.
+    """
+    if not speed * side > 0.0:
+        return False
+    value = guard_value(model, transition, t, x, work.scalar)
+    return abs(value) <= LEFT_BEHIND * rounding_band(model, run, transition, t, x, work)
 
 
 @njit(**INLINE)

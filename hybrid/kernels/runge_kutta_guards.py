@@ -175,6 +175,9 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
             # Only one side has been seen: look for the other one, farther and farther from there.
             length = low + reach if before else high - reach
             reach *= 8.0
-            if not low < length < high:
+            if before and low < h <= length:
+                # The end of the step is the farthest place there is.
+                length = h
+            elif not low < length < high:
                 break
     return NOT_THERE, 0.0
