@@ -21,6 +21,7 @@ ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import os, signal, sys, threading, time
 import hybrid, lyapunov, models
+signal.signal(signal.SIGINT, signal.default_int_handler)
 system, start = models.impact_oscillator(), (0.0, 0.0)
 rising = hybrid.Guard(lambda t, x, p: x.v, +1)
 marked = hybrid.poincare_section(system, start, rising, points=1)
@@ -112,6 +113,14 @@ CALLS = {
     "compared": "INTERRUPTED INTERRUPTED",
     "chart": " {'NOT_RUN'}",
 }
+
+
+@pytest.fixture(autouse=True)
+def python_hears_interrupts():
+    """Processes that a shell has put into the background ignore them."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def test_real_interrupts():
