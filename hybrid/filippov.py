@@ -210,13 +210,14 @@ class _Surface:
         """Whether an orbit that reaches the surface rising (side +1) or falling (-1) does more than touch it.
 
         One that leaves the sliding mode at a fold starts on the surface, with a speed that is zero up to
-        rounding and an acceleration back to where it belongs: it has arrived nowhere.
+        rounding and an acceleration back to where it belongs: it has arrived nowhere. The speed is compared
+        with those of both fields: the one at the fold may be at rest, as a mass that is about to slip.
         """
         if side > 0:
-            field, speed, turn = self.below, self.speed_below(t, x, p), self.turn_below(t, x, p)
+            speed, turn = self.speed_below(t, x, p), self.turn_below(t, x, p)
         else:
-            field, speed, turn = self.above, self.speed_above(t, x, p), self.turn_above(t, x, p)
-        return (side * turn >= 0.0) | (side * speed > TOUCH * self._steepest(t, x, p, field(t, x, p)))
+            speed, turn = self.speed_above(t, x, p), self.turn_above(t, x, p)
+        return (side * turn >= 0.0) | (side * speed > TOUCH * self._steepest(t, x, p))
 
     def attraction(self, t: Any, x: Any, p: Any) -> Any:
         L_b, L_a = self.speeds(t, x, p)
@@ -227,11 +228,11 @@ class _Surface:
 
         It is as smooth as the fields, so that the sliding mode has a Taylor series where they do.
         """
-        return TANGENT * self._steepest(t, x, p, [*self.below(t, x, p), *self.above(t, x, p)])
+        return TANGENT * self._steepest(t, x, p)
 
-    def _steepest(self, t: Any, x: Any, p: Any, velocity: Iterable[Any]) -> Any:
-        """The rate of ``h`` if all of the velocity were normal to the surface."""
-        slope, speed = self.gradient(t, x, p)[:-1], [*velocity]
+    def _steepest(self, t: Any, x: Any, p: Any) -> Any:
+        """The rate of ``h`` if all of the velocities of both fields were normal to the surface."""
+        slope, speed = self.gradient(t, x, p)[:-1], [*self.below(t, x, p), *self.above(t, x, p)]
         return np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
 
     def is_off(self, t: Any, x: Any, p: Any) -> Any:

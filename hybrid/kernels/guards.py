@@ -136,12 +136,12 @@ def sides_at(model, run, t, work):
 
 @njit(**KERNEL)
 def speed_rounding(model, run, mode, t, work):
-    """How far from zero rounding of the state alone can leave the speed of the guard in ``work.gradient``."""
+    """How far from zero rounding of state and time can leave the speed of the guard in ``work.gradient``."""
     n = model.dimension
     model.flow_jacobian(mode, t, run.y, model.parameters, work.jacobian)
     size = abs(work.gradient[n])
     for i in range(n):
-        spread = abs(work.field[i])
+        spread = abs(work.field[i]) + abs(work.jacobian[i, n] * t)
         for j in range(n):
             spread += abs(work.jacobian[i, j]) * run.scale[j]
         size += abs(work.gradient[i]) * spread

@@ -2,8 +2,10 @@
 
 import math
 
+import hypothesis
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 
 import hybrid
 import lyapunov
@@ -126,3 +128,25 @@ def test_viscous_damping_contracts_with_the_friction():
         turn = 0.3 if jump.transition == "above->below" else -0.3
         ratios *= (force + turn) / (force - turn)
     assert np.linalg.det(arc.fundamental) == pytest.approx(ratios * math.exp(-3 * c * period), rel=1e-9)
+
+
+@hypothesis.given(
+    f=st.floats(0.05, 0.95),
+    w=st.floats(0.3, 2.0),
+    size=st.floats(-9, 9).map(lambda power: 10**power),
+    start=st.integers(0, 10**6),
+)
+@hypothesis.example(f=0.75, w=1.25, size=1.0, start=0)
+@hypothesis.example(f=0.75, w=1.15, size=1.0, start=0)
+def test_a_stop_ends_once(f, w, size, start):
+    """A mass that is about to slip is at rest: only rounding is left of its speed and its acceleration."""
+    period = 2 * math.pi / w
+    arc = hybrid.simulate(
+        SYSTEM,
+        (0.0, size),
+        (start * period, (start + 30) * period),
+        parameters={"A": size, "f": f * size, "w": w},
+        max_jumps=1000,
+    )
+    assert arc.status.code is hybrid.StatusCode.SUCCESS
+    assert len(set(arc.jumps.t)) == len(arc.jumps)
