@@ -11,6 +11,7 @@ import ast
 import copy
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -35,6 +36,34 @@ OTHER_COMPARISON = {
     ast.IsNot: ast.Is,
     ast.In: ast.NotIn,
     ast.NotIn: ast.In,
+}
+# Test files that are asked about one fault.
+MOST_TESTS = 4
+# Where names and imports do not lead to the tests of a file.
+NEAREST = {
+    "hybrid/directional.py": ("test_series.py", "test_emit.py"),
+    "hybrid/forcing.py": ("test_pulses.py",),
+    "hybrid/linear_series.py": ("test_series.py", "test_simulate.py"),
+    "hybrid/program.py": ("test_proved_crossings.py", "test_crossings.py"),
+    "hybrid/propagator.py": ("test_series.py", "test_emit.py", "test_simulate.py"),
+    "hybrid/status.py": ("test_simulate.py", "test_tangent_status.py"),
+    "hybrid/whole.py": ("test_periodicity.py", "test_arguments.py"),
+    "hybrid/kernels/bounds.py": ("test_proved_crossings.py", "test_crossings.py"),
+    "hybrid/kernels/drive.py": ("test_simulate.py", "test_instant.py", "test_onset.py"),
+    "hybrid/kernels/first_mode.py": ("test_simulate.py", "test_instant.py"),
+    "hybrid/kernels/forcing.py": ("test_pulses.py",),
+    "hybrid/kernels/guards.py": ("test_onset.py", "test_instant.py", "test_crossings.py"),
+    "hybrid/kernels/jump.py": ("test_saltation.py", "test_instant.py", "test_locked.py"),
+    "hybrid/kernels/operations.py": ("test_proved_crossings.py",),
+    "hybrid/kernels/runge_kutta.py": ("test_order.py", "solvers/test_taylor.py"),
+    "hybrid/kernels/runge_kutta_guards.py": ("test_proved_crossings.py", "test_onset.py"),
+    "hybrid/kernels/sides.py": ("test_instant.py", "test_onset.py", "test_corner.py"),
+    "hybrid/solvers/dop853.py": ("test_order.py", "solvers/test_tableau.py"),
+    "hybrid/solvers/tsit5.py": ("test_order.py", "solvers/test_tableau.py"),
+    "hybrid/testing/check.py": ("test_testing.py", "test_planted_faults.py"),
+    "hybrid/testing/derivatives.py": ("test_planted_faults.py", "test_testing.py"),
+    "hybrid/testing/strategies.py": ("test_testing.py",),
+    "hybrid/testing/units.py": ("test_planted_faults.py", "test_testing.py"),
 }
 OTHER_NAME = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
@@ -98,12 +127,25 @@ def _changes(node: ast.AST) -> list[Callable[[ast.AST], None]]:
 
 
 def nearest_tests(path: Path) -> list[str]:
-    """Test files of the same name, else those that import the module, no more than four."""
+    """Test files of the same name, else those that import the module, else those of modules that do so."""
+    if str(path) in NEAREST:
+        return [f"tests/hybrid/{name}" for name in NEAREST[str(path)]]
+    tests = _own_tests(path)
+    if not tests:
+        module = re.compile(rf"\b{re.escape('.'.join(path.with_suffix('').parts))}\b")
+        for folder in ("hybrid", "lyapunov"):
+            for other in sorted((ROOT / folder).rglob("*.py")):
+                if module.search(other.read_text(encoding="utf-8")):
+                    tests += _own_tests(other.relative_to(ROOT))
+    return list(dict.fromkeys(tests))[:MOST_TESTS]
+
+
+def _own_tests(path: Path) -> list[str]:
     folder = ROOT / "tests"
     same = sorted(folder.rglob(f"test_{path.stem}.py"))
-    module = ".".join(path.with_suffix("").parts)
-    importing = [p for p in sorted(folder.rglob("test_*.py")) if module in p.read_text(encoding="utf-8")]
-    return [str(p.relative_to(ROOT)) for p in (same or importing)[:4]]
+    module = re.compile(rf"\b{re.escape('.'.join(path.with_suffix('').parts))}\b")
+    importing = (p for p in sorted(folder.rglob("test_*.py")) if module.search(p.read_text(encoding="utf-8")))
+    return [str(p.relative_to(ROOT)) for p in (same or importing)]
 
 
 def is_noticed(fault: Fault, seconds: float) -> bool:
