@@ -78,12 +78,12 @@ class Watch:
     """What is remembered of one guard: on which side the state is taken to be, and whether it is due.
 
     ``way`` is the sign that turns the guard's near side into the negative one. With direction 0 the near side
-    is the side on which the state was.
+    is the side on which the state was; ``turned`` says that ``way`` knows of the crossing that has fired.
     """
 
     def __init__(self, edge: Edge, way: int) -> None:
         self.edge, self.way = edge, way
-        self.beyond = self.due = self.fired = self.resting = False
+        self.beyond = self.due = self.fired = self.resting = self.turned = False
 
     def value(self, t: Fraction, x: Vector) -> Fraction:
         return self.way * self.edge.guard(t, x)
@@ -170,7 +170,7 @@ class _Runner:
         """Fire what is due, one after the other; returns how the run ended, or nothing."""
         count = 0
         for watch in self.watches.values():
-            watch.fired = False
+            watch.fired = watch.turned = False
         known: dict[object, int] = {}
         while True:
             ready = (i for i in sorted(self.watches) if self.watches[i].due and self._allowed(i))
@@ -236,7 +236,7 @@ class _Runner:
     def _own(self, watch: Watch, before: Fraction) -> None:
         """After its own reset a transition is not due, unless it came from beyond exactly onto its guard."""
         if not watch.edge.direction:
-            watch.way, watch.beyond = -self._side(watch.edge), False
+            watch.way, watch.beyond, watch.turned = -self._side(watch.edge), False, True
             return
         value, speed = watch.value(self.t, self.x), watch.speed(self.velocity)
         watch.beyond = value > 0 or (value == 0 and speed > 0)
@@ -301,12 +301,11 @@ class _Runner:
         else:
             if any(watch.edge.direction for watch, _ in same):
                 raise Open("direction 0 beside another direction")
-            alike = [watch for watch, _ in same]
-            way = same[0][0].way * same[0][1]
             # A crossing that has fired is over: the state was on the other side already.
-            crossed = any(other.fired for other in alike)
-            watch = Watch(edge, -way if crossed else way)
-            alike = [] if crossed else alike
+            fired = [(watch, turn) for watch, turn in same if watch.fired]
+            known, turn = (fired or same)[0]
+            watch = Watch(edge, known.way * turn * (-1 if fired and not known.turned else 1))
+            alike = [] if fired else [watch for watch, _ in same]
         before = watch.value(self.t, old_x)
         if alike:
             watch.beyond = any(other.beyond for other in alike)
