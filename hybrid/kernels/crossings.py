@@ -78,14 +78,35 @@ def _row_at(model, transition, path, order, clock, start, pace, place, base, til
     return last
 
 
-@njit(**INLINE)
-def _value_of(row, side):
-    """Value of a guard from its bounds at one place, where the guard comes from ``side``."""
-    slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE])
-    if not abs(slope) < math.inf and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
-        # It jumps somewhere within rounding of this place: the event is beyond.
-        return float(side)
+@njit(**KERNEL)
+def _sample(model, transition, path, order, clock, start, pace, place, work):
+    """Value of a guard at a place of the step, from the compiled function."""
+    state_at(path, order, model.dimension, place, work.state)
+    t = time_at(path, order, clock, start, pace, place)
+    return guard_value(model, transition, t, work.state, work.scalar)
+
+
+@njit(**KERNEL)
+def _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work):
+    """Value of a guard at one place, where ``row`` has its bounds.
+
+    Within rounding of a jump or of a vertical tangent the bounds know nothing: the function itself does.
+    """
+    unbounded = not (row[MOST_SLOPE] < math.inf and row[LEAST_SLOPE] > -math.inf)
+    if unbounded and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
+        return _sample(model, transition, path, order, clock, start, pace, place, work) - base - tilt * place
     return 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
+
+
+@njit(**INLINE)
+def _least_slope(row):
+    """The flattest slope that the bounds leave a guard at a place; nan if they do not know its sign.
+
+    Near a vertical tangent the bounds are wide: a steeper slope would end Newton's method before the root.
+    """
+    if row[LEAST_SLOPE] > 0.0:
+        return row[LEAST_SLOPE]
+    return row[MOST_SLOPE] if row[MOST_SLOPE] < 0.0 else math.nan
 
 
 @njit(**KERNEL)
@@ -122,24 +143,26 @@ def root_in_bracket(
             _row_at(model, transition, path, order, clock, start, pace, 0.0, base, tilt, work)
         ]
         if is_zero(on_guard):
-            if not side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE]):
-                return 0.0
-        elif _value_of(row, side) * side <= 0.0:
+            begins = side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
+        else:
+            value = _value_at(model, transition, path, order, clock, start, pace, 0.0, row, base, tilt, work)
+            begins = value * side > 0.0
+        if not begins:
             return 0.0
     place, last = 0.5 * (low + high), high - low
     for trial in range(MOST_ROOT_STEPS):
         row = work.registers[
             _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)
         ]
-        value = _value_of(row, side)
-        slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE])
+        value = _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work)
+        slope = _least_slope(row)
         if value * side > 0.0:
             low = place
         else:
             high = place
         if value == 0.0 or high - low <= 2.0 * EPSILON * high:
             break
-        closer = place - value / slope if 0.0 < abs(slope) < math.inf else math.nan
+        closer = place - value / slope if abs(slope) < math.inf else math.nan
         change = abs(closer - place)
         if change <= EPSILON * high:
             return place
@@ -326,14 +349,6 @@ def first_change(
     if touch != NOWHERE:
         _note_touch(run, transition, touch, depth * side, length)
     return NOWHERE, side, length
-
-
-@njit(**KERNEL)
-def _sample(model, transition, path, order, clock, start, pace, place, work):
-    """Value of a guard at a place of the step, from the compiled function."""
-    state_at(path, order, model.dimension, place, work.state)
-    t = time_at(path, order, clock, start, pace, place)
-    return guard_value(model, transition, t, work.state, work.scalar)
 
 
 @njit(**KERNEL)
