@@ -132,10 +132,11 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     """
     s = method.b.shape[0]
     low, high = 0.0, h
-    before = guard_value(model, transition, t, y, work.scalar) * side > 0.0
+    begins = guard_value(model, transition, t, y, work.scalar) * side > 0.0
     # Along the step an affine guard is as smooth as the state. Another one may have kinks, jumps, flat roots.
-    # It may cross again before the end of the step, which is no end of a bracket then.
+    # It may cross more than once on the step, whose ends are no ends of a bracket then.
     smooth = model.affine_guard[transition] == 1
+    before = smooth and begins
     after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
     length, last, reach = theta * h, math.inf, FIRST_REACH * h
     for trial in range(MOST_LANDINGS):
@@ -178,6 +179,9 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
             if before and low < h <= length:
                 # The end of the step is the farthest place there is.
                 length = h
+            elif begins and after and length <= low:
+                # So is its start.
+                before, length = True, 0.5 * high
             elif not low < length < high:
                 break
     return NOT_THERE, 0.0

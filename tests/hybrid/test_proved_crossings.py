@@ -248,3 +248,71 @@ def test_a_moving_guard_beside_a_steep_one(solver):
     arc = simulate(system, (0.0,), (0.0, 10.0), solver=solver)
     np.testing.assert_allclose(arc.jumps.t, [4.0], rtol=1e-14)
     np.testing.assert_allclose(arc.jumps.transversality, [-0.25], rtol=1e-14)
+
+
+# Functions that jump, or have a vertical tangent, where their argument is zero.
+STEEP = {"sign": np.sign, "cube root": np.cbrt, "levels": lambda u: np.where(u > 0, 1.0, -0.3)}
+ARGUMENTS = (
+    lambda t, x, p: np.log1p((x.q + 0.3 * x.v) * (x.q + 0.3 * x.v)) - p.c,
+    lambda t, x, p: x.q * np.sin(3 * t) - p.c,
+    lambda t, x, p: np.sin(2 * x.q) - p.c,
+)
+
+
+@cache
+def marked(guard, direction):
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"c": 0.1, "a": 0.5, "b": 0.1},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[Transition("swing", "swing", Guard(guard, direction), name="mark")],
+    )
+
+
+@cache
+def steep(function, argument):
+    return lambda t, x, p: STEEP[function](ARGUMENTS[argument](t, x, p))
+
+
+@pytest.mark.parametrize("function", STEEP)
+@pytest.mark.parametrize("argument", range(len(ARGUMENTS)))
+@given(c=st.floats(0.05, 0.8), direction=st.sampled_from([-1, 0, 1]))
+def test_a_jump_or_a_vertical_tangent_is_as_sharp_as_its_argument(function, argument, c, direction):
+    runs = [
+        simulate(marked(guard, direction), (1.5, 0.0), (0.0, END), parameters={"c": c}, max_jumps=100)
+        for guard in (ARGUMENTS[argument], steep(function, argument))
+    ]
+    plain, sharp = (np.asarray(arc.jumps.t) for arc in runs)
+    assert len(plain) == len(sharp)
+    # A shallow crossing lies where rounding leaves it.
+    slopes = np.array([abs(jump.transversality) for jump in runs[0].jumps])
+    np.testing.assert_array_less(np.abs(sharp - plain) * np.minimum(slopes, 1.0), 2e-14)
+
+
+def curved_and_jumping(t, x, p):
+    return (np.abs(np.abs(x.v) - p.a) ** 1.5 - p.b) * np.sign(x.v - p.c)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@given(
+    a=st.floats(0.4, 0.6),
+    b=st.floats(0.05, 0.12),
+    c=st.floats(-0.1, 0.1),
+    direction=st.sampled_from([-1, 0, 1]),
+)
+def test_a_jump_after_other_crossings_on_one_step(solver, a, b, c, direction):
+    system, started = marked(curved_and_jumping, direction), 0.3
+    q, v = 1.5 * np.cos(started), -1.5 * np.sin(started)
+    arc = simulate(
+        system, (q, v), (started, END), parameters={"a": a, "b": b, "c": c}, solver=solver, max_jumps=200
+    )
+    far = b ** (2 / 3)
+    asin = np.arcsin(np.array([c, a + far, a - far, -a - far, far - a]) / 1.5)
+    turns = 2 * np.pi * np.arange(-1, 4)[:, None]
+    times = np.sort(np.concatenate([turns - asin, turns + np.pi + asin], axis=None))
+    times = times[(times > started) & (times < END)]
+    first = np.sign((np.abs(np.abs(v) - a) ** 1.5 - b) * np.sign(v - c))
+    after = first * np.cumprod(np.full(len(times), -1.0))
+    expected = times[after == direction] if direction else times
+    assert len(arc.jumps) == len(expected)
+    np.testing.assert_allclose(arc.jumps.t, expected, atol=1e-6)
