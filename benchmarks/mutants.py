@@ -26,10 +26,10 @@ from benchmarks.common import ROOT, heading, table
 COPIED = ("hybrid", "lyapunov", "models", "tests", "docs", "benchmarks", "pyproject.toml", "README.md")
 OTHER_OPERATOR = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Mod: ast.Add}
 OTHER_COMPARISON = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
+    ast.Lt: ast.Gt,
+    ast.LtE: ast.GtE,
+    ast.Gt: ast.Lt,
+    ast.GtE: ast.LtE,
     ast.Eq: ast.NotEq,
     ast.NotEq: ast.Eq,
     ast.Is: ast.IsNot,
@@ -41,11 +41,14 @@ OTHER_COMPARISON = {
 MOST_TESTS = 4
 # Where names and imports do not lead to the tests of a file.
 NEAREST = {
+    "hybrid/accuracy.py": ("test_accuracy.py", "test_work_precision.py"),
     "hybrid/directional.py": ("test_series.py", "test_emit.py"),
+    "hybrid/ending.py": ("test_simulate.py", "test_tangent_status.py", "test_grazing.py"),
     "hybrid/forcing.py": ("test_pulses.py",),
     "hybrid/linear_series.py": ("test_series.py", "test_simulate.py"),
     "hybrid/program.py": ("test_proved_crossings.py", "test_crossings.py"),
     "hybrid/propagator.py": ("test_series.py", "test_emit.py", "test_simulate.py"),
+    "hybrid/run.py": ("test_run.py", "test_simulate.py", "test_arguments.py"),
     "hybrid/status.py": ("test_simulate.py", "test_tangent_status.py"),
     "hybrid/whole.py": ("test_periodicity.py", "test_arguments.py"),
     "hybrid/kernels/bounds.py": ("test_proved_crossings.py", "test_crossings.py"),
@@ -96,10 +99,16 @@ def faults(path: Path) -> Iterator[Fault]:
 
 
 def _is_silent(node: ast.AST) -> bool:
-    """Whether a fault here changes no result: texts, annotations, imports, errors' own words."""
+    """Whether a fault here changes no result: texts, annotations, imports, errors' own words, tuning."""
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.AnnAssign):
         return True
     if isinstance(node, ast.FunctionDef) and node.name in ("__repr__", "__getattr__"):
+        return True
+    if (
+        isinstance(node, ast.Assign)
+        and isinstance(node.targets[0], ast.Name)
+        and node.targets[0].id.isupper()
+    ):
         return True
     return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
