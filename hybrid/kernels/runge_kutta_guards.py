@@ -14,8 +14,6 @@ from hybrid.kernels.step import attempt_again
 
 # A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
 EULER_IS_ENOUGH = 1e-8
-# Newton's method converges to a simple root if its steps shrink faster than this.
-QUADRATIC = 0.1
 # Farthest Newton step, as a share of the step, for a guard that may have kinks and jumps.
 FARTHEST = 1e-3
 # First distance, as a share of the step, at which the other side of a guard is looked for.
@@ -146,7 +144,9 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
         value = guard_value(model, transition, t + length, work.new, work.scalar)
         speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
         correction = -value / speed
-        converges = smooth or (trial > 0 and abs(correction) <= QUADRATIC * last)
+        # The next correction is foreseen from the last two, since Newton's method converges quadratically.
+        next_one = abs(correction) ** 3
+        converges = smooth or (trial > 0 and next_one <= EPSILON * length * last * last)
         if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
             for i in range(model.dimension * (1 + tangents)):
                 work.new[i] += correction * work.stages[s, i]

@@ -44,6 +44,10 @@ FAMILIES = {
     "fifth": (lambda t, x, p: (x.q - p.c) ** 5, lambda k, c: [c]),
     "signed square": (lambda t, x, p: (x.q - p.c) * np.abs(x.q - p.c), lambda k, c: [c]),
     "cube root": (lambda t, x, p: np.cbrt(x.q - p.c), lambda k, c: [c]),
+    "near the tangent": (
+        lambda t, x, p: np.cbrt(p.k * (x.q - p.c)) - 1e-3,
+        lambda k, c: [c + 1e-9 / k],
+    ),
     "dead zone": (lambda t, x, p: np.maximum(np.abs(x.q - p.c) - 0.3, 0) - 1e-3 * p.k / 500, None),
     "quotient": (lambda t, x, p: (x.q - p.c) / (1 + p.k * x.q**2), lambda k, c: [c]),
     "angle": (lambda t, x, p: np.arctan2(x.q - p.c, 2 + x.v), lambda k, c: [c]),
