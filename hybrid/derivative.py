@@ -36,14 +36,12 @@ def symbolic_jacobian(
     """
     from sympy.core.parameters import distribute
 
-    from hybrid.symbolic import ZERO, close_gates
+    from hybrid.slopes import partial_derivatives
+    from hybrid.symbolic import close_gates
 
-    columns = list(variables)
     with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
-        return [
-            [close_gates(row.diff(variable)) if row.has(variable) else ZERO for variable in columns]
-            for row in expressions
-        ]
+        rows = partial_derivatives(expressions, list(variables))
+        return [[close_gates(entry) for entry in row] for row in rows]
 
 
 def check_derivative(system: HybridSystem, role: Role) -> None:

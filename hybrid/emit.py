@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 
 # A cell of a matrix in the statements for a derivative.
 _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
+_ZERO_CELL = re.compile(r"out\[\d+, \d+\] = 0\.0")
+# So many zeros are written by a loop.
+MANY_ZEROS = 50
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
 
@@ -64,14 +67,14 @@ def emit(system: HybridSystem) -> Emitted:
     ]
     functions = (
         _function("flow", [field.value for field in fields]),
-        _function("flow_jacobian", [field.derivative for field in fields]),
+        _function("flow_jacobian", [_zeros_first(field.derivative, system.dimension) for field in fields]),
         _function("variational_flow", [_variational(field, system.dimension) for field in fields]),
         _function(
             "guard", [*(guard.value for guard in guards), *(condition.value for condition in conditions)]
         ),
         _function("guard_gradient", [guard.derivative for guard in guards]),
         _function("reset", [reset.value for reset in resets]),
-        _function("reset_jacobian", [reset.derivative for reset in resets]),
+        _function("reset_jacobian", [_zeros_first(reset.derivative, system.dimension) for reset in resets]),
         _function("series", _placed(propagators), "index, t, x, p, order, out"),
     )
     symbols = writer.symbols
@@ -337,6 +340,16 @@ def _function(name: str, branches: Iterable[Sequence[str]], arguments: str = "in
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n"
+
+
+def _zeros_first(statements: list[str], n: int) -> list[str]:
+    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
+    zeros = [each for each in statements if _ZERO_CELL.fullmatch(each)]
+    if len(zeros) < MANY_ZEROS:
+        return statements
+    others = [each for each in statements if not _ZERO_CELL.fullmatch(each)]
+    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
+    return [*loop, *others]
 
 
 def _variational(field: _Written, n: int) -> list[str]:

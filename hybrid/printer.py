@@ -63,6 +63,9 @@ CONNECTIVES: dict[type[sympy.Basic], str] = {sym.And: "and", sym.Or: "or"}
 SUM, PRODUCT, POWER, ATOM = range(4)
 
 LARGEST_UNROLLED_POWER = 16
+# In a block of more expressions than this only whole ones are shared: the search for common parts of sums and
+# products takes a time that grows faster than the block.
+LARGE = 400
 
 
 def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> list[str]:
@@ -70,10 +73,14 @@ def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> li
 
     ``targets`` may then overlap with what the expressions read.
     """
-    shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("c", real=True), list=True)
-    printer = _Printer()
-    for symbol, expression in shared:
-        printer.assign(symbol.name, expression)
+    uses = _uses(expressions)
+    if len(uses) > LARGE:
+        reduced, printer = expressions, _Printer(node for node, count in uses.items() if count > 1)
+    else:
+        shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("c", real=True), list=True)
+        printer = _Printer()
+        for symbol, expression in shared:
+            printer.assign(symbol.name, expression)
     stores = []
     for k, (target, expression) in enumerate(zip(targets, reduced, strict=True)):
         value = f"y{k}"
@@ -83,6 +90,20 @@ def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> li
             printer.assign(value, expression)
         stores.append(f"{target} = {value}")
     return printer.lines + stores
+
+
+def _uses(expressions: Iterable[sympy.Expr]) -> dict[sympy.Expr, int]:
+    """How often each expression inside others, but symbols and numbers, is used."""
+    uses: dict[sympy.Expr, int] = {}
+    waiting = list(expressions)
+    while waiting:
+        node = waiting.pop()
+        if not node.args:
+            continue
+        uses[node] = uses.get(node, 0) + 1
+        if uses[node] == 1:
+            waiting.extend(node.args)
+    return uses
 
 
 def unprintable(expressions: Iterable[sympy.Expr]) -> str | None:
@@ -98,11 +119,15 @@ def unprintable(expressions: Iterable[sympy.Expr]) -> str | None:
 
 
 class _Printer:
-    """Prints one block of statements; a value that a text needs several times becomes a variable."""
+    """Prints one block of statements; a value that a text needs several times becomes a variable.
 
-    def __init__(self) -> None:
+    So do the expressions in ``shared``, which several others need.
+    """
+
+    def __init__(self, shared: Iterable[sympy.Expr] = ()) -> None:
         self.lines: list[str] = []
         self._variables: dict[sympy.Expr, str] = {}
+        self._shared = frozenset(shared)
 
     def assign(self, name: str, expression: sympy.Expr) -> None:
         text = self.text(expression)  # may append lines of its own, which come first
@@ -110,6 +135,8 @@ class _Printer:
 
     def text(self, expression: sympy.Expr, binding: int = SUM) -> str:
         """The expression as code, in brackets if it binds less than ``binding``."""
+        if expression in self._shared:
+            return self.name(expression)
         text, own = self._print(expression)
         return f"({text})" if own < binding else text
 
@@ -120,7 +147,8 @@ class _Printer:
         if expression not in self._variables:
             name = f"u{len(self._variables)}"
             self._variables[expression] = name
-            self.assign(name, expression)
+            text, _ = self._print(expression)  # may append lines of its own, which come first
+            self.lines.append(f"{name} = {text}")
         return self._variables[expression]
 
     def _print(self, expression: sympy.Expr) -> tuple[str, int]:
@@ -151,7 +179,9 @@ class _Printer:
         above, below = [], []
         for factor in sympy.Mul.make_args(rest):
             base, exponent = factor.as_base_exp()
-            if factor.is_Pow and exponent.is_Number and exponent.is_negative:
+            if factor in self._shared:
+                above.append(self.name(factor))
+            elif factor.is_Pow and exponent.is_Number and exponent.is_negative:
                 below.append(self.text(sympy.Pow(base, -exponent), ATOM))
             else:
                 above.append(self.text(factor, POWER))

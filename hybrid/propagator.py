@@ -14,7 +14,6 @@ import sympy
 from sympy.core.parameters import distribute
 
 from hybrid.constants import Constants
-from hybrid.directional import directional
 from hybrid.emitted import Propagator
 from hybrid.kernels.codes import (
     DESINGULARISED,
@@ -40,6 +39,7 @@ from hybrid.roots import (
 )
 from hybrid.series import ONE_THEN_ZERO, PAIRS, NoSeries, Recurrences
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
+from hybrid.slopes import directional, partial_derivatives
 from hybrid.symbolic import (
     ZERO,
     Absolute,
@@ -114,7 +114,7 @@ def _series(
         written = _write_desingularised(field, boundaries, guards, z, symbols)
         reason = "half-integer powers of a guard, on the clock dt = w ds"
         return Propagator(DESINGULARISED, 0, reason, *written, guards=tuple(held))
-    jacobian = [[entry.diff(v) for v in symbols.x] for entry in field]
+    jacobian = partial_derivatives(field, symbols.x)
     if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
         written = _write(field, guards, symbols)
         return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *written, guards=tuple(held))
@@ -255,8 +255,8 @@ def _write(
 ) -> tuple[tuple[str, ...], int, int, int]:
     body = _Body(symbols, guards, (), ONE_THEN_ZERO)
     seeds = _seeds(symbols)
-    tangents = [directional(rate, seeds) for rate in field]
-    trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
+    tangents = directional(field, seeds)
+    trace = _divergence(field, symbols)
     return body.assemble(symbols.x, *_state(symbols), field, guards, trace, tangents, seeds)
 
 
@@ -296,8 +296,8 @@ def _write_desingularised(
     seeds = _seeds(symbols)
     slope = slope_along(field, z, symbols)
     rates = [on_clock(rate, z) for rate in field]
-    tangents = [on_clock(directional(rate, seeds), z) for rate in field]
-    trace = on_clock(sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True))), z)
+    tangents = [on_clock(along, z) for along in directional(field, seeds)]
+    trace = on_clock(_divergence(field, symbols), z)
     # Where z is zero its root crosses zero, with a slope.
     roots = _in_terms_of_root(boundaries, z, ROOT, symbols)
     crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
@@ -342,7 +342,7 @@ def _write_rooted(
         signed |= places
     crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
     columns, starts = _state(symbols)
-    trace = sympy.Add(*(rate.diff(x) for rate, x in zip(field, symbols.x, strict=True)))
+    trace = _divergence(field, symbols)
     return body.assemble(
         [*symbols.x, *(root.symbol for root in roots)],
         [*columns, *body.rows.values()],
@@ -350,7 +350,7 @@ def _write_rooted(
         [*(in_all_roots(rate) for rate in field), *(in_all_roots(root.rate) for root in roots)],
         crossing,
         in_all_roots(trace),
-        [in_all_roots(directional(rate, seeds)) for rate in field],
+        [in_all_roots(along) for along in directional(field, seeds)],
         seeds,
     )
 
@@ -369,6 +369,11 @@ def _harmonics(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr
         for function in PAIRS.get(node.func, (node.func,))[:2]:
             found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))
     return found
+
+
+def _divergence(field: Sequence[sympy.Expr], symbols: Symbols) -> sympy.Expr:
+    jacobian = partial_derivatives(field, symbols.x)
+    return sympy.Add(*(row[i] for i, row in enumerate(jacobian)))
 
 
 def _seeds(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:

@@ -1,0 +1,102 @@
+"""Derivatives of expressions by the chain rule: all partial ones at once, or one along a vector.
+
+SymPy's own ``diff`` walks an expression once for each variable and asks about assumptions at every node. Here
+every node is differentiated once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import sympy
+
+from hybrid.symbolic import ONE, ZERO, Select
+
+Partials = dict[sympy.Symbol, sympy.Expr]
+
+
+def partial_derivatives(
+    expressions: Iterable[sympy.Expr], variables: Sequence[sympy.Symbol]
+) -> list[list[sympy.Expr]]:
+    """Rows of the partial derivatives of ``expressions`` with respect to ``variables``."""
+    wanted = frozenset(variables)
+    found: dict[sympy.Expr, Partials] = {}
+    rows = (_partials(expression, wanted, found) for expression in expressions)
+    return [[row.get(variable, ZERO) for variable in variables] for row in rows]
+
+
+def _partials(
+    expression: sympy.Expr, wanted: frozenset[sympy.Symbol], found: dict[sympy.Expr, Partials]
+) -> Partials:
+    """The partial derivatives that are not zero; ``found`` holds those of the nodes seen before."""
+    if expression.is_Symbol:
+        return {expression: ONE} if expression in wanted else {}
+    known = found.get(expression)
+    if known is not None:
+        return known
+    if isinstance(expression, sympy.sign):
+        return {}
+    args = expression.args
+    inner = [_partials(argument, wanted, found) for argument in args]
+    terms: dict[sympy.Symbol, list[sympy.Expr]] = {}
+    if isinstance(expression, Select):
+        condition, (_, one, other) = args[0], inner
+        for v in one | other:
+            terms[v] = [Select(condition, one.get(v, ZERO), other.get(v, ZERO))]
+    else:
+        for place, partials in enumerate(inner):
+            if not partials:
+                continue
+            if expression.is_Add:
+                products = partials
+            elif expression.is_Mul:
+                before, behind = args[:place], args[place + 1 :]
+                products = {v: sympy.Mul(*before, part, *behind) for v, part in partials.items()}
+            else:
+                outer = _outer(expression, place)
+                products = {v: outer * part for v, part in partials.items()}
+            for v, product in products.items():
+                terms.setdefault(v, []).append(product)
+    sums = {v: sympy.Add(*each) if len(each) > 1 else each[0] for v, each in terms.items()}
+    found[expression] = {v: total for v, total in sums.items() if total != 0}
+    return found[expression]
+
+
+def directional(
+    expressions: Iterable[sympy.Expr], seeds: dict[sympy.Symbol, sympy.Symbol]
+) -> list[sympy.Expr]:
+    """Derivatives along the seeds, one for each symbol, in a form that keeps common factors together."""
+    found: dict[sympy.Expr, sympy.Expr] = {}
+    return [_along(expression, seeds, found) for expression in expressions]
+
+
+def _along(
+    expression: sympy.Expr, seeds: dict[sympy.Symbol, sympy.Symbol], found: dict[sympy.Expr, sympy.Expr]
+) -> sympy.Expr:
+    if expression.is_Symbol:
+        return seeds.get(expression, ZERO)
+    known = found.get(expression)
+    if known is not None:
+        return known
+    args = expression.args
+    terms = []
+    for place, argument in enumerate(args):
+        inner = _along(argument, seeds, found)
+        if inner == 0:
+            continue
+        if expression.is_Add:
+            terms.append(inner)
+        elif expression.is_Mul:
+            terms.append(sympy.Mul(*args[:place], inner, *args[place + 1 :]))
+        else:
+            terms.append(_outer(expression, place) * inner)
+    found[expression] = sympy.Add(*terms) if len(terms) != 1 else terms[0]
+    return found[expression]
+
+
+def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
+    """Derivative of the outermost function in its argument of that index."""
+    if expression.is_Pow:
+        base, exponent = expression.args
+        return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
+    return expression.fdiff(index + 1)
