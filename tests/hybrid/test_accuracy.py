@@ -153,6 +153,26 @@ def test_a_run_that_breaks_off_keeps_its_status():
     assert np.isfinite(found.jumps[0])
 
 
+def test_runs_that_end_in_different_modes_have_no_error_bar():
+    """Between the event of a loose run and that of a tight one, at pi/2, only one of them has jumped."""
+    system = hybrid.HybridSystem(
+        state=("q", "v"),
+        modes=[hybrid.Mode(side, lambda t, x, p: (x.v, -x.q)) for side in ("right", "left")],
+        transitions=[hybrid.Transition("right", "left", hybrid.Guard(lambda t, x, p: x.q, -1))],
+    )
+    loose = DOP853(rtol=1e-2, atol=1e-3)
+
+    def error(end):
+        return global_error(system, (1.0, 0.0), (0.0, end), mode="right", solver=loose)
+
+    # The loose run crosses at another time, which also depends on where its last step ends.
+    found = [error(np.pi / 2 + sign * 10.0**-power) for power in range(3, 10) for sign in (1, -1)]
+    torn = [each for each in found if each.status.code == StatusCode.NOT_CONVERGED]
+    assert 0 < len(torn) < len(found)
+    assert all(np.all(np.isinf(each.x)) for each in torn)
+    assert all(np.all(each.x < 0.1) for each in found if each not in torn)
+
+
 def test_a_run_without_jumps():
     """Decay: exp(-1) of the start."""
     system = hybrid.HybridSystem(state=("x",), modes=[hybrid.Mode("only", lambda t, x, p: (-x.x,))])

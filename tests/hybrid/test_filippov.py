@@ -174,6 +174,17 @@ class TestSliding:
         start = max(at, 0.0)
         np.testing.assert_allclose(arc.x[-1], [2 + at, ((2 + at) ** 2 - start**2) / 2], rtol=1e-11)
 
+    @pytest.mark.parametrize("scale", [2.0**-30, 2.0**30])
+    @pytest.mark.parametrize("x0", [(-2.3, -0.5), (-2.7, 0.5), (-0.6, -0.5), (0.5, -0.3)])
+    def test_the_scale_of_the_switching_function_changes_nothing(self, scale, x0):
+        scaled = planar(
+            lambda t, x, p: (1.0, 1.0), lambda t, x, p: (1.0, x.x), switching=lambda t, x, p: scale * x.y
+        )
+        here, there = (hybrid.simulate(system, x0, (0.0, 5.0)) for system in (self.SYSTEM, scaled))
+        assert events(there) == events(here)
+        np.testing.assert_allclose(there.jumps.t, here.jumps.t, rtol=1e-14)
+        np.testing.assert_allclose(there.x[-1], here.x[-1], rtol=1e-13)
+
     def test_starts_in_the_surface(self):
         assert hybrid.simulate(self.SYSTEM, (-1.0, 0.0), (0.0, 0.5)).mode[0] == "sliding"
         assert hybrid.simulate(self.SYSTEM, (1.0, 0.0), (0.0, 0.5)).mode[0] == "above"
