@@ -51,6 +51,7 @@ MODELS = {
     "chain of 10 states": "chain(5)",
     "chain of 20 states": "chain(10)",
     "chain of 40 states": "chain(20)",
+    "chain of 100 states": "chain(50)",
     "20 states, dense": "dense(20)",
 }
 # The kernels are loaded by a model that is small and another one.

@@ -39,7 +39,7 @@ from hybrid.roots import (
 )
 from hybrid.series import ONE_THEN_ZERO, PAIRS, NoSeries, Recurrences
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
-from hybrid.slopes import directional, partial_derivatives
+from hybrid.slopes import directional, divergence, partial_derivatives
 from hybrid.symbolic import (
     ZERO,
     Absolute,
@@ -256,7 +256,7 @@ def _write(
     body = _Body(symbols, guards, (), ONE_THEN_ZERO)
     seeds = _seeds(symbols)
     tangents = directional(field, seeds)
-    trace = _divergence(field, symbols)
+    trace = divergence(field, symbols.x)
     return body.assemble(symbols.x, *_state(symbols), field, guards, trace, tangents, seeds)
 
 
@@ -297,7 +297,7 @@ def _write_desingularised(
     slope = slope_along(field, z, symbols)
     rates = [on_clock(rate, z) for rate in field]
     tangents = [on_clock(along, z) for along in directional(field, seeds)]
-    trace = on_clock(_divergence(field, symbols), z)
+    trace = on_clock(divergence(field, symbols.x), z)
     # Where z is zero its root crosses zero, with a slope.
     roots = _in_terms_of_root(boundaries, z, ROOT, symbols)
     crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
@@ -342,7 +342,7 @@ def _write_rooted(
         signed |= places
     crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
     columns, starts = _state(symbols)
-    trace = _divergence(field, symbols)
+    trace = divergence(field, symbols.x)
     return body.assemble(
         [*symbols.x, *(root.symbol for root in roots)],
         [*columns, *body.rows.values()],
@@ -369,11 +369,6 @@ def _harmonics(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr
         for function in PAIRS.get(node.func, (node.func,))[:2]:
             found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))
     return found
-
-
-def _divergence(field: Sequence[sympy.Expr], symbols: Symbols) -> sympy.Expr:
-    jacobian = partial_derivatives(field, symbols.x)
-    return sympy.Add(*(row[i] for i, row in enumerate(jacobian)))
 
 
 def _seeds(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:

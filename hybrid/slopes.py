@@ -25,6 +25,11 @@ def partial_derivatives(
     return [[row.get(variable, ZERO) for variable in variables] for row in rows]
 
 
+def divergence(field: Sequence[sympy.Expr], variables: Sequence[sympy.Symbol]) -> sympy.Expr:
+    """Sum of the derivatives of each rate in its own variable."""
+    return sympy.Add(*(row[i] for i, row in enumerate(partial_derivatives(field, variables))))
+
+
 def _partials(
     expression: sympy.Expr, wanted: frozenset[sympy.Symbol], found: dict[sympy.Expr, Partials]
 ) -> Partials:
