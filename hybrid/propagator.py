@@ -124,10 +124,10 @@ def _series(
         return Propagator(TAYLOR, 0, reason, *written, guards=tuple(held))
     of_state = _degree(field, jacobian, symbols)
     if 0 < of_state <= HIGHEST_ORDER:
-        # A guard that is a polynomial in the state is one in time here.
+        # A quadratic guard is a polynomial in time here; of higher ones flat roots drown in rounding.
         powers = [0 if b.guard is None else _polynomial(b.guard, symbols) for b in boundaries]
-        held = [0 < of_state * power <= HIGHEST_ORDER for power in powers]
-        degree = of_state * max([1, *(power for power in powers if of_state * power <= HIGHEST_ORDER)])
+        held = [0 < power <= 2 and of_state * power <= HIGHEST_ORDER for power in powers]
+        degree = of_state * max([1, *(power for power, is_held in zip(powers, held, strict=True) if is_held)])
         written = _write(field, _columns(boundaries, held), symbols)
         return Propagator(EXACT, degree, f"polynomials of degree {degree}", *written, guards=tuple(held))
     harmonics = _harmonics(field, symbols)

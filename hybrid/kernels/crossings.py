@@ -316,6 +316,13 @@ def first_change(
         if after == 0:
             continue
         if after != side and side != 0:
+            # Behind a jump at the start the guard may be on its side for certain from this piece on.
+            if (
+                sure < low
+                and certain_sign(model, transition, path, order, clock, start, pace, low, base, tilt, work)
+                == side
+            ):
+                sure = low
             place = root_in_bracket(
                 model,
                 transition,

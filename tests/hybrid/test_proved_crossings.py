@@ -320,3 +320,40 @@ def test_a_jump_after_other_crossings_on_one_step(solver, a, b, c, direction):
     expected = times[after == direction] if direction else times
     assert len(arc.jumps) == len(expected)
     np.testing.assert_allclose(arc.jumps.t, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_fall_behind_a_jump_at_the_start_of_a_step(solver):
+    """The jump puts the guard on its far side, from where it only falls: one more change of sign."""
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode("ramp", lambda t, x, p: (0.3,))],
+        transitions=[
+            Transition(
+                "ramp",
+                "ramp",
+                Guard(lambda t, x, p: np.minimum(np.where(x.q > 0.8, 1.0, x.q - 0.8), np.cbrt(1.1 - x.q)), 0),
+            )
+        ],
+    )
+    arc = simulate(system, (-1.0,), (0.0, 10.0), solver=solver, max_jumps=50)
+    np.testing.assert_allclose(arc.jumps.t, [1.8 / 0.3, 2.1 / 0.3], rtol=1e-14)
+
+
+@pytest.mark.parametrize("power", [3, 5, 7])
+@given(c=st.floats(-0.5, 0.5), a=st.floats(0.2, 0.5))
+def test_flat_roots_on_flights_that_are_polynomials(power, c, a):
+    """The power of a polynomial is flat where that is zero, however it would round written out."""
+    system = HybridSystem(
+        state=("q",),
+        parameters={"c": 0.0, "a": 0.4},
+        modes=[Mode("ramp", lambda t, x, p: (0.25,))],
+        transitions=[
+            Transition("ramp", "ramp", Guard(lambda t, x, p: (x.q + p.a * x.q**2 - p.c) ** power, 1))
+        ],
+    )
+    arc = simulate(system, (-0.9,), (0.0, 10.0), parameters={"c": c, "a": a}, max_jumps=50)
+    root = (np.sqrt(1 + 4 * a * c) - 1) / (2 * a)
+    if root < -0.9:
+        return
+    np.testing.assert_allclose(arc.jumps.t, [(root + 0.9) / 0.25], rtol=0, atol=1e-13)
