@@ -168,9 +168,16 @@ def test_degree_of_polynomial_solutions(field, degree):
 
 
 @pytest.mark.parametrize(
-    ("guard", "degree"), [(lambda x: x.x + 1, 2), (lambda x: x.x * x.y**2 - 1, 6), (lambda x: np.exp(x.x), 2)]
+    ("guard", "degree"),
+    [
+        (lambda x: x.x + 1, 2),
+        (lambda x: x.x * x.y - 1, 4),
+        # Written out its flat roots would drown in rounding.
+        (lambda x: x.x * x.y**2 - 1, 2),
+        (lambda x: np.exp(x.x), 2),
+    ],
 )
-def test_a_step_over_a_whole_flight_needs_polynomial_guards_too(guard, degree):
+def test_a_step_over_a_whole_flight_needs_quadratic_guards_too(guard, degree):
     flight = Transition("a", "a", Guard(lambda t, x, p: guard(x), -1))
     [propagator] = emit(system_of(lambda t, x, p: (x.y, -9.81), flight)).propagators
     assert (propagator.kind, propagator.degree) == (EXACT, degree)
