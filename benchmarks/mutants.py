@@ -42,7 +42,6 @@ MOST_TESTS = 4
 # Where names and imports do not lead to the tests of a file.
 NEAREST = {
     "hybrid/accuracy.py": ("test_accuracy.py", "test_work_precision.py"),
-    "hybrid/directional.py": ("test_series.py", "test_emit.py"),
     "hybrid/ending.py": ("test_simulate.py", "test_tangent_status.py", "test_grazing.py"),
     "hybrid/forcing.py": ("test_pulses.py",),
     "hybrid/linear_series.py": ("test_series.py", "test_simulate.py"),
@@ -52,6 +51,8 @@ NEAREST = {
     "hybrid/status.py": ("test_simulate.py", "test_tangent_status.py"),
     "hybrid/whole.py": ("test_periodicity.py", "test_arguments.py"),
     "hybrid/kernels/bounds.py": ("test_proved_crossings.py", "test_crossings.py"),
+    "hybrid/kernels/crossings.py": ("test_proved_crossings.py", "test_crossings.py"),
+    "hybrid/kernels/dense.py": ("test_cache.py", "test_series.py", "test_work_precision.py"),
     "hybrid/kernels/drive.py": ("test_simulate.py", "test_instant.py", "test_onset.py"),
     "hybrid/kernels/first_mode.py": ("test_simulate.py", "test_instant.py"),
     "hybrid/kernels/forcing.py": ("test_pulses.py",),
@@ -60,13 +61,22 @@ NEAREST = {
     "hybrid/kernels/operations.py": ("test_proved_crossings.py",),
     "hybrid/kernels/runge_kutta.py": ("test_order.py", "solvers/test_taylor.py"),
     "hybrid/kernels/runge_kutta_guards.py": ("test_proved_crossings.py", "test_onset.py"),
+    "hybrid/kernels/series_guards.py": ("kernels/test_series_guards.py", "test_onset.py", "test_simulate.py"),
     "hybrid/kernels/sides.py": ("test_instant.py", "test_onset.py", "test_corner.py"),
+    "hybrid/kernels/step.py": ("test_order.py", "test_simulate.py"),
+    "hybrid/load.py": ("test_cache.py", "test_compile.py"),
     "hybrid/solvers/dop853.py": ("test_order.py", "solvers/test_tableau.py"),
     "hybrid/solvers/tsit5.py": ("test_order.py", "solvers/test_tableau.py"),
     "hybrid/testing/check.py": ("test_testing.py", "test_planted_faults.py"),
     "hybrid/testing/derivatives.py": ("test_planted_faults.py", "test_testing.py"),
+    "hybrid/symbolic.py": ("test_trace.py", "test_slopes.py", "test_series.py"),
+    "hybrid/testing/case.py": ("test_testing.py", "test_planted_faults.py"),
+    "hybrid/testing/small.py": ("test_testing.py", "test_planted_faults.py"),
     "hybrid/testing/strategies.py": ("test_testing.py",),
     "hybrid/testing/units.py": ("test_planted_faults.py", "test_testing.py"),
+    "hybrid/trace.py": ("test_trace.py",),
+    "hybrid/traced.py": ("test_trace.py", "test_kept.py"),
+    "hybrid/ufuncs.py": ("test_trace.py",),
 }
 OTHER_NAME = {"min": "max", "max": "min", "any": "all", "all": "any"}
 

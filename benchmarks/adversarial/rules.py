@@ -314,7 +314,8 @@ class _Runner:
         elif before == 0 and any(other.resting for other, _ in same):
             raise Open("at rest on a guard that was watched the other way")
         else:
-            watch.beyond = before > 0
+            # It keeps the side that the other one knows; a crossing that nobody watched for is over.
+            watch.beyond = before > 0 or (before == 0 and not any(other.beyond for other, _ in same))
         due = watch.due
         self._asked(watch, before)
         if edge.marks:

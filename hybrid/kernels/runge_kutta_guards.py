@@ -7,7 +7,14 @@ from numba import njit
 from hybrid.kernels.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
 from hybrid.kernels.codes import GRAZING_PLACE, MODE, NO_TRANSITION
 from hybrid.kernels.crossings import crossing_on_path, rests
-from hybrid.kernels.guards import error_band, guard_speed, guard_value, note_grazing, rounding_band
+from hybrid.kernels.guards import (
+    ROUNDING_OF_STATE,
+    error_band,
+    guard_speed,
+    guard_value,
+    note_grazing,
+    rounding_band,
+)
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL
 from hybrid.kernels.onset import BY_STEP, has_just_fired
 from hybrid.kernels.step import attempt_again
@@ -39,6 +46,20 @@ def affine_polynomial(model, method, transition, t, h, x, value, work):
             total += method.interpolant[i, j] * work.speeds[j]
         work.polynomial[i] = total
     return degree
+
+
+@njit(**KERNEL)
+def rounding_on_step(model, run, transition, t, h, work):
+    """How far from zero rounding can leave a guard that is at rest on a step; ``work.gradient`` is current.
+
+    A state and a time that are zero where the step starts have no size there, only further on.
+    """
+    n = model.dimension
+    moved = abs(work.gradient[n])
+    for i in range(n):
+        moved += abs(work.gradient[i] * work.stages[0, i])
+    band = rounding_band(model, run, transition, t, run.y, work)
+    return band + ROUNDING_OF_STATE * EPSILON * h * moved
 
 
 @njit(**KERNEL)
@@ -74,7 +95,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
             start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
             degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
             if on_guard > 0:
-                band, farthest = rounding_band(model, run, transition, t, run.y, work), 0.0
+                band, farthest = rounding_on_step(model, run, transition, t, h, work), 0.0
                 for i in range(degree + 1):
                     farthest = max(farthest, abs(work.polynomial[i]))
                 if farthest <= band:

@@ -7,7 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    Taylor,
+    Transition,
+    Tsit5,
+    simulate,
+)
 from tests.hybrid.systems import BALL_SYSTEM, OSCILLATOR_SYSTEM, pendulum
 
 SOLVERS = (Taylor(rtol=1e-12, atol=1e-14), DOP853(rtol=1e-12, atol=1e-14))
@@ -19,6 +30,11 @@ GUARDS = {
     "kink": lambda t, x, p: np.maximum(x.q - p.c, 3 * (x.q - p.c)),
     "jump": lambda t, x, p: np.sign(x.q - p.c) * (1 + x.q * x.q),
 }
+
+
+def moderate(largest):
+    """Numbers whose products with others keep all their digits, and zero."""
+    return st.floats(-largest, largest).filter(lambda a: a == 0.0 or abs(a) > 1e-60)
 
 
 def away(q, ulps):
@@ -102,3 +118,34 @@ def test_a_run_cut_beside_a_jump(solver, name):
             first = simulate(system, x0, (0.0, split), mode=mode, **options)
             second = simulate(system, first.x[-1], (split, end), mode=first.mode[-1], **options)
             assert len(first.jumps) + len(second.jumps) == len(times[solver]), (t, ulps)
+
+
+@cache
+def riding():
+    """``q`` moves as fast as both its guards do, on which it lies; ``s`` turns, for steps of some length."""
+    count = Reset(lambda t, x, p: (x.q, x.s, x.n + 1))
+    return HybridSystem(
+        state=("q", "s", "n"),
+        parameters={"c": 0.0, "r": 1.0},
+        modes=[Mode("move", lambda t, x, p: (p.r, 1.3 * np.cos(x.s), 0.0))],
+        transitions=[
+            Transition("move", "move", Guard(lambda t, x, p: x.q - p.r * t - p.c, +1), count, name="rises"),
+            Transition("move", "move", Guard(lambda t, x, p: x.q - p.r * t - p.c, -1), count, name="falls"),
+            Transition("move", "move", Guard(lambda t, x, p: np.sin(x.s), 0), name="mark"),
+        ],
+    )
+
+
+@pytest.mark.parametrize("solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=repr)
+@settings(max_examples=60, deadline=None)
+@given(
+    r=moderate(4),
+    c=moderate(4),
+    s=moderate(3),
+)
+def test_a_state_that_rides_on_its_guard_does_not_fire_it(solver, r, c, s):
+    arc = simulate(
+        riding(), (c, s, 0.0), (0.0, 30.0), parameters={"r": r, "c": c}, solver=solver, max_jumps=100
+    )
+    assert arc.status.ok
+    assert arc.x[-1, 2] == 0
