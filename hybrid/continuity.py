@@ -16,6 +16,17 @@ import numpy as np
 import sympy
 from sympy.core.parameters import distribute
 
+from hybrid.nodes import (
+    MOST_EXPANDED,
+    contains,
+    is_larger_than,
+    mentions,
+    nodes,
+    nodes_of,
+    once,
+    replaced,
+    symbols_of,
+)
 from hybrid.symbolic import (
     ONE,
     ZERO,
@@ -39,6 +50,7 @@ from hybrid.symbolic import (
 ROUNDING = (Floor, Ceiling, Truncate)
 REMAINDERS = (Remainder, TruncatedRemainder)
 JUMPS = (Less, LessEqual, Sign, Step, *ROUNDING, *REMAINDERS, Atan2)
+UNKNOWN = frozenset((sympy.nan, sympy.zoo, sympy.oo))
 # A constant this much smaller than the terms that it is the sum of is rounding.
 SMALL = 1e-12
 # Floats are taken for multiples of this part of pi.
@@ -56,10 +68,11 @@ def jumps_of(field: Iterable[sympy.Expr], states: Sequence[sympy.Symbol]) -> lis
 
 
 def _surfaces(entry: sympy.Expr, states: Sequence[sympy.Symbol]) -> list[str]:
-    entry = _with_exact_turns(entry)
-    atoms = sorted((node for node in entry.atoms(*JUMPS) if node.has(*states)), key=sympy.default_sort_key)
-    if not atoms:
+    if not contains(entry, JUMPS):
         return []
+    entry = _with_exact_turns(entry)
+    jumps = (node for node in nodes_of(JUMPS, entry) if mentions(node, states))
+    atoms = sorted(jumps, key=sympy.default_sort_key)
     names = {atom: sympy.Dummy(real=True) for atom in atoms}
     return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
 
@@ -99,11 +112,11 @@ def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Exp
 
 def _substitutions(surface: sympy.Expr) -> Iterator[tuple[sympy.Expr, sympy.Expr]]:
     """What to put for what, so that a surface vanishes."""
-    variables = [each for each in surface.free_symbols if each.name == "t" or each.name.startswith("x[")]
+    variables = [each for each in symbols_of(surface) if each.name == "t" or each.name.startswith("x[")]
     for variable in sorted(variables, key=sympy.default_sort_key):
         # A slope that depends on the state may vanish, where the surface has another sheet.
         slope = surface.diff(variable)
-        if slope != 0 and not slope.has(*variables) and not slope.atoms(sympy.Dummy):
+        if slope != 0 and not mentions(slope, variables) and not contains(slope, sympy.Dummy):
             yield variable, sympy.expand(variable - surface / slope)
     for term in sympy.Add.make_args(surface):
         if not (term.is_number or term.is_Symbol):
@@ -154,14 +167,15 @@ def _sides(atom: sympy.Expr, step: sympy.Symbol) -> tuple[sympy.Expr | None, tup
     return None, nothing
 
 
+@once
 def _with_exact_turns(expression: sympy.Expr) -> sympy.Expr:
     """The expression with multiples of pi for floats that stand for them in sines and cosines."""
     if not expression.args:
         return expression
     args = [_with_exact_turns(argument) for argument in expression.args]
     if isinstance(expression, sympy.sin | sympy.cos | sympy.tan):
-        exact = {number: _turns(number) for number in args[0].atoms(sympy.Float)}
-        args = [args[0].xreplace(exact)]
+        exact = {number: _turns(number) for number in nodes_of(sympy.Float, args[0])}
+        args = [replaced(args[0], exact)]
     return expression.func(*args)
 
 
@@ -185,15 +199,10 @@ def _replaced(
     names: Mapping[sympy.Expr, sympy.Dummy],
 ) -> sympy.Expr:
     """The expression with values for some atoms, and for all other atoms names of unknown value."""
-    if expression in values:
-        return values[expression]
-    if expression in names:
-        return names[expression]
-    if not expression.args:
-        return expression
-    return expression.func(*(_replaced(argument, values, names) for argument in expression.args))
+    return replaced(expression, {**names, **values})
 
 
+@once
 def _without_choices(expression: sympy.Expr) -> sympy.Expr:
     """Choices and connectives as polynomials in their conditions, which are 0 or 1.
 
@@ -212,7 +221,7 @@ def _without_choices(expression: sympy.Expr) -> sympy.Expr:
     if isinstance(expression, Not):
         return 1 - _truth(expression.args[0], args[0])
     if isinstance(expression, Equal):
-        return ZERO if expression.free_symbols else expression
+        return ZERO if symbols_of(expression) else expression
     return expression.func(*args)
 
 
@@ -225,7 +234,7 @@ def _truth(raw: sympy.Expr, value: sympy.Expr) -> sympy.Expr:
 
 
 def _is_zero(expression: sympy.Expr) -> bool:
-    if expression.has(sympy.nan, sympy.zoo, sympy.oo):
+    if is_larger_than(MOST_EXPANDED, expression) or not UNKNOWN.isdisjoint(nodes(expression)):
         return False
     expanded = sympy.expand(expression)
     if expanded == 0:

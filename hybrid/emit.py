@@ -22,14 +22,16 @@ from hybrid.emitted import Emitted, Propagator
 from hybrid.errors import ModelError
 from hybrid.forcing import forcings
 from hybrid.kernels.codes import WIDE
+from hybrid.nodes import forget, mentions, nodes_of
 from hybrid.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.periodicity import is_periodic
 from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
 from hybrid.program import programs
-from hybrid.propagator import Boundary, known_positive, propagator, simplified
+from hybrid.propagator import Boundary, known_positive, propagator
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
 from hybrid.series_loops import padded
+from hybrid.signs import simplified
 from hybrid.surface import surfaces
 from hybrid.symbolic import JUMPING, ONE, ZERO, Select
 from hybrid.trace import Symbols, TraceError, model_symbols, trace
@@ -55,6 +57,13 @@ def emit(system: HybridSystem) -> Emitted:
         If a function can neither be traced nor differentiated by the complex step, and comes without
         a derivative.
     """
+    try:
+        return _emitted(system)
+    finally:
+        forget()
+
+
+def _emitted(system: HybridSystem) -> Emitted:
     writer = _Writer(system)
     fields = [writer.write(field_role(system, mode)) for mode in system.modes]
     guards = [writer.write(guard_role(transition)) for transition in system.transitions]
@@ -378,10 +387,10 @@ def _is_affine(written: _Written, variables: Sequence[sympy.Symbol]) -> bool:
     if written.expressions is None or written.jacobian is None:
         return False
     # A floor or a sign has slope zero on both sides of its jumps.
-    jumps = [node for expression in written.expressions for node in expression.atoms(*JUMPING)]
+    jumps = nodes_of(JUMPING, *written.expressions)
     entries = [entry for row in written.jacobian for entry in row[: len(variables)]]
     return _is_free(jumps, variables) and _is_free(entries, variables)
 
 
 def _is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:
-    return expressions is not None and not any(expression.has(*variables) for expression in expressions)
+    return expressions is not None and not any(mentions(expression, variables) for expression in expressions)

@@ -278,6 +278,7 @@ def _derived_gradient(
     from sympy.core.parameters import distribute
 
     from hybrid.derivative import symbolic_jacobian
+    from hybrid.nodes import replaced
     from hybrid.printer import IMPORTS, assignments
     from hybrid.trace import Traced, model_symbols, trace
 
@@ -295,7 +296,7 @@ def _derived_gradient(
         known = (symbols.t, *symbols.x, *symbols.p)
         values = {symbol: value.expression for symbol, value in zip(known, (t, *x, *p), strict=True)}
         with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
-            return [Traced(entry.xreplace(values)) for entry in row]
+            return [Traced(replaced(entry, values)) for entry in row]
 
     return gradient
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 import attrs
 import sympy
 
+from hybrid.nodes import degree_of, mentions, once
 from hybrid.trace import Symbols
 
 # Products of more harmonics than these, such as ``cos(t)**100``, are narrow pulses.
@@ -39,14 +40,19 @@ def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forc
     return tuple(dict.fromkeys(found))
 
 
-def _parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator[Forcing]:
-    if not node.has(symbols.t):
+@once
+def _parts(node: sympy.Expr, component: int, symbols: Symbols) -> tuple[Forcing, ...]:
+    return tuple(dict.fromkeys(_found_parts(node, component, symbols)))
+
+
+def _found_parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator[Forcing]:
+    if not mentions(node, (symbols.t,)):
         return
     own, others = [node], []
-    if node.is_Add or (node.is_Mul and node.has(*symbols.x)):
-        own = [part for part in node.args if part.has(symbols.t) and not part.has(*symbols.x)]
-        others = [part for part in node.args if part.has(*symbols.x)]
-    elif node.has(*symbols.x):
+    if node.is_Add or (node.is_Mul and mentions(node, symbols.x)):
+        own = [part for part in node.args if mentions(part, (symbols.t,)) and not mentions(part, symbols.x)]
+        others = [part for part in node.args if mentions(part, symbols.x)]
+    elif mentions(node, symbols.x):
         own, others = [], [*node.args]
     if node.is_Add:
         own = [part for part in own if not is_harmless(part, symbols.t)]
@@ -69,9 +75,10 @@ def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
     return harmonics is not None and harmonics <= MOST_HARMONICS
 
 
+@once
 def _harmonics(node: sympy.Expr, t: sympy.Symbol) -> int | None:
     """Largest number of harmonics that are multiplied with one another; None if there are other functions."""
-    if node == t or not node.has(t):
+    if node == t or not mentions(node, (t,)):
         return 0
     if node.is_Add or node.is_Mul:
         parts = [_harmonics(part, t) for part in node.args]
@@ -83,7 +90,7 @@ def _harmonics(node: sympy.Expr, t: sympy.Symbol) -> int | None:
         factor = _harmonics(node.base, t)
         return None if factor is None else factor * int(node.exp)
     if isinstance(node, sympy.sin | sympy.cos):
-        return 1 if node.args[0].is_polynomial(t) else None
+        return 1 if degree_of(node.args[0], frozenset((t,))) is not None else None
     if isinstance(node, sympy.exp | sympy.sinh | sympy.cosh):
-        return None if node.args[0].diff(t).has(t) else 0
+        return None if mentions(node.args[0].diff(t), (t,)) else 0
     return None

@@ -15,6 +15,7 @@ import sympy
 
 from hybrid.constants import Constants
 from hybrid.kernels.codes import NARROW
+from hybrid.nodes import degree_of, mentions, replaced
 from hybrid.series_loops import indented, padded
 from hybrid.trace import Symbols
 
@@ -54,7 +55,7 @@ def linear_form(
     """The linear form of an affine mode, if it has one; ``harmonics`` stand for what it is driven by."""
     variables = [*symbols.x, *harmonics.values()]
     turning = [function.diff(symbols.t) for function in harmonics]
-    rows = [_row(entry.xreplace(harmonics), variables, symbols.t) for entry in (*field, *turning, *guards)]
+    rows = [_row(replaced(entry, harmonics), variables, symbols.t) for entry in (*field, *turning, *guards)]
     if len(variables) >= LARGEST or any(row is None for row in rows):
         return None
     starts = [*symbols.x, *harmonics, sympy.Integer(1)]
@@ -66,11 +67,11 @@ def linear_form(
 def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbol) -> list[sympy.Expr] | None:
     """Coefficients of the variables, then the constant term; None if it is not affine in them alone."""
     # The derivative of a sign is zero too.
-    if not entry.is_polynomial(*variables):
+    if degree_of(entry, frozenset(variables)) is None:
         return None
     slopes = [entry.diff(variable) for variable in variables]
-    rest = entry.xreplace(dict.fromkeys(variables, sympy.Integer(0)))
-    if any(each.has(time, *variables) for each in (*slopes, rest)):
+    rest = replaced(entry, dict.fromkeys(variables, sympy.Integer(0)))
+    if any(mentions(each, (time, *variables)) for each in (*slopes, rest)):
         return None
     return [*slopes, rest]
 

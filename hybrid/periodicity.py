@@ -77,9 +77,10 @@ def is_periodic(expressions: Iterable[sympy.Expr], t: sympy.Symbol, period: symp
 def _proved(expression: sympy.Expr, t: sympy.Symbol, period: sympy.Expr) -> bool:
     import sympy
 
+    from hybrid.nodes import mentions
     from hybrid.symbolic import Remainder
 
-    if not expression.has(t):
+    if not mentions(expression, (t,)):
         return True
     if expression.is_Symbol:
         return False
@@ -88,11 +89,11 @@ def _proved(expression: sympy.Expr, t: sympy.Symbol, period: sympy.Expr) -> bool
         turn = 2 * sympy.pi
     elif isinstance(expression, sympy.tan):
         turn = sympy.pi
-    elif isinstance(expression, Remainder) and not expression.args[1].has(t):
+    elif isinstance(expression, Remainder) and not mentions(expression.args[1], (t,)):
         turn = expression.args[1]
     if turn is not None:
         slope = expression.args[0].diff(t)
-        if not slope.has(t) and _is_whole(sympy.cancel(slope * period / turn)):
+        if not mentions(slope, (t,)) and _is_whole(sympy.cancel(slope * period / turn)):
             return True
     return all(_proved(argument, t, period) for argument in expression.args)
 

@@ -12,6 +12,7 @@ import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
 from hybrid import symbolic as sym
+from hybrid.nodes import is_larger_than, nodes
 
 MATH_FUNCTIONS: dict[type[sympy.Basic], str] = {
     sympy.exp: "exp",
@@ -66,6 +67,8 @@ LARGEST_UNROLLED_POWER = 16
 # In a block of more expressions than this only whole ones are shared: the search for common parts of sums and
 # products takes a time that grows faster than the block.
 LARGE = 400
+# So are those of expressions that have more operations than this where nothing is shared.
+LARGE_TREE = 20_000
 
 
 def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> list[str]:
@@ -74,7 +77,7 @@ def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> li
     ``targets`` may then overlap with what the expressions read.
     """
     uses = _uses(expressions)
-    if len(uses) > LARGE:
+    if len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in expressions):
         reduced, printer = expressions, _Printer(node for node, count in uses.items() if count > 1)
     else:
         shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("c", real=True), list=True)
@@ -109,12 +112,11 @@ def _uses(expressions: Iterable[sympy.Expr]) -> dict[sympy.Expr, int]:
 def unprintable(expressions: Iterable[sympy.Expr]) -> str | None:
     """Name of a function that has no counterpart in generated code, if there is one."""
     known = {*MATH_FUNCTIONS, *_Printer.PRINTERS}
-    for expression in expressions:
-        for node in sympy.preorder_traversal(expression):
-            if isinstance(node, sympy.Symbol | sympy.Number | sympy.NumberSymbol):
-                continue
-            if node.func not in known:
-                return str(node.func.__name__)
+    for node in nodes(*expressions):
+        if isinstance(node, sympy.Symbol | sympy.Number | sympy.NumberSymbol):
+            continue
+        if node.func not in known:
+            return str(node.func.__name__)
     return None
 
 

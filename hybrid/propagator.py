@@ -26,6 +26,15 @@ from hybrid.kernels.codes import (
     WIDE,
 )
 from hybrid.linear_series import LinearForm, linear_form, table_statements
+from hybrid.nodes import (
+    contains,
+    degree_of,
+    mentions,
+    nodes,
+    nodes_of,
+    replaced,
+    symbols_of,
+)
 from hybrid.printer import assignments
 from hybrid.roots import (
     ROOT,
@@ -39,17 +48,10 @@ from hybrid.roots import (
 )
 from hybrid.series import ONE_THEN_ZERO, PAIRS, NoSeries, Recurrences
 from hybrid.series_loops import StateLoop, TangentLoop, indented, padded
+from hybrid.signs import sign_of, simplified
 from hybrid.slopes import directional, divergence, partial_derivatives
 from hybrid.symbolic import (
     ZERO,
-    Absolute,
-    Less,
-    LessEqual,
-    Maximum,
-    Minimum,
-    Select,
-    Sign,
-    Step,
 )
 from hybrid.trace import Symbols
 
@@ -86,6 +88,8 @@ def propagator(
             return _series(field, boundaries, known, symbols)
     except NoSeries as reason:
         return Propagator(RUNGE_KUTTA, 0, str(reason))
+    except RecursionError:
+        return Propagator(RUNGE_KUTTA, 0, "its functions are nested too deeply for a series")
 
 
 def known_positive(boundaries: Iterable[Boundary]) -> list[sympy.Expr]:
@@ -115,7 +119,7 @@ def _series(
         reason = "half-integer powers of a guard, on the clock dt = w ds"
         return Propagator(DESINGULARISED, 0, reason, *written, guards=tuple(held))
     jacobian = partial_derivatives(field, symbols.x)
-    if any(entry.has(*symbols.x, symbols.t) for row in jacobian for entry in row):
+    if any(mentions(entry, symbols.variables) for row in jacobian for entry in row):
         written = _write(field, guards, symbols)
         return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *written, guards=tuple(held))
     if not all(_elementary(entry, symbols) for entry in field):
@@ -153,44 +157,12 @@ def _columns(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy
     return [b.guard if is_held and b.guard is not None else ZERO for b, is_held in pairs]
 
 
-def simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
-    """The expression where everything in ``known`` is positive or zero."""
-    if not expression.has(Maximum, Minimum, Absolute, Sign, Step, Select):
-        return expression
-    args = [simplified(argument, known) for argument in expression.args]
-    if isinstance(expression, Maximum | Minimum):
-        a, b = args
-        sign = _sign_of(a - b, known) * (1 if isinstance(expression, Maximum) else -1)
-        if sign:
-            return a if sign > 0 else b
-    if isinstance(expression, Absolute | Sign | Step):
-        sign = _sign_of(args[0], known)
-        if sign:
-            absolute = sign * args[0]
-            unit = sympy.Integer(sign) if isinstance(expression, Sign) else sympy.Integer((sign + 1) // 2)
-            return absolute if isinstance(expression, Absolute) else unit
-    if isinstance(expression, Select) and isinstance(args[0], Less | LessEqual):
-        a, b = args[0].args
-        sign = _sign_of(b - a, known)
-        if sign:
-            return args[1] if sign > 0 else args[2]
-    return expression.func(*args)
-
-
-def _sign_of(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> int:
-    for positive in known:
-        for sign in (1, -1):
-            if (expression - sign * positive).expand() == 0:
-                return sign
-    return 0
-
-
 def _in_terms_of_root(
     boundaries: Sequence[Boundary], z: sympy.Expr, root: sympy.Symbol, symbols: Symbols
 ) -> dict[int, sympy.Expr]:
     """By place, the guards that are multiples of ``z``: the root with the sign of the guard in the mode."""
     return {
-        place: (boundary.inside or _sign_of(boundary.guard, [z]) or 1) * root
+        place: (boundary.inside or sign_of(boundary.guard, [z]) or 1) * root
         for place, boundary in enumerate(boundaries)
         if boundary.guard is not None and is_multiple(boundary.guard, z, symbols)
     }
@@ -198,12 +170,12 @@ def _in_terms_of_root(
 
 def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
     """Whether it depends on time by polynomials and by harmonics and exponentials of linear functions."""
-    for node in sympy.preorder_traversal(entry):
-        if not node.has(symbols.t) or node.is_Symbol or node.is_Add or node.is_Mul:
+    for node in nodes(entry):
+        if not mentions(node, (symbols.t,)) or node.is_Symbol or node.is_Add or node.is_Mul:
             continue
         if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
             continue
-        if isinstance(node, ELEMENTARY) and not node.args[0].diff(symbols.t).has(symbols.t):
+        if isinstance(node, ELEMENTARY) and not mentions(node.args[0].diff(symbols.t), (symbols.t,)):
             continue
         return False
     return True
@@ -211,15 +183,13 @@ def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
 
 def _polynomial(guard: sympy.Expr, symbols: Symbols) -> int:
     """Degree of a guard that is a polynomial in state and time, at least 1; zero for any other."""
-    variables = [v for v in symbols.variables if guard.has(v)]
-    if not guard.is_polynomial(*variables):
-        return 0
-    return max(1, sympy.Poly(guard, *variables).total_degree()) if variables else 1
+    degree = degree_of(guard, frozenset(symbols.variables))
+    return 0 if degree is None else max(1, degree)
 
 
 def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]], symbols: Symbols) -> int:
     """Degree of the solutions in time if they are polynomials, else 0."""
-    if any(entry.has(*ELEMENTARY) and entry.has(symbols.t) for entry in field):
+    if any(contains(entry, ELEMENTARY) and mentions(entry, (symbols.t,)) for entry in field):
         return 0
     if not _may_be_nilpotent(jacobian):
         return 0
@@ -238,11 +208,11 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 
 def _may_be_nilpotent(matrix: Sequence[Sequence[sympy.Expr]]) -> bool:
     """Whether a matrix in the parameters vanishes in its own powers, as far as one set of values can tell."""
-    names = sorted({name for row in matrix for entry in row for name in entry.free_symbols}, key=str)
+    names = sorted({name for row in matrix for entry in row for name in symbols_of(entry)}, key=str)
     drawn = np.random.default_rng(1).uniform(1.0, 2.0, len(names))
     values = dict(zip(names, map(sympy.Float, drawn), strict=True))
     try:
-        numbers = np.array([[float(entry.xreplace(values)) for entry in row] for row in matrix])
+        numbers = np.array([[float(replaced(entry, values)) for entry in row] for row in matrix])
     except (TypeError, ValueError):
         return True
     scaled = numbers / max(np.abs(numbers).max(), SMALLEST)
@@ -289,7 +259,7 @@ def _write_desingularised(
     with, ``z`` is its square, and only a root that has drifted from the states is taken from them again.
     """
     harmonics = _harmonics(field, symbols)
-    field = [rate.xreplace(harmonics) for rate in field]
+    field = [replaced(rate, harmonics) for rate in field]
     # The time since the start comes behind the states among what is advanced.
     body = _Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()
@@ -303,7 +273,7 @@ def _write_desingularised(
     crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
     columns, starts = _state(symbols)
     body.start_root("root", z, min(roots))
-    turning = [ROOT * function.diff(symbols.t).xreplace(harmonics) for function in harmonics]
+    turning = [ROOT * replaced(function.diff(symbols.t), harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
     return body.assemble(
@@ -361,10 +331,9 @@ def _harmonics(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr
     On a clock of their own they are states like others: their rates share the factor of all rates.
     """
     found: dict[sympy.Expr, sympy.Symbol] = {}
-    nodes = {node for entry in field for node in entry.atoms(*ELEMENTARY)}
-    for node in sorted(nodes, key=sympy.default_sort_key):
+    for node in sorted(nodes_of(ELEMENTARY, *field), key=sympy.default_sort_key):
         slope = node.args[0].diff(symbols.t)
-        if slope == 0 or slope.has(symbols.t) or node.has(*symbols.x):
+        if slope == 0 or mentions(slope, (symbols.t,)) or mentions(node, symbols.x):
             continue
         for function in PAIRS.get(node.func, (node.func,))[:2]:
             found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))

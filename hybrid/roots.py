@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import attrs
 import sympy
 
+from hybrid.nodes import MOST_EXPANDED, is_larger_than, mentions, nodes_of, replaced
 from hybrid.series import NoSeries
 from hybrid.trace import Symbols
 
@@ -23,8 +24,8 @@ def singular_bases(
     may change its sign there must be a guard.
     """
     bases: set[sympy.Expr] = set()
-    for power in {node for entry in field for node in entry.atoms(sympy.Pow)}:
-        if power.exp.is_Integer or not power.base.has(*symbols.variables):
+    for power in nodes_of(sympy.Pow, *field):
+        if power.exp.is_Integer or not mentions(power.base, symbols.variables):
             continue
         if not any(is_multiple(power.base, guard, symbols) for guard in known):
             if not power.base.is_nonnegative:
@@ -38,7 +39,9 @@ def singular_bases(
 
 def is_multiple(expression: sympy.Expr, other: sympy.Expr, symbols: Symbols) -> bool:
     """Whether an expression is another one times what depends on parameters only."""
-    return other != 0 and not sympy.cancel(expression / other).has(*symbols.variables)
+    if other == 0 or is_larger_than(MOST_EXPANDED, expression):
+        return False
+    return not mentions(sympy.cancel(expression / other), symbols.variables)
 
 
 @attrs.frozen
@@ -57,7 +60,7 @@ def regular_root(field: Sequence[sympy.Expr], z: sympy.Expr, place: int, symbols
     ``dt = w ds`` the tank would take for ever.
     """
     root = sympy.Symbol(f"w{place}", positive=True)
-    states = [x for x in symbols.x if z.has(x) and not z.diff(x).has(*symbols.variables)]
+    states = [x for x in symbols.x if mentions(z, (x,)) and not mentions(z.diff(x), symbols.variables)]
     if not states:
         return None
     slope = in_roots(slope_along(field, z, symbols), z, root)
@@ -72,7 +75,7 @@ def regular_root(field: Sequence[sympy.Expr], z: sympy.Expr, place: int, symbols
 def slope_along(field: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols) -> sympy.Expr:
     """The rate of an expression along the field."""
     return z.diff(symbols.t) + sympy.Add(
-        *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if z.has(x))
+        *(z.diff(x) * rate for x, rate in zip(symbols.x, field, strict=True) if mentions(z, (x,)))
     )
 
 
@@ -86,8 +89,8 @@ def on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
 
 def in_roots(expression: sympy.Expr, z: sympy.Expr, root: sympy.Symbol = ROOT) -> sympy.Expr:
     """Fractional powers of ``z`` as whole ones times its root, which saves the products that ``z`` is."""
-    powers = {p for p in expression.atoms(sympy.Pow) if p.base == z and not p.exp.is_Integer}
-    return expression.xreplace({p: sympy.Mul(*_whole_power(z, p.exp - HALF, root), root) for p in powers})
+    powers = {p for p in nodes_of(sympy.Pow, expression) if p.base == z and not p.exp.is_Integer}
+    return replaced(expression, {p: sympy.Mul(*_whole_power(z, p.exp - HALF, root), root) for p in powers})
 
 
 def _whole_power(z: sympy.Expr, exponent: sympy.Integer, root: sympy.Symbol) -> tuple[sympy.Expr, ...]:

@@ -16,6 +16,7 @@ from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 
 from hybrid.constants import Constants
 from hybrid.kernels.codes import NARROW
+from hybrid.nodes import mentions, nodes, operations_of, symbols_of
 from hybrid.printer import MATH_FUNCTIONS, power_text
 from hybrid.series_sums import Term, added
 
@@ -103,6 +104,7 @@ class Recurrences:
         self.slopes: dict[sympy.Expr, str] = {}
         self.shared: Counter[sympy.Expr] = Counter()
         self.lateness: dict[sympy.Expr, int] = {}
+        self.readiness: dict[sympy.Expr, tuple[int, int]] = {}
         self.own = frozenset(rows)
         if known is None and time is not None:
             self.own |= {time[0]}
@@ -113,10 +115,11 @@ class Recurrences:
         The factors of products are counted: one that many share goes into their common block. And what takes
         long to compute is known late: its symbol is added last in every sum.
         """
+        self.readiness.clear()
         for symbol, rate in zip(symbols, rates, strict=True):
             if symbol is not None:
-                self.lateness[symbol] = sympy.count_ops(rate)
-            for node in sympy.preorder_traversal(rate):
+                self.lateness[symbol] = operations_of(rate)
+            for node in nodes(rate):
                 if node.is_Mul:
                     self.shared.update(node.args)
 
@@ -156,7 +159,7 @@ class Recurrences:
         return f"out[{order}, {column}] = {value}"
 
     def _is_known(self, expression: sympy.Expr) -> bool:
-        return self.known is not None and not expression.free_symbols & self.own
+        return self.known is not None and not mentions(expression, self.own)
 
     def _known_coefficient(self, expression: sympy.Expr) -> str:
         assert self.known is not None
@@ -164,7 +167,7 @@ class Recurrences:
         return self.known.variables.get(expression, f"out[o, {row}]")
 
     def _is_constant(self, expression: sympy.Expr) -> bool:
-        return not expression.free_symbols & self.own and (
+        return not mentions(expression, self.own) and (
             self.known is None or self.known._is_constant(expression)
         )
 
@@ -335,11 +338,14 @@ class Recurrences:
         """When a coefficient is known: how many operations after those of the states, and theirs."""
         if expression.is_Symbol:
             return 1, self.lateness.get(expression, 0)
-        moving = [each for each in expression.args if not self._is_constant(each)]
-        if not moving or self._is_known(expression):
-            return 0, 0
-        depth, late = max(map(self._ready, moving))
-        return depth + (1 if expression.is_Add or expression.is_Mul else 2), late
+        if expression not in self.readiness:
+            moving = [each for each in expression.args if not self._is_constant(each)]
+            depth, late = 0, 0
+            if moving and not self._is_known(expression):
+                depth, late = max(map(self._ready, moving))
+                depth += 1 if expression.is_Add or expression.is_Mul else 2
+            self.readiness[expression] = depth, late
+        return self.readiness[expression]
 
     def _product(self, expression: sympy.Expr) -> str:
         factors = expression.args
@@ -348,16 +354,14 @@ class Recurrences:
             return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
         below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
         # A divisor that is known has its reciprocal kept, and is multiplied by.
-        below = [f for f in below if self.known is None or f.free_symbols & self.own]
+        below = [f for f in below if self.known is None or mentions(f, self.own)]
         if below and len(below) < len(factors):
             above = sympy.Mul(*(f for f in factors if f not in below))
             return self._quotient(expression, above, sympy.Mul(*(1 / f for f in below)))
         if len(below) > 1:
             return self._quotient(expression, None, sympy.Mul(*(1 / f for f in below)))
         # What is known goes first, then what most products share.
-        *others, last = sorted(
-            factors, key=lambda factor: (-bool(factor.free_symbols & self.own), self.shared[factor])
-        )
+        *others, last = sorted(factors, key=lambda factor: (-mentions(factor, self.own), self.shared[factor]))
         return self._convolution(expression, last, sympy.Mul(*others))
 
     def _convolution(self, expression: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> str:
@@ -417,9 +421,10 @@ class Recurrences:
         """The constant rate of an argument that is linear in time, None for others."""
         if self.time is None or self.time[1] != ONE_THEN_ZERO:
             return None
+        if symbols_of(u) & self.own - {self.time[0]}:
+            return None
         slope = u.diff(self.time[0])
-        rest = u.free_symbols & self.own - {self.time[0]}
-        return None if rest or not self._is_constant(slope) else self.constants.name(slope)
+        return self.constants.name(slope) if self._is_constant(slope) else None
 
     def _exponential(self, expression: sympy.Expr, u: sympy.Expr) -> str:
         rate = self._rate(u)

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import sympy
+from sympy.core.parameters import global_parameters
 
+from hybrid.nodes import interned, once
 from hybrid.symbolic import ONE, ZERO, Select
 
 Partials = dict[sympy.Symbol, sympy.Expr]
@@ -20,9 +22,8 @@ def partial_derivatives(
 ) -> list[list[sympy.Expr]]:
     """Rows of the partial derivatives of ``expressions`` with respect to ``variables``."""
     wanted = frozenset(variables)
-    found: dict[sympy.Expr, Partials] = {}
-    rows = (_partials(expression, wanted, found) for expression in expressions)
-    return [[row.get(variable, ZERO) for variable in variables] for row in rows]
+    rows = (_partials(expression, wanted, global_parameters.distribute) for expression in expressions)
+    return [[interned(row.get(variable, ZERO)) for variable in variables] for row in rows]
 
 
 def divergence(field: Sequence[sympy.Expr], variables: Sequence[sympy.Symbol]) -> sympy.Expr:
@@ -30,19 +31,19 @@ def divergence(field: Sequence[sympy.Expr], variables: Sequence[sympy.Symbol]) -
     return sympy.Add(*(row[i] for i, row in enumerate(partial_derivatives(field, variables))))
 
 
-def _partials(
-    expression: sympy.Expr, wanted: frozenset[sympy.Symbol], found: dict[sympy.Expr, Partials]
-) -> Partials:
-    """The partial derivatives that are not zero; ``found`` holds those of the nodes seen before."""
+@once
+def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distributed: bool) -> Partials:
+    """The partial derivatives that are not zero; ``distributed`` is how SymPy treats numbers times sums.
+
+    Those of an expression are the same objects each time. Two that are only equal are compared branch by
+    branch, for as long as a tree of them takes.
+    """
     if expression.is_Symbol:
         return {expression: ONE} if expression in wanted else {}
-    known = found.get(expression)
-    if known is not None:
-        return known
     if isinstance(expression, sympy.sign):
         return {}
     args = expression.args
-    inner = [_partials(argument, wanted, found) for argument in args]
+    inner = [_partials(argument, wanted, distributed) for argument in args]
     terms: dict[sympy.Symbol, list[sympy.Expr]] = {}
     if isinstance(expression, Select):
         condition, (_, one, other) = args[0], inner
@@ -63,8 +64,7 @@ def _partials(
             for v, product in products.items():
                 terms.setdefault(v, []).append(product)
     sums = {v: sympy.Add(*each) if len(each) > 1 else each[0] for v, each in terms.items()}
-    found[expression] = {v: total for v, total in sums.items() if total != 0}
-    return found[expression]
+    return {v: total for v, total in sums.items() if total != 0}
 
 
 def directional(
@@ -72,7 +72,7 @@ def directional(
 ) -> list[sympy.Expr]:
     """Derivatives along the seeds, one for each symbol, in a form that keeps common factors together."""
     found: dict[sympy.Expr, sympy.Expr] = {}
-    return [_along(expression, seeds, found) for expression in expressions]
+    return [interned(_along(expression, seeds, found)) for expression in expressions]
 
 
 def _along(
@@ -104,4 +104,9 @@ def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
     if expression.is_Pow:
         base, exponent = expression.args
         return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
+    # SymPy would evaluate the other function anew.
+    if isinstance(expression, sympy.sin):
+        return sympy.cos(expression.args[0], evaluate=False)
+    if isinstance(expression, sympy.cos):
+        return -sympy.sin(expression.args[0], evaluate=False)
     return expression.fdiff(index + 1)

@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from hybrid.emitted import Emitted
     from hybrid.system import HybridSystem
 
-# Longer expressions are compared as they are.
+# Longer expressions are compared as they are, still longer ones not term by term.
 MOST_TERMS = 200
+MOST_SHOWN = 5000
 # Digits to which quotients of coefficients are compared.
 DIGITS = 12
 
@@ -39,9 +40,14 @@ def _without_factor(expression: sympy.Expr) -> tuple[Any, int]:
 
     None instead if it is a constant.
     """
-    if not expression.free_symbols:
+    from hybrid.nodes import is_larger_than, symbols_of
+
+    if not symbols_of(expression):
         return None, 1
-    if expression.count_ops() <= MOST_TERMS:
+    if is_larger_than(MOST_SHOWN, expression):
+        # As it stands: to write it out would take for ever.
+        return expression, 1
+    if not is_larger_than(MOST_TERMS, expression):
         expression = expression.expand()
     coefficients = expression.as_coefficients_dict()
     terms = sorted((str(term), float(factor)) for term, factor in coefficients.items())

@@ -13,7 +13,8 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 import sympy
-from sympy.core.cache import cacheit
+
+from hybrid.nodes import contains, interned, once
 
 ZERO = sympy.Integer(0)
 ONE = sympy.Integer(1)
@@ -209,15 +210,17 @@ class Gate(RealFunction):
 JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)
 
 
-@cacheit  # type: ignore[untyped-decorator]  # subexpressions are shared, and would be walked once for each use
+@once
 def close_gates(expression: sympy.Expr) -> sympy.Expr:
     """Let a factor that switches a product off win over one that is infinite where it does.
 
     The slope of ``max(z, 0)**(1/4)`` is ``max(z, 0)**(-3/4)/4 * Step(z)``: 0 for ``z < 0``, never
     ``inf*0``.
     """
-    if not expression.has(Step, Select):
-        return expression
+    return interned(_closed(expression)) if contains(expression, (Step, Select)) else expression
+
+
+def _closed(expression: sympy.Expr) -> sympy.Expr:
     arguments = [close_gates(argument) for argument in expression.args]
     if not expression.is_Mul:
         return expression.func(*arguments)

@@ -10,11 +10,15 @@ import sympy
 from sympy.core.parameters import distribute
 
 from hybrid.errors import ModelError
+from hybrid.nodes import interned, is_larger_than, nodes, once
 from hybrid.symbolic import number
 from hybrid.traced import Traced as Traced
 from hybrid.traced import TraceError as TraceError
 from hybrid.traced import values_of
 from hybrid.ufuncs import RULES
+
+# Operations of an expression that is shown to people.
+SHOWN = 100
 
 
 class SymbolicAlgebra:
@@ -26,11 +30,16 @@ class SymbolicAlgebra:
 
     def combined(self, name: str, contents: tuple[sympy.Expr, ...]) -> sympy.Expr:
         """What the rule of that name makes of expressions."""
-        return RULES[name](*contents)
+        return _combined(name, contents)
 
     def expression(self, content: sympy.Expr) -> sympy.Expr:
         """The content itself."""
         return content
+
+
+@once
+def _combined(name: str, contents: tuple[sympy.Expr, ...]) -> sympy.Expr:
+    return interned(RULES[name](*contents))
 
 
 SYMBOLIC = SymbolicAlgebra()
@@ -90,7 +99,8 @@ def trace(
         raise
     except Exception as error:
         raise TraceError(f"{type(error).__name__}: {error}") from error
-    for expression in expressions:
-        if expression.has(sympy.I, sympy.zoo, sympy.nan):
-            raise TraceError(f"it is not a real number everywhere: {expression}")
+    for node in nodes(*expressions):
+        if node in (sympy.I, sympy.zoo, sympy.nan):
+            shown = next((str(each) for each in expressions if not is_larger_than(SHOWN, each)), str(node))
+            raise TraceError(f"it is not a real number everywhere: {shown}")
     return expressions

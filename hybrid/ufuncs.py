@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import sympy
@@ -43,16 +44,21 @@ def _heaviside(a: sympy.Expr, at_zero: sympy.Expr) -> sympy.Expr:
     return Select(Less(a, ZERO), ZERO, Select(Less(ZERO, a), ONE, at_zero))
 
 
-def _of_parity(parity: int, function: Callable[[sympy.Expr], sympy.Expr]) -> Callable[..., sympy.Expr]:
-    """An even or odd function of SymPy's, with the sign of ``-a - b`` taken out before SymPy does.
+def _as_it_stands(function: Any) -> Callable[[sympy.Expr], sympy.Expr]:
+    """A function of SymPy's that it only evaluates of numbers: to look for more takes it 20 ms for a sum."""
+    return lambda a: function(a) if a.is_Number else function(a, evaluate=False)
 
-    It negates such a sum by distributing -1 over it, and tries for ever where distribution is off.
-    """
+
+def _of_parity(parity: int, function: Any) -> Callable[[sympy.Expr], sympy.Expr]:
+    """An even or odd function of SymPy's, with the sign of ``-a - b`` taken out."""
+    plain = _as_it_stands(function)
 
     def rule(a: sympy.Expr) -> sympy.Expr:
-        if a.is_Add and a.could_extract_minus_sign():
-            return parity * function(sympy.Add(*(-term for term in a.args)))
-        return function(a)
+        if a.is_Number or not a.could_extract_minus_sign():
+            return plain(a)
+        # A sum term by term: SymPy would distribute -1 over it, and is told not to.
+        opposite = sympy.Add(*(-term for term in a.args)) if a.is_Add else -a
+        return parity * plain(opposite)
 
     return rule
 
@@ -79,7 +85,7 @@ RULES: dict[str, Callable[..., sympy.Expr]] = {
     "reciprocal": lambda a: 1 / a,
     "sqrt": lambda a: a**HALF,
     "cbrt": CubeRoot,
-    "exp": sympy.exp,
+    "exp": _as_it_stands(sympy.exp),
     "exp2": exp2,
     "expm1": expm1,
     "log": sympy.log,

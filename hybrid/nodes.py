@@ -1,0 +1,145 @@
+"""Questions about expressions that look at each of their nodes once, however often it is used.
+
+An expression is a graph: a value that a function uses twice is one node with two uses. SymPy's own ``has``,
+``atoms``, ``xreplace`` and traversals walk it as a tree, and a value that is used twice in each of forty
+rounds of a loop has 2^40 branches there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
+from typing import Any, TypeVar
+
+import sympy
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+# A tree of more operations than this is not expanded: that takes a time that may grow with its square.
+MOST_EXPANDED = 2000
+
+_remembered: list[Any] = []
+# By identity: expressions that have been seen, and the one that stands for all that are equal to it.
+_seen: dict[int, tuple[sympy.Basic, sympy.Basic]] = {}
+_standing: dict[Any, sympy.Basic] = {}
+
+
+def once(function: Function) -> Function:
+    """Remember what a function of nodes returned, until `forget`."""
+    remembering: Any = lru_cache(maxsize=None)(function)
+    _remembered.append(remembering)
+    return remembering
+
+
+def forget() -> None:
+    """Let go of what is remembered: a model has been traced."""
+    for function in _remembered:
+        function.cache_clear()
+    _seen.clear()
+    _standing.clear()
+
+
+def interned(expression: Any) -> Any:
+    """The same expression, in which nodes that are equal are one object, also with those of earlier calls.
+
+    SymPy compares two equal expressions that are different objects branch by branch, as trees.
+    """
+    found = _seen.get(id(expression))
+    if found is not None:
+        return found[1]
+    args = expression.args
+    if args:
+        own = [interned(each) for each in args]
+        same = all(new is old for new, old in zip(own, args, strict=True))
+        key = (expression.func, *map(id, own))
+        standing = _standing.get(key)
+        if standing is None:
+            standing = expression if same else expression.func(*own, evaluate=False)
+            _standing[key] = standing
+    else:
+        standing = _standing.setdefault(expression, expression)
+    _seen[id(expression)] = expression, standing
+    return standing
+
+
+def nodes(*expressions: sympy.Basic) -> Iterator[sympy.Basic]:
+    """Every node of the expressions, once."""
+    seen: set[sympy.Basic] = set()
+    waiting = [*expressions]
+    while waiting:
+        node = waiting.pop()
+        if node not in seen:
+            seen.add(node)
+            yield node
+            waiting.extend(node.args)
+
+
+def nodes_of(kinds: Any, *expressions: sympy.Basic) -> set[Any]:
+    """The nodes of a class, or of one of several."""
+    return {node for node in nodes(*expressions) if isinstance(node, kinds)}
+
+
+@once
+def symbols_of(expression: sympy.Basic) -> frozenset[sympy.Symbol]:
+    """The symbols of an expression."""
+    if isinstance(expression, sympy.Symbol):
+        return frozenset((expression,))
+    return frozenset().union(*map(symbols_of, expression.args))
+
+
+def mentions(expression: sympy.Basic, symbols: Iterable[sympy.Symbol]) -> bool:
+    """Whether an expression has any of some symbols."""
+    return not symbols_of(expression).isdisjoint(symbols)
+
+
+@once
+def contains(expression: sympy.Basic, kinds: Any) -> bool:
+    """Whether an expression has a node of these classes."""
+    return isinstance(expression, kinds) or any(contains(each, kinds) for each in expression.args)
+
+
+@once
+def degree_of(expression: sympy.Basic, variables: frozenset[sympy.Symbol]) -> int | None:
+    """Degree as a polynomial in some variables, before anything cancels; None if it is none."""
+    if not mentions(expression, variables):
+        return 0
+    if isinstance(expression, sympy.Symbol):
+        return 1
+    degrees = [degree_of(each, variables) for each in expression.args]
+    known = [each for each in degrees if each is not None]
+    if isinstance(expression, sympy.Pow) and expression.exp.is_Integer and expression.exp.is_positive:
+        return None if degrees[0] is None else degrees[0] * int(expression.exp)
+    if len(known) < len(degrees) or not (expression.is_Add or expression.is_Mul):
+        return None
+    return max(known) if expression.is_Add else sum(known)
+
+
+@once
+def operations_of(expression: sympy.Basic) -> int:
+    """Operations of an expression that is written out as a tree."""
+    args = expression.args
+    return max(1, len(args) - 1) + sum(map(operations_of, args)) if args else 0
+
+
+def is_larger_than(most: int, expression: sympy.Basic) -> bool:
+    """Whether an expression, written out as a tree, has more operations than that."""
+    return operations_of(expression) > most
+
+
+def replaced(expression: sympy.Expr, values: Mapping[sympy.Expr, sympy.Expr]) -> sympy.Expr:
+    """An expression with some of its nodes replaced."""
+    return interned(_replaced(interned(expression), values, {}))
+
+
+def _replaced(
+    node: sympy.Expr, values: Mapping[sympy.Expr, sympy.Expr], known: dict[sympy.Expr, sympy.Expr]
+) -> sympy.Expr:
+    if node in values:
+        return values[node]
+    if not node.args:
+        return node
+    made = known.get(node)
+    if made is None:
+        args = [_replaced(each, values, known) for each in node.args]
+        changed = any(new is not old for new, old in zip(args, node.args, strict=True))
+        made = known[node] = node.func(*args) if changed else node
+    return made
