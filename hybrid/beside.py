@@ -22,18 +22,12 @@ _helpers: list[subprocess.Popen[bytes]] = []
 def start(modules: Sequence[str]) -> None:
     """Have these kernel modules compiled by a second process, if there is a second processor for it."""
     interpreter = bool(sys.executable) and not getattr(sys, "frozen", False)
-    if not modules or not interpreter or _processors() < 2:
+    if not modules or not interpreter or processors() < 2:
         return
-    package = str(Path(__file__).parents[1])
-    environment = {
-        **os.environ,
-        "HYBRID_CACHE_DIR": str(cache_directory().absolute()),
-        "PYTHONPATH": os.pathsep.join([package, *filter(None, sys.path)]),
-    }
     try:
         helper = subprocess.Popen(
             [sys.executable, "-c", PROGRAM, *modules],
-            env=environment,
+            env=environment(),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -52,7 +46,17 @@ def finish() -> None:
         atexit.unregister(helper.kill)
 
 
-def _processors() -> int:
+def environment() -> dict[str, str]:
+    """The variables of a process that compiles what this one would, into the same cache."""
+    package = str(Path(__file__).parents[1])
+    return {
+        **os.environ,
+        "HYBRID_CACHE_DIR": str(cache_directory().absolute()),
+        "PYTHONPATH": os.pathsep.join([package, *filter(None, sys.path)]),
+    }
+
+
+def processors() -> int:
     """How many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

@@ -17,15 +17,31 @@ from hybrid.cache import announced, cache_folder, compiled_into, source_key
 DRIVER = "hybrid.kernels.drive"
 # What every run needs besides: a second process compiles them meanwhile.
 EVENTS = ("hybrid.kernels.jump", "hybrid.kernels.corner", "hybrid.kernels.first_mode")
+# All that Python calls or hands on, those that take longest to compile first.
+ALL_KERNELS = (
+    DRIVER,
+    "hybrid.kernels.jump",
+    "hybrid.kernels.radau",
+    "hybrid.kernels.runge_kutta",
+    "hybrid.kernels.corner",
+    "hybrid.kernels.bounds",
+    "hybrid.kernels.forcing",
+    "hybrid.kernels.sections",
+    "hybrid.kernels.dense",
+    "hybrid.kernels.evaluate",
+    "hybrid.kernels.first_mode",
+    "hybrid.kernels.step",
+    "lyapunov.kernels",
+)
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
     """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
-    kept = _kept(module)
+    kept = is_kept(module)
     if module == DRIVER and not kept:
-        beside.start([each for each in EVENTS if not _kept(each)])
+        beside.start([each for each in EVENTS if not is_kept(each)])
     with nullcontext() if kept else announced(MESSAGE):
         if module in EVENTS:
             beside.finish()
@@ -56,7 +72,8 @@ def _folder(module: str) -> Path:
     return cache_folder(f"kernels-{kernels_key(module)}")
 
 
-def _kept(module: str) -> bool:
+def is_kept(module: str) -> bool:
+    """Whether compiled code of a module of kernels is on disk."""
     return any(_folder(module).rglob(f"{module.rpartition('.')[2]}.*.nbi"))
 
 

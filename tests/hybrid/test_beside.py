@@ -10,7 +10,7 @@ from hybrid import beside
 @pytest.fixture
 def empty_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(beside, "_processors", lambda: 2)
+    monkeypatch.setattr(beside, "processors", lambda: 2)
     return tmp_path
 
 
@@ -43,7 +43,7 @@ def test_nor_whether_it_can_be_started(empty_cache, monkeypatch):
 
 
 def test_one_processor_is_left_to_this_process(empty_cache, monkeypatch, refuse):
-    monkeypatch.setattr(beside, "_processors", lambda: 1)
+    monkeypatch.setattr(beside, "processors", lambda: 1)
     beside.start(["hybrid.kernels.step"])
 
 

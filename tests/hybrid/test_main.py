@@ -1,0 +1,50 @@
+"""``python -m hybrid compile``."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import hybrid.__main__ as command
+from hybrid.load import ALL_KERNELS, DRIVER, EVENTS
+
+SOURCES = Path(command.__file__).parents[1]
+SMALL = ("hybrid.kernels.step", "hybrid.kernels.evaluate")
+
+
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_every_module_of_kernels_that_is_loaded_is_compiled_ahead():
+    loaded = {DRIVER, *EVENTS}
+    for folder in ("hybrid", "lyapunov"):
+        for path in (SOURCES / folder).rglob("*.py"):
+            loaded |= set(re.findall(r'load_kernels\("([\w.]+)"\)', path.read_text(encoding="utf-8")))
+    assert set(ALL_KERNELS) == loaded
+
+
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_kernels_are_compiled_into_the_cache_once(empty_cache, monkeypatch, capsys, processes):
+    monkeypatch.setattr(command, "ALL_KERNELS", SMALL)
+    assert command.main(["compile", "--processes", processes]) == 0
+    assert str(empty_cache) in capsys.readouterr().out
+    kept = {path.name.partition(".")[0]: path.stat().st_mtime_ns for path in empty_cache.rglob("*.nbc")}
+    assert set(kept) == {"step", "evaluate"}
+    assert command.main(["compile"]) == 0
+    again = {path.name.partition(".")[0]: path.stat().st_mtime_ns for path in empty_cache.rglob("*.nbc")}
+    assert again == kept
+
+
+def test_what_was_not_compiled_is_named(empty_cache, monkeypatch, capsys):
+    monkeypatch.setattr(command, "ALL_KERNELS", ("hybrid.kernels.no_such_module",))
+    assert command.main(["compile"]) == 1
+    assert "hybrid.kernels.no_such_module" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [[], ["comple"], ["compile", "--processes", "many"]])
+def test_what_is_no_command_is_refused(arguments):
+    with pytest.raises(SystemExit):
+        command.main(arguments)
