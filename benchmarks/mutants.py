@@ -42,7 +42,9 @@ MOST_TESTS = 4
 # Where names and imports do not lead to the tests of a file.
 NEAREST = {
     "hybrid/accuracy.py": ("test_accuracy.py", "test_work_precision.py"),
-    "hybrid/ending.py": ("test_simulate.py", "test_tangent_status.py", "test_grazing.py"),
+    "hybrid/ending.py": ("test_simulate.py", "test_tangent_status.py", "test_grazing.py", "test_instant.py"),
+    "hybrid/factors.py": ("test_orbit.py", "../lyapunov/test_floquet.py"),
+    "hybrid/first_mode.py": ("test_simulate.py", "test_instant.py"),
     "hybrid/forcing.py": ("test_pulses.py",),
     "hybrid/linear_series.py": ("test_series.py", "test_simulate.py"),
     "hybrid/program.py": ("test_proved_crossings.py", "test_crossings.py"),

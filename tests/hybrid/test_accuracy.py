@@ -1,6 +1,7 @@
 """Estimated global errors against true ones, from closed forms at forty digits."""
 
 import functools
+from types import SimpleNamespace
 
 import mpmath as mp
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import hybrid
 import models
 from hybrid import DOP853, StatusCode, Tsit5, global_error
+from hybrid.accuracy import _agreement, _bound
 from tests.cases import systems
 from tests.reference.impacts import ImpactOscillator
 
@@ -185,3 +187,24 @@ def test_a_run_without_jumps():
 def test_tolerances_that_cannot_be_tightened():
     with pytest.raises(hybrid.ArgumentError, match="rtol must be at least 1e-13; got 1e-14"):
         global_error(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), solver=DOP853(rtol=1e-14))
+
+
+def test_a_bound_is_never_less_than_rounding():
+    value = np.array([2.0, -3.0])
+    np.testing.assert_array_equal(_bound(value, value, value), 2 * np.finfo(float).eps * np.abs(value))
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "agreeing"), [("abcd", "abxd", 2), ("abcd", "xbcd", 0), ("abc", "abcd", 3)]
+)
+def test_jumps_agree_up_to_the_first_that_differs(one, other, agreeing):
+    arcs = (SimpleNamespace(jumps=Jumped(np.array(list(names)))) for names in (one, other))
+    assert _agreement(*arcs) == agreeing
+
+
+class Jumped:
+    def __init__(self, transition):
+        self.transition = transition
+
+    def __len__(self):
+        return len(self.transition)

@@ -119,3 +119,12 @@ def test_storing_a_complex_number_in_a_real_array_is_not_overlooked():
 def test_a_branch_on_an_array_entry_is_not_overlooked():
     system = HybridSystem(state=1, modes=[Mode("a", lambda t, x, p: x if x[0] > 0 else -x)])
     assert complex_step_error(system, field_role(system, system.modes[0])) is not None
+
+
+def test_a_derivative_rounds_as_the_function_does():
+    """3*(a - b) stays a product: 3*a - 3*b would not be exact where a - b is."""
+    symbols = model_symbols(3, 0)
+    a, b, c = symbols.x
+    [row] = symbolic_jacobian(trace(lambda t, x, p: 3.0 * (x[0] - x[1]) * x[2], 3, ()), (c,))
+    assert row[0].is_Mul
+    assert a - b in row[0].args

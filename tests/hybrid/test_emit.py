@@ -381,3 +381,26 @@ class TestPlainFunctions:
 
         system = HybridSystem(state=("q",), modes=[Mode("a", Decay())])
         assert not compile_system(system).emitted.opaque
+
+
+def test_a_guard_of_the_start_is_no_column_of_the_series():
+    """It comes between two that are, and takes nobody's place."""
+    crossed = {
+        name: Transition("run", "run", Guard(value, +1), name=name)
+        for name, value in (("sine", lambda t, x, p: np.sin(x.q) - 0.3), ("line", lambda t, x, p: x.q - 1))
+    }
+    start = Transition("run", None, Guard(lambda t, x, p: x.q - 9, +1, at_start=True), name="start")
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("run", lambda t, x, p: (x.v, -(x.q**3)))],
+        transitions=[crossed["sine"], start, crossed["line"]],
+    )
+    assert emit(system).guard_in_series == (False, False, True)
+
+
+@pytest.mark.parametrize(("tangents", "groups"), [(0, 0), (1, 1), (4, 1), (5, 2), (8, 2), (9, 3)])
+def test_columns_of_tangent_vectors_come_in_fours(tangents, groups):
+    system = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -(x.q**3)))])
+    compiled = compile_system(system)
+    [mode] = compiled.emitted.propagators
+    assert compiled.series_columns(tangents) == compiled.emitted.tangent_start + groups * mode.tangent_columns

@@ -108,3 +108,19 @@ def test_making_a_system_imports_neither_sympy_nor_numba():
         "assert not {'sympy', 'numba'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_value_error_is_told_as_it_is():
+    def field(t, x, p):
+        raise ValueError("no such spring")
+
+    fails("Mode 'flight': field fails when called with (t, x, p): ValueError: no such spring", field=field)
+
+
+def test_writing_into_the_state_is_told():
+    def field(t, x, p):
+        x[0] = 1.0
+        return (x[1], 0.0)
+
+    with pytest.raises(ModelError, match="field writes into its argument, which is the state of the run"):
+        HybridSystem(state=2, modes=[Mode("flight", field)])

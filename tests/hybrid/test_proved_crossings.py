@@ -357,3 +357,20 @@ def test_flat_roots_on_flights_that_are_polynomials(power, c, a):
     if root < -0.9:
         return
     np.testing.assert_allclose(arc.jumps.t, [(root + 0.9) / 0.25], rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("remainder", [np.mod, np.fmod])
+def test_a_remainder_rises_through_its_threshold_and_falls_where_it_begins_anew(solver, remainder):
+    saw = HybridSystem(
+        state=("q", "n"),
+        modes=[Mode("run", lambda t, x, p: (1.0 + 0.0 * np.sin(x.q), 0.0))],
+        transitions=[
+            Transition("run", "run", Guard(lambda t, x, p: remainder(x.q, 1.5) - 0.4, +1), name="rises"),
+            Transition("run", "run", Guard(lambda t, x, p: remainder(x.q, 1.5) - 0.4, -1), name="falls"),
+        ],
+    )
+    arc = simulate(saw, (0.1, 0.0), (0.0, 5.0), solver=solver)
+    found = {name: [jump.t for jump in arc.jumps if jump.transition == name] for name in ("rises", "falls")}
+    np.testing.assert_allclose(found["rises"], [0.3, 1.8, 3.3, 4.8], atol=1e-8)
+    np.testing.assert_allclose(found["falls"], [1.4, 2.9, 4.4], atol=1e-8)

@@ -9,7 +9,7 @@ import sympy
 from hybrid import symbolic as sym
 from hybrid.compiler.lowering import MATRIX_ROLE, VECTOR_ROLE, LoweringError, parsed
 from hybrid.compiler.machine import machine_code
-from hybrid.printer import MATH_FUNCTIONS, assignments
+from hybrid.printer import MATH_FUNCTIONS, assignments, power_text
 from tests.hybrid.text import both
 
 X = np.array([0.7, -1.3, 0.0, 2.5])
@@ -92,6 +92,8 @@ def test_loops_count_as_python_does():
         "    out[i] = s",
         "for k in range(3, 3):",
         "    out[k] = 99.0",
+        "for k in range(1, 3):",
+        "    out[k] = out[k] + k",
     ]
     np.testing.assert_array_equal(*results(lines))
 
@@ -199,3 +201,11 @@ def test_any_expression(seed):
         if not any("sin" in line for line in written[i]):
             np.testing.assert_array_equal(found, expected, err_msg="\n".join(written[i]))
     assert compared > 30
+
+
+@pytest.mark.parametrize("exponent", ["1/2", "3/2", "5/2", "-1/2", "-3/2", "-5/2"])
+def test_half_integer_powers_are_products_with_a_root(exponent):
+    text = power_text("z", sympy.Rational(exponent), "k")
+    assert "**" not in text
+    value = eval(text, {"z": 1.7, "sqrt": math.sqrt})
+    assert value == pytest.approx(1.7 ** float(sympy.Rational(exponent)), rel=1e-15)
