@@ -16,6 +16,7 @@ import attrs
 from llvmlite import ir
 from numba.core import cgutils
 
+from hybrid.compiler.builder import Builder
 from hybrid.compiler.calls import CALLS, NUMBER, WHOLE, Call
 from hybrid.kernels.codes import NARROW
 from hybrid.kernels.lanes import Matrix, everywhere, vector_of
@@ -124,7 +125,7 @@ class _Body:
         self.arguments = dict(zip(signature.names, function.args, strict=True))
         # Variables live in the first block, where LLVM looks for those that need no memory.
         self.front = ir.IRBuilder(function.append_basic_block("front"))
-        self.builder = ir.IRBuilder(function.append_basic_block("body"))
+        self.builder = Builder(function.append_basic_block("body"))
         self.values: dict[str, Any] = {}
         self.variables: dict[str, Any] = {}
         for name, kind, argument in zip(signature.names, signature.types, function.args, strict=True):
@@ -294,18 +295,18 @@ class _Body:
         return self.OPERATIONS[kind](self.builder, a, b, flags=self.flags)
 
     OPERATIONS: ClassVar[dict[type[ast.AST], Callable[..., Any]]] = {
-        ast.Add: ir.IRBuilder.fadd,
-        ast.Sub: ir.IRBuilder.fsub,
-        ast.Mult: ir.IRBuilder.fmul,
-        ast.Div: ir.IRBuilder.fdiv,
+        ast.Add: Builder.fadd,
+        ast.Sub: Builder.fsub,
+        ast.Mult: Builder.fmul,
+        ast.Div: Builder.fdiv,
         ast.Mod: lambda builder, a, b, flags: CALLS["remainder"](builder, a, b),
         ast.Pow: lambda builder, a, b, flags: CALLS["pow"](builder, a, b),
     }
     # Whole numbers are counts here: none is negative where it is divided.
     WHOLE_OPERATIONS: ClassVar[dict[type[ast.AST], Callable[..., Any]]] = {
-        ast.Add: ir.IRBuilder.add,
-        ast.Sub: ir.IRBuilder.sub,
-        ast.Mult: ir.IRBuilder.mul,
+        ast.Add: Builder.add,
+        ast.Sub: Builder.sub,
+        ast.Mult: Builder.mul,
         ast.FloorDiv: ir.IRBuilder.sdiv,
     }
 

@@ -5,8 +5,11 @@ import math
 import numpy as np
 import pytest
 import sympy
+from llvmlite import binding, ir
 
 from hybrid import symbolic as sym
+from hybrid.compiler.builder import Builder
+from hybrid.compiler.calls import NUMBER, WHOLE
 from hybrid.compiler.lowering import MATRIX_ROLE, VECTOR_ROLE, LoweringError, parsed
 from hybrid.compiler.machine import machine_code
 from hybrid.printer import MATH_FUNCTIONS, assignments, power_text
@@ -209,3 +212,33 @@ def test_half_integer_powers_are_products_with_a_root(exponent):
     assert "**" not in text
     value = eval(text, {"z": 1.7, "sqrt": math.sqrt})
     assert value == pytest.approx(1.7 ** float(sympy.Rational(exponent)), rel=1e-15)
+
+
+def test_types_that_do_not_fit_are_refused():
+    function = ir.Function(ir.Module(), ir.FunctionType(ir.VoidType(), [NUMBER, WHOLE]), "f")
+    number, whole = function.args
+    builder = Builder(function.append_basic_block("body"))
+    place = builder.alloca(NUMBER)
+    with pytest.raises(ValueError, match="fadd of double and i64"):
+        builder.fadd(number, whole)
+    with pytest.raises(TypeError, match="i64 has no place at double"):
+        builder.store(whole, place)
+    assert builder.bitcast(number, NUMBER) is number
+
+
+def test_lines_are_read_by_llvm():
+    """Addresses, aligned stores and flags among them."""
+    module = ir.Module()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [NUMBER.as_pointer(), WHOLE]), "f")
+    address, index = function.args
+    builder = Builder(function.append_basic_block("body"))
+    here = builder.gep(address, [builder.mul(index, WHOLE(3))])
+    value = builder.fmul(builder.load(here, align=8), NUMBER(-0.5), flags=("contract",))
+    builder.store(builder.fadd(value, NUMBER(float("inf"))), here, align=8)
+    bits = builder.load(builder.bitcast(here, WHOLE.as_pointer()))
+    builder.store(
+        builder.sub(bits, WHOLE(1)), builder.gep(builder.bitcast(address, WHOLE.as_pointer()), [index])
+    )
+    builder.ret_void()
+    binding.parse_assembly(str(module)).verify()
+    assert "fmul contract double" in str(module)

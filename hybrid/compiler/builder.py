@@ -1,0 +1,100 @@
+"""LLVM's instructions as lines of text, written as they come.
+
+llvmlite keeps an object with its operands for each instruction, and writes all of them out in the end. Nearly
+all instructions of a model are loads, stores, addresses and arithmetic: these are written at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from llvmlite import ir
+
+_texts: dict[int, tuple[Any, str]] = {}
+
+
+class Line:
+    """An instruction that has been written, and stands for its value."""
+
+    __slots__ = ("reference", "text", "type")
+
+    def __init__(self, kind: Any, reference: str, text: str) -> None:
+        self.type, self.reference, self.text = kind, reference, text
+
+    def __str__(self) -> str:
+        return self.text
+
+    def get_reference(self) -> str:
+        """How other instructions name the value."""
+        return self.reference
+
+
+def _text(kind: Any) -> str:
+    """A type in LLVM's words."""
+    found = _texts.get(id(kind))
+    if found is None:
+        # With the type itself, whose place in memory nobody else gets then.
+        found = _texts[id(kind)] = kind, str(kind)
+    return found[1]
+
+
+def _reference(value: Any) -> str:
+    return value.reference if type(value) is Line else str(value.get_reference())
+
+
+def _arithmetic(operation: str) -> Callable[..., Line]:
+    def write(self: Builder, a: Any, b: Any, name: str = "", flags: Sequence[str] = ()) -> Line:
+        if a.type != b.type:
+            raise ValueError(f"{operation} of {a.type} and {b.type}")
+        words = " ".join((operation, *flags, _text(a.type)))
+        return self.written(a.type, f"{words} {_reference(a)}, {_reference(b)}")
+
+    return write
+
+
+class Builder(ir.IRBuilder):
+    """A builder of llvmlite's that writes the commonest instructions as lines."""
+
+    count = 0
+
+    def written(self, kind: Any, text: str) -> Line:
+        """Add an instruction that has a value of this type."""
+        self.count += 1
+        reference = f'%"line.{self.count}"'
+        return self._added(Line(kind, reference, f"{reference} = {text}"))
+
+    def _added(self, line: Line) -> Line:
+        self._block.instructions.insert(self._anchor, line)
+        self._anchor += 1
+        return line
+
+    add, sub, mul = map(_arithmetic, ("add", "sub", "mul"))
+    fadd, fsub, fmul, fdiv = map(_arithmetic, ("fadd", "fsub", "fmul", "fdiv"))
+
+    def load(self, ptr: Any, name: str = "", align: int | None = None, typ: Any = None) -> Line:
+        """What is stored at an address."""
+        kind = typ or ptr.type.pointee
+        text = f"load {_text(kind)}, {_text(ptr.type)} {_reference(ptr)}"
+        return self.written(kind, text if align is None else f"{text}, align {align}")
+
+    def store(self, value: Any, ptr: Any, align: int | None = None) -> Line:
+        """Put a value at an address."""
+        if ptr.type.pointee != value.type:
+            raise TypeError(f"{value.type} has no place at {ptr.type}")
+        text = f"store {_text(value.type)} {_reference(value)}, {_text(ptr.type)} {_reference(ptr)}"
+        return self._added(Line(ir.VoidType(), "", text if align is None else f"{text}, align {align}"))
+
+    def gep(self, ptr: Any, indices: Sequence[Any], *arguments: Any, **options: Any) -> Any:
+        """The address so many entries further."""
+        if len(indices) > 1 or arguments or options:
+            return super().gep(ptr, indices, *arguments, **options)
+        [index] = indices
+        entry, place = _text(ptr.type.pointee), f"{_text(index.type)} {_reference(index)}"
+        return self.written(ptr.type, f"getelementptr {entry}, {_text(ptr.type)} {_reference(ptr)}, {place}")
+
+    def bitcast(self, value: Any, typ: Any, name: str = "") -> Any:
+        """The same bits as a value of another type."""
+        if value.type == typ:
+            return value
+        return self.written(typ, f"bitcast {_text(value.type)} {_reference(value)} to {_text(typ)}")
