@@ -60,6 +60,7 @@ NEAREST = {
     "hybrid/kernels/forcing.py": ("test_pulses.py",),
     "hybrid/kernels/guards.py": ("test_onset.py", "test_instant.py", "test_crossings.py"),
     "hybrid/kernels/jump.py": ("test_saltation.py", "test_instant.py", "test_locked.py"),
+    "hybrid/kernels/onset.py": ("test_onset.py", "test_instant.py", "test_proved_crossings.py"),
     "hybrid/kernels/operations.py": ("test_proved_crossings.py",),
     "hybrid/kernels/runge_kutta.py": ("test_order.py", "solvers/test_taylor.py"),
     "hybrid/kernels/runge_kutta_guards.py": ("test_proved_crossings.py", "test_onset.py"),
