@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,10 @@ import numpy as np
 from hybrid import arguments
 from hybrid.agreement import check_agreement
 from hybrid.cache import announced
-from hybrid.compiler import ROLES
+from hybrid.compiler import POINT, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.errors import ArgumentError
 from hybrid.kept import traced_or_kept
-from hybrid.kernels.codes import NARROW, NO_MODE
+from hybrid.kernels.codes import NARROW, NO_MODE, RUNGE_KUTTA
 from hybrid.load import Absent, address, entry, load_kernels
 from hybrid.periodicity import period_fault
 from hybrid.roles import CONDITION, Role
@@ -44,8 +44,8 @@ class CompiledSystem:
         The model.
     emitted
         The generated source and what tracing could prove of the model.
-    roles
-        The compiled functions, in the order of ``ROLES``.
+    parts
+        The compiled functions by name, for each part of ``hybrid.compiler.PARTS`` that was needed so far.
     plans
         What runs by one solver have in common, kept here by those who make runs.
     periodic_at
@@ -54,7 +54,7 @@ class CompiledSystem:
 
     system: HybridSystem
     emitted: Emitted
-    roles: tuple[Any, ...]
+    parts: dict[str, Any] = attrs.field(factory=dict, init=False)
     plans: dict[Any, Any] = attrs.field(factory=dict, init=False)
     periodic_at: set[bytes] = attrs.field(factory=set, init=False)
 
@@ -117,21 +117,56 @@ class CompiledSystem:
     def __deepcopy__(self, memo: dict[int, Any]) -> CompiledSystem:
         return self
 
+    def functions(self, part: str) -> dict[str, Any]:
+        """The compiled functions of a part of ``hybrid.compiler.PARTS`` by name, each with its ``address``.
+
+        Raises
+        ------
+        ModelError
+            If a function that tracing could not follow cannot be compiled as it is.
+        """
+        if part not in self.parts:
+            # What imports LLVM waits until a model is compiled.
+            from hybrid.compiler.functions import functions_of
+
+            with announced(f"hybrid: compiling {self.system.name or 'the model'} ..."):
+                self.parts[part] = functions_of(self.emitted, part, self._own)
+        found: dict[str, Any] = self.parts[part]
+        return found
+
+    @cached_property
+    def _own(self) -> Any:
+        from hybrid.compiler.functions import own_functions
+
+        return own_functions(self.emitted)
+
+    def moving(self, kinds: Iterable[int], tangents: int) -> dict[str, Any]:
+        """The functions that advance modes by propagators of these kinds, by their names in a model."""
+        needed: dict[str, Any] = {}
+        if any(kind != RUNGE_KUTTA for kind in kinds):
+            part = TANGENT_SERIES if tangents else SERIES
+            [needed["series"]] = self.functions(part).values()
+        if tangents and RUNGE_KUTTA in kinds:
+            needed |= self.functions(VARIATIONAL)
+        return needed
+
     def series_columns(self, tangents: int) -> int:
         """Columns that the series of any mode need."""
         groups = -(-arguments.count("tangents", tangents, 0) // NARROW)
-        widest = max(each.tangent_columns for each in self.emitted.propagators)
+        widest = max(each.series.tangent_columns for each in self.emitted.propagators)
         return self.emitted.tangent_start + groups * widest
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
-        """What the kernels are given: roles, parameter values, graph."""
-        return self._with(parameters) if parameters else self._default_model
+        """What the kernels are given: functions at a point, parameter values, graph."""
+        return self.at(parameters, self._model)
 
-    @cached_property
-    def _default_model(self) -> Any:
-        return self._with(None)
+    def moved_by(self, moving: Mapping[str, Any], propagator: np.ndarray | None) -> Any:
+        """A model at its default parameters, with what ``moving`` returned, and with other propagators."""
+        changes = dict(moving) if propagator is None else {**moving, "propagator": propagator}
+        return self.at(None, self._model.replace(**changes))
 
-    def _with(self, parameters: Mapping[str, float] | None) -> Any:
+    def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
+        """A model at parameter values."""
         from hybrid.system import period_at
 
         values = self.system.parameter_values(parameters)
@@ -143,7 +178,7 @@ class CompiledSystem:
         changes: dict[str, Any] = {"parameters": values, "period": period}
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
-        return self._model.replace(**changes)
+        return model.replace(**changes)
 
     def _check_period(self, values: np.ndarray, period: float) -> None:
         """ArgumentError if the period is none at these values; they are remembered if it is one."""
@@ -179,7 +214,9 @@ class CompiledSystem:
         first_outgoing, outgoing = _leaving(system, at_start=False)
         first_at_start, at_start = _leaving(system, at_start=True)
         return Model(
-            **dict(zip(ROLES, self.roles, strict=True)),
+            **self.functions(POINT),
+            variational_flow=Absent(),
+            series=Absent(),
             parameters=system.parameter_values(),
             dimension=system.dimension,
             first_outgoing=first_outgoing,
@@ -205,7 +242,7 @@ class CompiledSystem:
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
             timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
             tangent_start=self.emitted.tangent_start,
-            tangent_columns=_indices(propagator.tangent_columns for propagator in self.emitted.propagators),
+            tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
 
@@ -261,12 +298,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     compiled: CompiledSystem | None = system._compiled
     if compiled is None:
         load_kernels()
-        # What imports LLVM waits until a model is compiled.
-        from hybrid.compiler.functions import functions_of
-
-        emitted = traced_or_kept(system)
-        with announced(f"hybrid: compiling {system.name or 'the model'} ..."):
-            compiled = CompiledSystem(system, emitted, functions_of(emitted))
+        compiled = CompiledSystem(system, traced_or_kept(system))
         check_agreement(compiled)
         object.__setattr__(system, "_compiled", compiled)
     return compiled

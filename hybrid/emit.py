@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import sympy
 
+from hybrid.compiler import PARTS
 from hybrid.continuity import jumps_of, may_jump
 from hybrid.derivative import complex_step_error, symbolic_jacobian
-from hybrid.emitted import Emitted, Propagator
+from hybrid.emitted import Emitted, Propagator, Series
 from hybrid.errors import ModelError
 from hybrid.forcing import forcings
 from hybrid.kernels.codes import WIDE
@@ -74,18 +75,19 @@ def _emitted(system: HybridSystem) -> Emitted:
         propagator(field.expressions, around, writer.symbols)
         for field, around in zip(fields, boundaries, strict=True)
     ]
-    functions = (
-        _function("flow", [field.value for field in fields]),
-        _function("flow_jacobian", [_zeros_first(field.derivative, system.dimension) for field in fields]),
-        _function("variational_flow", [_variational(field, system.dimension) for field in fields]),
-        _function(
-            "guard", [*(guard.value for guard in guards), *(condition.value for condition in conditions)]
-        ),
-        _function("guard_gradient", [guard.derivative for guard in guards]),
-        _function("reset", [reset.value for reset in resets]),
-        _function("reset_jacobian", [_zeros_first(reset.derivative, system.dimension) for reset in resets]),
-        _function("series", _placed(propagators), "index, t, x, p, order, out"),
-    )
+    n = system.dimension
+    series = [each.series for each in propagators]
+    bodies: dict[str, list[Sequence[str]]] = {
+        "flow": [field.value for field in fields],
+        "flow_jacobian": [_zeros_first(field.derivative, n) for field in fields],
+        "variational_flow": [_variational(field, n) for field in fields],
+        "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
+        "guard_gradient": [guard.derivative for guard in guards],
+        "reset": [reset.value for reset in resets],
+        "reset_jacobian": [_zeros_first(reset.derivative, n) for reset in resets],
+        "series": _placed(series, [each.statements for each in series]),
+        "tangent_series": _placed(series, [each.tangent_statements for each in series]),
+    }
     symbols = writer.symbols
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
@@ -94,7 +96,10 @@ def _emitted(system: HybridSystem) -> Emitted:
     forcing = [each for of_mode in pulses for each in of_mode]
     not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
     return Emitted(
-        source="\n\n".join((IMPORTS, *functions)),
+        texts={
+            part: "\n\n".join((IMPORTS, *(_function(name, bodies[name]) for name in names)))
+            for part, names in PARTS.items()
+        },
         opaque=writer.opaque,
         affine_guard=affine,
         guard_in_series=_guards_in_series(system, propagators),
@@ -111,30 +116,34 @@ def _emitted(system: HybridSystem) -> Emitted:
         ),
         proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
         timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
-        propagators=tuple(propagators),
-        tangent_start=_tangent_start(propagators),
+        propagators=tuple(map(_without_text, propagators)),
+        tangent_start=_tangent_start(series),
     )
 
 
-def _placed(propagators: Sequence[Propagator]) -> list[list[str]]:
+def _placed(series: Sequence[Series], statements: Sequence[Sequence[str]]) -> list[Sequence[str]]:
     """The bodies of the series of all modes, each with its columns in the matrix that they share.
 
     Every mode has a table of its own, which stays when another mode writes its series.
     """
-    table, vectors = max(each.columns for each in propagators), _tangent_start(propagators)
-    bodies = []
-    for each in propagators:
-        bodies.append(
-            [f"table = {table}", f"vectors = {vectors}", *each.statements] if each.statements else []
-        )
+    table, vectors = max(each.columns for each in series), _tangent_start(series)
+    bodies: list[Sequence[str]] = []
+    for each, lines in zip(series, statements, strict=True):
+        bodies.append([f"table = {table}", f"vectors = {vectors}", *lines] if lines else [])
         table += each.table_columns
     return bodies
 
 
-def _tangent_start(propagators: Sequence[Propagator]) -> int:
+def _tangent_start(series: Sequence[Series]) -> int:
     """The first column of tangent vectors: behind those of the state and behind all tables."""
-    whole = max(each.columns for each in propagators) + sum(each.table_columns for each in propagators)
+    whole = max(each.columns for each in series) + sum(each.table_columns for each in series)
     return padded(whole, WIDE)
+
+
+def _without_text(propagator: Propagator) -> Propagator:
+    """The propagator without the statements, which are in the texts of the model."""
+    series = attrs.evolve(propagator.series, statements=(), tangent_statements=())
+    return attrs.evolve(propagator, series=series)
 
 
 @attrs.frozen
@@ -339,9 +348,10 @@ def _written_condition(writer: _Writer, transition: Transition) -> _Written:
     return _Written([], [], []) if role is None else writer.condition(role)
 
 
-def _function(name: str, branches: Iterable[Sequence[str]], arguments: str = "index, t, x, p, out") -> str:
-    """Source of a role with one branch an index; an empty one is left out."""
-    lines = [f"def {name}({arguments}):"]
+def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
+    """Source of a role with one branch per index; an empty one is left out."""
+    order = "order, " if name.endswith("series") else ""
+    lines = [f"def {name}(index, t, x, p, {order}out):"]
     for index, statements in enumerate(branches):
         if statements:
             lines.append(f"    {'if' if len(lines) == 1 else 'elif'} index == {index}:")

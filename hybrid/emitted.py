@@ -9,6 +9,30 @@ from hybrid.opaque import OpaqueFunction
 
 
 @attrs.frozen
+class Series:
+    """The series of a mode as statements, and the columns that they fill.
+
+    Attributes
+    ----------
+    statements, tangent_statements
+        Body of the mode in the functions ``series`` and ``tangent_series``. ``table`` and ``vectors`` in it
+        are the first columns of its table and of the tangent vectors.
+    columns, table_columns, tangent_columns
+        Numbers of columns for the state and what it is made of, for a table that stays, and for four tangent
+        vectors.
+    """
+
+    statements: tuple[str, ...] = ()
+    tangent_statements: tuple[str, ...] = ()
+    columns: int = 0
+    table_columns: int = 0
+    tangent_columns: int = 0
+
+
+NO_SERIES = Series()
+
+
+@attrs.frozen
 class Propagator:
     """How a mode is advanced, and why.
 
@@ -21,12 +45,8 @@ class Propagator:
         Degree in time of every solution, and of every guard along it, if those are polynomials, else 0.
     reason
         What tracing found.
-    statements
-        Body of the mode in the role ``series``. ``table`` and ``vectors`` in it are the first columns of its
-        table and of the tangent vectors.
-    columns, table_columns, tangent_columns
-        Columns that the series need for the state and what it is made of, for a table that stays, and for
-        four tangent vectors.
+    series
+        The series of its solutions; nothing for RUNGE_KUTTA.
     guards
         By transition that leaves the mode: whether the series hold its guard in a column.
     """
@@ -34,10 +54,7 @@ class Propagator:
     kind: int
     degree: int
     reason: str
-    statements: tuple[str, ...] = ()
-    columns: int = 0
-    table_columns: int = 0
-    tangent_columns: int = 0
+    series: Series = NO_SERIES
     guards: tuple[bool, ...] = ()
 
     def __str__(self) -> str:
@@ -79,9 +96,8 @@ class Emitted:
 
     Parameters
     ----------
-    source
-        Text of a module with the functions ``flow``, ``flow_jacobian``, ``variational_flow``, ``guard``,
-        ``guard_gradient``, ``reset`` and ``reset_jacobian``, to be compiled with IEEE division. Behind the
+    texts
+        By part of ``hybrid.compiler.PARTS``: text of a module with the functions of the part. Behind the
         guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
         model gives the same text, in any process.
     opaque
@@ -118,7 +134,7 @@ class Emitted:
         The first column of tangent vectors in series.
     """
 
-    source: str
+    texts: dict[str, str]
     opaque: dict[str, OpaqueFunction]
     affine_guard: tuple[bool, ...]
     guard_in_series: tuple[bool, ...]

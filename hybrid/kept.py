@@ -19,7 +19,7 @@ import attrs
 import numpy as np
 
 from hybrid.cache import cache_folder, keep, kept, source_key
-from hybrid.emitted import Emitted, Programs, Propagator
+from hybrid.emitted import Emitted, Programs, Propagator, Series
 from hybrid.load import kernels_key
 from hybrid.roles import roles
 from hybrid.traced import TraceError, values_of
@@ -174,12 +174,15 @@ def _read(path: Path) -> Emitted | None:
         found["programs"] = Programs(
             tuple(map(tuple, rows)), tuple(checked), tuple(map(float, numbers)), tuple(first)
         )
-        for each in found["propagators"]:
-            each["statements"], each["guards"] = tuple(each["statements"]), tuple(each["guards"])
-        found["propagators"] = tuple(Propagator(**each) for each in found["propagators"])
+        found["propagators"] = tuple(map(_propagator, found["propagators"]))
         return Emitted(**found)
     except (ValueError, LookupError, TypeError):
         return None
+
+
+def _propagator(found: dict[str, Any]) -> Propagator:
+    series = Series(**{**found["series"], "statements": (), "tangent_statements": ()})
+    return Propagator(found["kind"], found["degree"], found["reason"], series, tuple(found["guards"]))
 
 
 def _checksum(text: str) -> str:

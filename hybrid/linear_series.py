@@ -78,10 +78,11 @@ def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbo
 
 def table_statements(
     form: LinearForm, n: int, constants: Constants, starts: Sequence[str]
-) -> tuple[list[str], int, int]:
-    """Statements for the series, the columns of their table, and those that four tangent vectors need.
+) -> tuple[list[str], list[str], int, int]:
+    """Statements for the series and, behind them, for tangent vectors.
 
-    ``table`` and ``vectors`` are the first columns of both, ``starts`` what ``y`` starts from.
+    Besides, the numbers of columns of their table and of four tangent vectors. ``table`` and ``vectors`` are
+    the first columns of both, ``starts`` what ``y`` starts from.
     """
     size, guards = len(form.starts), len(form.guards)
     front, one = padded(n + guards + 2), size - 1
@@ -105,11 +106,13 @@ def table_statements(
         f"    out[1, table + {one * front + n + guards + 1}] = {constants.name(form.trace(n))}",
         "    out[order + 2, table] = 1.0",
         f"combine(out, order, table, {front}, ({', '.join(starts)},))",
+    ]
+    vectors = [
         f"spread_tangents(x, {n}, out, vectors, {NARROW * n})",
         "for g in range(groups):",
         f"    combine_tangents(out, order, table, {front}, vectors + g*{NARROW * n}, {n})",
     ]
-    return lines, padded(size) * front, NARROW * n
+    return lines, vectors, padded(size) * front, NARROW * n
 
 
 def _entry(value: str, place: int, front: int) -> str:

@@ -14,7 +14,7 @@ import sympy
 from sympy.core.parameters import distribute
 
 from hybrid.constants import Constants
-from hybrid.emitted import Propagator
+from hybrid.emitted import Propagator, Series
 from hybrid.kernels.codes import (
     DESINGULARISED,
     EXACT,
@@ -110,22 +110,22 @@ def _series(
     if roots:
         written = _write_rooted(field, boundaries, guards, roots, symbols)
         reason = "half-integer powers of a guard, whose root is smooth"
-        return Propagator(ROOTED, 0, reason, *written, guards=tuple(held))
+        return Propagator(ROOTED, 0, reason, written, tuple(held))
     if len(bases) > 1:
         raise NoSeries("it has fractional powers of more than one guard")
     if bases:
         [z] = bases
         written = _write_desingularised(field, boundaries, guards, z, symbols)
         reason = "half-integer powers of a guard, on the clock dt = w ds"
-        return Propagator(DESINGULARISED, 0, reason, *written, guards=tuple(held))
+        return Propagator(DESINGULARISED, 0, reason, written, tuple(held))
     jacobian = partial_derivatives(field, symbols.x)
     if any(mentions(entry, symbols.variables) for row in jacobian for entry in row):
         written = _write(field, guards, symbols)
-        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", *written, guards=tuple(held))
+        return Propagator(TAYLOR, 0, "smooth, nonlinear in the state", written, tuple(held))
     if not all(_elementary(entry, symbols) for entry in field):
         written = _write(field, guards, symbols)
         reason = "affine, its forcing has no short series"
-        return Propagator(TAYLOR, 0, reason, *written, guards=tuple(held))
+        return Propagator(TAYLOR, 0, reason, written, tuple(held))
     of_state = _degree(field, jacobian, symbols)
     if 0 < of_state <= HIGHEST_ORDER:
         # A quadratic guard is a polynomial in time here; of higher ones flat roots drown in rounding.
@@ -133,14 +133,14 @@ def _series(
         held = [0 < power <= 2 and of_state * power <= HIGHEST_ORDER for power in powers]
         degree = of_state * max([1, *(power for power, is_held in zip(powers, held, strict=True) if is_held)])
         written = _write(field, _columns(boundaries, held), symbols)
-        return Propagator(EXACT, degree, f"polynomials of degree {degree}", *written, guards=tuple(held))
+        return Propagator(EXACT, degree, f"polynomials of degree {degree}", written, tuple(held))
     harmonics = _harmonics(field, symbols)
     form = linear_form(field, guards, harmonics, symbols)
     if form is None:
         written = _write(field, guards, symbols)
     else:
         written = _write_linear(form, harmonics, len(guards), symbols)
-    return Propagator(EXACT, 0, "affine in the state", *written, guards=tuple(held))
+    return Propagator(EXACT, 0, "affine in the state", written, tuple(held))
 
 
 def _is_held(boundary: Boundary, bases: Sequence[sympy.Expr], symbols: Symbols) -> bool:
@@ -220,9 +220,7 @@ def _may_be_nilpotent(matrix: Sequence[Sequence[sympy.Expr]]) -> bool:
     return not np.abs(power).max() > SAME
 
 
-def _write(
-    field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols
-) -> tuple[tuple[str, ...], int, int, int]:
+def _write(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols) -> Series:
     body = _Body(symbols, guards, (), ONE_THEN_ZERO)
     seeds = _seeds(symbols)
     tangents = directional(field, seeds)
@@ -232,14 +230,14 @@ def _write(
 
 def _write_linear(
     form: LinearForm, harmonics: dict[sympy.Expr, sympy.Symbol], guards: int, symbols: Symbols
-) -> tuple[tuple[str, ...], int, int, int]:
+) -> Series:
     n, constants = len(symbols.x), Constants()
     begun = [f"start{i}" for i in range(len(harmonics))]
     starts = [*_state(symbols)[1], *begun, "1.0"]
-    lines, table, tangents = table_statements(form, n, constants, starts)
-    groups = f"groups = (len(x)//{n} + {NARROW - 2})//{NARROW}"
-    lines = [groups, *constants.statements(), *assignments(begun, list(harmonics)), *lines]
-    return tuple(lines), padded(n + guards + OTHERS, WIDE), table, tangents
+    lines, vectors, table, tangents = table_statements(form, n, constants, starts)
+    shared = [*constants.statements(), *assignments(begun, list(harmonics)), *lines]
+    front = padded(n + guards + OTHERS, WIDE)
+    return Series(tuple(shared), (_groups(n), *shared, *vectors), front, table, tangents)
 
 
 def _write_desingularised(
@@ -248,7 +246,7 @@ def _write_desingularised(
     guards: Sequence[sympy.Expr],
     z: sympy.Expr,
     symbols: Symbols,
-) -> tuple[tuple[str, ...], int, int, int]:
+) -> Series:
     """Series on the clock ``dt = w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
 
     All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
@@ -294,7 +292,7 @@ def _write_rooted(
     guards: Sequence[sympy.Expr],
     roots: Sequence[Root],
     symbols: Symbols,
-) -> tuple[tuple[str, ...], int, int, int]:
+) -> Series:
     """Series in time of the states and of the roots of guards, whose half-integer powers are theirs."""
     body = _Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
     seeds = _seeds(symbols)
@@ -403,11 +401,11 @@ class _Body:
         trace: sympy.Expr,
         tangents: Sequence[sympy.Expr],
         seeds: dict[sympy.Symbol, sympy.Symbol],
-    ) -> tuple[tuple[str, ...], int, int, int]:
-        """The statements, and the numbers of columns as in ``Propagator``.
+    ) -> Series:
+        """The series without and with tangent vectors.
 
-        Runs without tangent vectors have statements of their own, which know nothing of what only these need:
-        the products in their rates, and the divergence.
+        Those without know nothing of what only tangent vectors need: the products in their rates, and the
+        divergence.
         """
         free = self.columns
         alone = self._state("s", names, columns, starts, rates, guards)
@@ -424,17 +422,14 @@ class _Body:
         carried.compute(tangents)
         self._place_pairs(moved.block)
         together = [*moved.higher(), *carried.higher()]
-        lines = [
-            *self.preamble,
-            f"groups = (len(x)//{self.n} + {NARROW - 2})//{NARROW}",
-            *self.constants.statements(),
-            "o = 0",
-            "if groups == 0:",
-            *indented([*alone.first(), *_each_order(alone.higher())]),
-            "else:",
-            *indented([*moved.first(), *carried.first(), *_each_order(together)]),
-        ]
-        return tuple(lines), padded(max(width, self.columns), WIDE), 0, carried.columns
+        shared = [*self.preamble, *self.constants.statements(), "o = 0"]
+        return Series(
+            (*shared, *alone.first(), *_each_order(alone.higher())),
+            (_groups(self.n), *shared, *moved.first(), *carried.first(), *_each_order(together)),
+            padded(max(width, self.columns), WIDE),
+            0,
+            carried.columns,
+        )
 
     def _state(
         self,
@@ -462,6 +457,10 @@ class _Body:
             self.columns = padded(self.columns, WIDE)
             self.preamble.append(f"{block.prefix}{factors} = {self.columns}")
             self.columns += padded(len(block.pairs))
+
+
+def _groups(n: int) -> str:
+    return f"groups = (len(x)//{n} + {NARROW - 2})//{NARROW}"
 
 
 def _each_order(statements: Iterable[str]) -> list[str]:

@@ -412,12 +412,10 @@ def start(
     state = arguments.state("x0", x0, system)
     t0 = arguments.number(time, t0)
     solver = check_solver(solver)
-    model = compiled.model(parameters)
-    check_time(time, t0, model.period)
     tangents = 0 if tangent is None else tangent.shape[1]
     plan = plan_of(compiled, solver, tangents)
-    if plan.propagator is not None:
-        model = model.replace(propagator=plan.propagator)
+    model = compiled.at(parameters, plan.model) if parameters else plan.model
+    check_time(time, t0, model.period)
     run, phase0 = _fresh_run(plan.run_layout, model, state, tangent, t0)
     work = _fresh_work(plan.work_layout, plan.method)
     run.count[codes.MODE], beyond = choose_mode(system, plan.parts, model, run, work, mode)
@@ -428,13 +426,13 @@ def start(
 class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
-    ``propagator`` replaces that of the model if it is not None: only Taylor series come from the model.
-    ``propagators`` says how each mode is advanced, by its name; ``degree`` is that of a record's steps.
+    ``model`` is that at the default parameters. ``propagators`` says how each mode is advanced, by its name;
+    ``degree`` is that of a record's steps.
     """
 
     method: Any
     parts: Any
-    propagator: np.ndarray | None
+    model: Any
     propagators: dict[str, str]
     degree: int
     run_layout: Any
@@ -456,7 +454,9 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
                 bool(solver.tableau.implicit),
                 bool(compiled.emitted.forcing_component),
             ),
-            None if is_taylor else np.array(kinds, dtype=np.int64),
+            compiled.moved_by(
+                compiled.moving(kinds, tangents), None if is_taylor else np.array(kinds, dtype=np.int64)
+            ),
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),
             _run_layout(n, tangents, modes, transitions),

@@ -445,7 +445,7 @@ class Recurrences:
     def _pair(self, expression: sympy.Expr) -> str:
         odd, even, sign = PAIRS[expression.func]
         (u,) = expression.args
-        s, c = odd(u), even(u)
+        s, c = odd(u, evaluate=False), even(u, evaluate=False)
         rate = self._rate(u)
         argument = self.coefficient(u)
         if rate:

@@ -12,7 +12,7 @@ import sympy
 from sympy.core.parameters import global_parameters
 
 from hybrid.nodes import interned, once
-from hybrid.symbolic import ONE, ZERO, Select
+from hybrid.symbolic import ONE, ZERO, Select, product
 
 Partials = dict[sympy.Symbol, sympy.Expr]
 
@@ -57,12 +57,12 @@ def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distribut
                 products = partials
             elif expression.is_Mul:
                 before, behind = args[:place], args[place + 1 :]
-                products = {v: sympy.Mul(*before, part, *behind) for v, part in partials.items()}
+                products = {v: _with_factor(part, before, behind) for v, part in partials.items()}
             else:
                 outer = _outer(expression, place)
-                products = {v: outer * part for v, part in partials.items()}
-            for v, product in products.items():
-                terms.setdefault(v, []).append(product)
+                products = {v: product(outer, part) for v, part in partials.items()}
+            for v, term in products.items():
+                terms.setdefault(v, []).append(term)
     sums = {v: sympy.Add(*each) if len(each) > 1 else each[0] for v, each in terms.items()}
     return {v: total for v, total in sums.items() if total != 0}
 
@@ -92,11 +92,21 @@ def _along(
         if expression.is_Add:
             terms.append(inner)
         elif expression.is_Mul:
-            terms.append(sympy.Mul(*args[:place], inner, *args[place + 1 :]))
+            terms.append(_with_factor(inner, args[:place], args[place + 1 :]))
         else:
-            terms.append(_outer(expression, place) * inner)
+            terms.append(product(_outer(expression, place), inner))
     found[expression] = sympy.Add(*terms) if len(terms) != 1 else terms[0]
     return found[expression]
+
+
+def _with_factor(
+    factor: sympy.Expr, before: tuple[sympy.Expr, ...], behind: tuple[sympy.Expr, ...]
+) -> sympy.Expr:
+    """A product with one factor put in its place."""
+    if factor is ONE and len(before) + len(behind) == 1:
+        [other] = (*before, *behind)
+        return other
+    return product(*before, factor, *behind)
 
 
 def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import sympy
@@ -19,6 +20,8 @@ from hybrid.nodes import contains, interned, once
 ZERO = sympy.Integer(0)
 ONE = sympy.Integer(1)
 HALF = sympy.Rational(1, 2)
+# Numbers to remember.
+MOST_NUMBERS = 10_000
 
 
 def number(value: Any) -> sympy.Expr:
@@ -26,10 +29,24 @@ def number(value: Any) -> sympy.Expr:
 
     Multiples of 1/8 become exact rationals, so that ``z**1.5`` and ``2.0*x`` keep their structure.
     """
-    value = float(value)
+    return _number(float(value))
+
+
+# The same object each time: what SymPy finds out about a number stays with it.
+@lru_cache(maxsize=MOST_NUMBERS)
+def _number(value: float) -> sympy.Expr:
     if math.isfinite(value) and abs(value) < 2.0**50 and (8.0 * value).is_integer():
         return sympy.Rational(int(8.0 * value), 8)
     return sympy.Float(value) if math.isfinite(value) else sympy.sympify(value)
+
+
+def product(*factors: sympy.Expr) -> sympy.Expr:
+    """SymPy's product. Of a number and a symbol or a function it is made without a question to SymPy."""
+    if len(factors) == 2:
+        a, b = factors if factors[0].is_Number else factors[::-1]
+        if a.is_Number and (b.is_Symbol or b.is_Function) and a is not ZERO and a is not ONE:
+            return sympy.Mul(a, b, evaluate=False)
+    return sympy.Mul(*factors)
 
 
 class RealFunction(sympy.Function):

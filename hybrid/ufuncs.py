@@ -32,6 +32,7 @@ from hybrid.symbolic import (
     Truncate,
     TruncatedRemainder,
     number,
+    product,
 )
 from hybrid.traced import WHERE
 
@@ -69,7 +70,7 @@ DEGREE = number(np.pi / 180.0)
 RULES: dict[str, Callable[..., sympy.Expr]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
-    "multiply": lambda a, b: a * b,
+    "multiply": product,
     "divide": lambda a, b: a / b,
     "floor_divide": lambda a, b: Floor(a / b),
     "remainder": Remainder,

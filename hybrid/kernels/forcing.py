@@ -35,7 +35,7 @@ from hybrid.kernels.codes import (
 )
 from hybrid.kernels.guards import has_program
 from hybrid.kernels.layout import EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RUN, WORK
-from hybrid.kernels.step import rates
+from hybrid.kernels.step import rates_by_jacobian
 
 # What a piece of a step may be found to be.
 EXPLAINED, UNKNOWN, HIDDEN = range(3)
@@ -352,13 +352,13 @@ def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
         if clock >= 0:
             t, pace = _value_and_slope(series, clock, order, s)
             t += start
-        rates(model, mode, t, work.trial, tangents, field)
+        rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, field)
         for i in range(length):
             other[i] = field[i]
         if noisy:
             for i in range(length):
                 work.trial[i] *= 1.0 + (ROUNDING if (i + 1) // 2 % 2 == 0 else -ROUNDING)
-            rates(model, mode, t, work.trial, tangents, other)
+            rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, other)
         for i in range(length):
             gap, noise = abs(pace * field[i] - work.new[i]), abs(pace * (other[i] - field[i]))
             if not gap <= noise:

@@ -55,7 +55,7 @@ from hybrid.kernels.series_guards import (
     time_of,
     to_bernstein,
 )
-from hybrid.kernels.step import rates
+from hybrid.kernels.step import rates_by_jacobian
 
 # Series that can be trusted to the last digit are cut off below rounding.
 EXACT_TOLERANCE = 1e-17
@@ -214,7 +214,7 @@ def reach_guard(model, run, tangents, transition, t, longest, work):
     where more than ``longest`` would be needed.
     """
     field = work.stages[0]
-    rates(model, run.count[MODE], t, run.y, tangents, field)
+    rates_by_jacobian(model, run.count[MODE], t, run.y, tangents, work.jacobian, field)
     speed = guard_speed(model, transition, t, run.y, field, work.gradient)
     if speed == 0.0:
         return 0.0

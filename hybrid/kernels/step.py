@@ -34,6 +34,24 @@ def rates(model, mode, t, y, tangents, out):
         model.variational_flow(mode, t, y, model.parameters, out)
 
 
+@njit(**KERNEL)
+def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
+    """The same, without the divergence, by the Jacobian ``(n, n + 1)``, which is left in ``jacobian``.
+
+    Runs by series have no variational flow: it is compiled for explicit and implicit methods alone.
+    """
+    n = model.dimension
+    model.flow(mode, t, y, model.parameters, out)
+    if tangents > 0:
+        model.flow_jacobian(mode, t, y, model.parameters, jacobian)
+    for first in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            rate = 0.0
+            for j in range(n):
+                rate += jacobian[i, j] * y[first + j]
+            out[first + i] = rate
+
+
 @njit(void(MODEL, int64, float64, VECTOR, VECTOR), **ENTRY)
 def field(model, mode, t, x, out):
     """``f`` into ``out (n,)``."""

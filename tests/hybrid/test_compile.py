@@ -1,4 +1,4 @@
-"""From a model to six roles and a graph of indices."""
+"""From a model to machine code and a graph of indices."""
 
 import attrs
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
-from hybrid.compiler import ROLES
+from hybrid.compiler import PARTS, POINT, SERIES, TANGENT_SERIES, VARIATIONAL
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
 
@@ -18,13 +18,13 @@ def test_once_for_all_calls():
 def test_models_alike_share_their_code():
     one, other = compile_system(bouncing_ball()), compile_system(bouncing_ball())
     assert one is not other
-    assert one.roles is other.roles
+    assert one.functions(POINT) is other.functions(POINT)
 
 
 def test_parameters_do_not_compile_anew():
     compiled = compile_system(bouncing_ball())
     moon = attrs.evolve(compiled.system, parameters={"g": 1.62, "e": 0.8})
-    assert compile_system(moon).roles is compiled.roles
+    assert compile_system(moon).functions(POINT) is compiled.functions(POINT)
     np.testing.assert_array_equal(compiled.model({"g": 1.62}).parameters, [1.62, 0.8])
 
 
@@ -69,7 +69,7 @@ def test_graph_as_indices():
 def test_roles_are_the_model_functions():
     system = impact_oscillator()
     compiled = compile_system(system)
-    assert len(compiled.roles) == len(ROLES)
+    assert set(compiled.functions(POINT)) == set(PARTS[POINT])
     t, x, p = 0.7, np.array([0.3, -0.5]), compiled.model().parameters
     out = np.empty(2)
     from hybrid.load import load_kernels
@@ -83,6 +83,23 @@ def test_roles_are_the_model_functions():
     flow_jacobian(compiled.model(), 0, t, x, jacobian)
     np.testing.assert_allclose(jacobian, [[0.0, 1.0, 0.0], [-1.0, -0.1, -np.sin(0.7)]])
     assert len(p) == 6
+
+
+def test_a_run_compiles_only_what_it_needs():
+    system = impact_oscillator()
+    parts = compile_system(system).parts
+    assert set(parts) == {POINT}
+    start, span = (0.3, -0.5), (0.0, 5.0)
+    alone = hybrid.simulate(system, start, span)
+    assert set(parts) == {POINT, SERIES}
+    carried = hybrid.simulate(system, start, span, tangent=True)
+    assert set(parts) == {POINT, SERIES, TANGENT_SERIES}
+    hybrid.simulate(system, start, span, solver=hybrid.DOP853())
+    assert VARIATIONAL not in parts
+    other = hybrid.simulate(system, start, span, solver=hybrid.DOP853(), tangent=True)
+    assert set(parts) == set(PARTS)
+    np.testing.assert_allclose(carried.x[-1], alone.x[-1], rtol=1e-12)
+    np.testing.assert_allclose(other.fundamental, carried.fundamental, rtol=1e-6)
 
 
 def test_no_system():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hybrid.compile import compile_system
-from hybrid.compiler import ROLES as ALL_ROLES
-from hybrid.compiler.functions import functions_of
+from hybrid.compiler import PARTS, POINT
+from hybrid.compiler.functions import functions_of, own_functions
 from hybrid.derivative import sample_points
 from hybrid.emit import emit
 from hybrid.errors import ModelError
@@ -18,19 +18,17 @@ from hybrid.roles import field_role, guard_role, reset_role
 from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
 from tests.hybrid.text import called
 
-ROLES = ("flow", "flow_jacobian", "guard", "guard_gradient", "reset", "reset_jacobian")
-
 
 def load(emitted, *, compiled):
     """The six roles as functions."""
     if compiled:
-        everything = dict(zip(ALL_ROLES, map(called, functions_of(emitted)), strict=True))
-        return {name: everything[name] for name in ROLES}
+        functions = functions_of(emitted, POINT, own_functions(emitted))
+        return {name: called(function) for name, function in functions.items()}
     scope = {}
     for name, own in emitted.opaque.items():
         scope |= {name: in_python(own), f"{name}_slopes": slopes_in_python(own)}
-    exec(emitted.source, scope)
-    return {name: scope[name] for name in ROLES}
+    exec(emitted.texts[POINT], scope)
+    return {name: scope[name] for name in PARTS[POINT]}
 
 
 def in_python(own):
@@ -245,10 +243,10 @@ def test_division_by_zero_follows_ieee():
 
 
 def test_half_powers_are_roots_and_whole_powers_products():
-    source = emit(hertz()).source
+    source = emit(hertz()).texts[POINT]
     assert "sqrt(" in source
     assert "**1.5" not in source
-    assert "**" not in emit(mode_system(lambda t, x, p: (x.q**5, x.v**-1.5 + x.q**2.0))).source
+    assert "**" not in emit(mode_system(lambda t, x, p: (x.q**5, x.v**-1.5 + x.q**2.0))).texts[POINT]
 
 
 def test_what_is_proved():
@@ -270,7 +268,7 @@ def test_a_constant_slope_between_jumps_is_not_affine():
 SEEDED = """
 from test_emit import chain, two_modes, opaque
 from hybrid.emit import emit
-print(emit(chain()).source, emit(two_modes()).source, emit(opaque()).source)
+print(emit(chain()).texts, emit(two_modes()).texts, emit(opaque()).texts)
 """
 
 
@@ -285,9 +283,8 @@ def test_the_text_is_the_same_in_every_process():
         )
         texts.add(done.stdout)
     assert len(texts) == 1
-    assert (
-        texts.pop().strip() == " ".join(emit(model()).source for model in (chain, two_modes, opaque)).strip()
-    )
+    here = " ".join(str(emit(model()).texts) for model in (chain, two_modes, opaque))
+    assert texts.pop().strip() == here
 
 
 def branching(t, x, p):
@@ -403,4 +400,7 @@ def test_columns_of_tangent_vectors_come_in_fours(tangents, groups):
     system = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -(x.q**3)))])
     compiled = compile_system(system)
     [mode] = compiled.emitted.propagators
-    assert compiled.series_columns(tangents) == compiled.emitted.tangent_start + groups * mode.tangent_columns
+    assert (
+        compiled.series_columns(tangents)
+        == compiled.emitted.tangent_start + groups * mode.series.tangent_columns
+    )

@@ -6,6 +6,7 @@ import pytest
 import sympy
 
 from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid.compiler import PARTS, SERIES, TANGENT_SERIES
 from hybrid.constants import Constants
 from hybrid.emit import emit
 from hybrid.kernels.codes import DESINGULARISED, EXACT, NARROW, RUNGE_KUTTA, TAYLOR
@@ -61,14 +62,16 @@ def series_of(system, x, *, t=0.0, mode=0, tangents=0, vectors=None, parameters=
     """
     scope = {}
     emitted = emit(system)
-    exec(emitted.source, scope)
     n = system.dimension
     vectors = np.eye(n)[:tangents] if vectors is None else vectors
     tangents = len(vectors)
+    part = TANGENT_SERIES if tangents else SERIES
+    exec(emitted.texts[part], scope)
+    [name] = PARTS[part]
     y = np.concatenate([x, *vectors])
     out = np.full((ORDER + 3, 400), np.nan)
-    scope["series"](mode, t, y, np.array(parameters), ORDER, out)
-    start, stride = emitted.tangent_start, emitted.propagators[mode].tangent_columns
+    scope[name](mode, t, y, np.array(parameters), ORDER, out)
+    start, stride = emitted.tangent_start, emitted.propagators[mode].series.tangent_columns
     columns = [start + i // NARROW * stride + NARROW * np.arange(n) + i % NARROW for i in range(tangents)]
     return out[: ORDER + 1, :start], [out[: ORDER + 1, each] for each in columns]
 
@@ -287,7 +290,7 @@ def test_the_reason_is_told():
 
 def test_a_linear_mode_has_a_table_and_what_only_looks_linear_has_none():
     def tables(field):
-        return [each.table_columns for each in emit(system_of(field)).propagators]
+        return [each.series.table_columns for each in emit(system_of(field)).propagators]
 
     assert tables(lambda t, x, p: (x.y, np.cos(3 * t) - x.x)) == [4 * 8]
     assert tables(lambda t, x, p: (x.y, t * np.cos(3 * t) - x.x)) == [0]
@@ -325,7 +328,7 @@ def test_a_table_and_recurrences_agree():
     wall = Transition("a", "a", Guard(lambda t, x, p: x.x - 2, +1), name="wall")
     ramp = Transition("a", "a", Guard(lambda t, x, p: x.x - t, +1), name="ramp")
     fast, slow = system_of(field, wall), system_of(field, wall, ramp)
-    assert [emit(each).propagators[0].table_columns > 0 for each in (fast, slow)] == [True, False]
+    assert [emit(each).propagators[0].series.table_columns > 0 for each in (fast, slow)] == [True, False]
     out, vectors = series_of(fast, [0.5, -1.0], t=0.7, tangents=2)
     expected, others = series_of(slow, [0.5, -1.0], t=0.7, tangents=2)
     np.testing.assert_allclose(out[:, :3], expected[:, :3], rtol=1e-13, atol=1e-15)
