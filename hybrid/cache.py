@@ -125,16 +125,18 @@ def compiled_into(folder: Path) -> Iterator[None]:
     """
     from numba import config
 
+    from hybrid.kernels.compiler import INTO_FOLDER
     from hybrid.machine_code import checked_contents
 
     with _LOCK:
-        before = vars(config)["CACHE_DIR"]
+        before, outside = vars(config)["CACHE_DIR"], INTO_FOLDER.set(True)
         vars(config)["CACHE_DIR"] = str(folder)
         try:
             with checked_contents():
                 yield
         finally:
             vars(config)["CACHE_DIR"] = before
+            INTO_FOLDER.reset(outside)
 
 
 def say(message: str) -> None:

@@ -13,7 +13,7 @@ from hybrid.kernels.codes import CYCLE, PHASE, PHASE_LOW, SINCE_ENTRY
 from hybrid.kernels.layout import INLINE, KERNEL
 
 # What a sum loses is found by sums in the order in which they are written.
-IN_ORDER = {**KERNEL, "fastmath": False}
+IN_ORDER = KERNEL | {"fastmath": False}
 
 
 @njit(**IN_ORDER)

@@ -5,6 +5,9 @@ callers and optimises it there again. Nobody calls the machine code of a part, a
 caller need not be before, with few exceptions: both together are a third of the time that all kernels take.
 """
 
+from collections.abc import Mapping
+from contextvars import ContextVar
+
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
@@ -13,6 +16,34 @@ from numba.core.typed_passes import NativeLowering
 # What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out a few
 # parts in a hundred faster.
 THOROUGHLY = tuple(f"hybrid.kernels.{name}" for name in ("series", "series_guards", "tangent"))
+
+
+# Whether what is compiled now goes into a folder that is named after all sources of the kernels.
+INTO_FOLDER = ContextVar("INTO_FOLDER", default=False)
+
+
+class Options(Mapping):
+    """Keywords for ``njit``; a kernel is kept on disk only if ``INTO_FOLDER`` says so as it is decorated.
+
+    Numba would keep it beside its own file and take it from there again after another file has changed whose
+    functions are part of it.
+    """
+
+    def __init__(self, options):
+        self.options = options
+
+    def __getitem__(self, name):
+        option = self.options[name]
+        return option and INTO_FOLDER.get() if name == "cache" else option
+
+    def __iter__(self):
+        return iter(self.options)
+
+    def __len__(self):
+        return len(self.options)
+
+    def __or__(self, other):
+        return Options({**self.options, **other})
 
 
 class _NoEnvironment:

@@ -6,7 +6,7 @@ one after the other, so that each of them is contiguous. ``n`` is the dimension,
 
 from numba import boolean, float64, int64, types, void
 
-from hybrid.kernels.compiler import PartCompiler
+from hybrid.kernels.compiler import Options, PartCompiler
 from hybrid.kernels.structure import Structure
 
 EPSILON = 2.220446049250313e-16
@@ -304,7 +304,7 @@ ADVANCE = types.FunctionType(
 # How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning in
 # comparisons (``math.isfinite`` takes the difference of a number and itself, which may be taken for zero).
 # Kernels allocate nothing and own nothing, so no references are counted.
-_MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False}
+_MATHEMATICS = Options({"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False})
 # Called from Python, and kept on disk: these state their signatures.
 ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}
 # Handed to the driver as a first-class function.

@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import pytest
 
 import hybrid
@@ -303,3 +304,21 @@ def test_damaged_kernels_are_compiled_again(tmp_path):
         said = [line for line in done.stderr.splitlines() if "compiling" not in line]
         assert len(said) == lines
         assert all("is damaged and is made again" in line for line in said)
+
+
+def test_kernels_are_kept_by_the_loader_alone(tmp_path):
+    """Beside its own file a kernel would outlive an edit of the others that are part of it."""
+    load_kernels()
+    from hybrid.kernels.layout import ENTRY, KERNEL, PART
+
+    assert not dict(**ENTRY)["cache"]
+    assert not (PART | {"cache": True})["cache"]
+    assert "cache" not in KERNEL
+    with compiled_into(tmp_path):
+        assert dict(**PART)["cache"]
+        assert not (ENTRY | {"cache": False})["cache"]
+    assert not dict(**PART)["cache"]
+    # The loader comes too late for what has been imported past it.
+    kernel = numba.njit(numba.float64(numba.float64), **ENTRY)(lambda u: u + 1.0)
+    assert kernel(1.0) == 2.0
+    assert kernel._cache.cache_path is None

@@ -10,7 +10,9 @@ from hybrid.run import start
 
 load_kernels()
 from hybrid.kernels.layout import METHOD, MODEL, VECTOR, WORK  # noqa: E402
-from hybrid.kernels.radau import NOT_SOLVED, attempt_radau  # noqa: E402
+
+radau = load_kernels("hybrid.kernels.radau")
+NOT_SOLVED, attempt_radau = radau.NOT_SOLVED, radau.attempt_radau
 
 # Newton's iteration to rounding; fixed steps ignore the error ratio.
 TIGHT = hybrid.RadauIIA(rtol=1e-13, atol=1e-14)
