@@ -12,6 +12,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("hybrid", "models", "lyapunov")
 KERNELS_MAY_IMPORT = (
     "__future__",
+    "collections",
+    "contextvars",
     "ctypes",
     "hybrid.kernels",
     "llvmlite",
