@@ -85,10 +85,8 @@ class Builder(ir.IRBuilder):
         text = f"store {_text(value.type)} {_reference(value)}, {_text(ptr.type)} {_reference(ptr)}"
         return self._added(Line(ir.VoidType(), "", text if align is None else f"{text}, align {align}"))
 
-    def gep(self, ptr: Any, indices: Sequence[Any], *arguments: Any, **options: Any) -> Any:
-        """The address so many entries further."""
-        if len(indices) > 1 or arguments or options:
-            return super().gep(ptr, indices, *arguments, **options)
+    def gep(self, ptr: Any, indices: Sequence[Any]) -> Any:
+        """The address so many entries further; ``indices`` has one entry."""
         [index] = indices
         entry, place = _text(ptr.type.pointee), f"{_text(index.type)} {_reference(index)}"
         return self.written(ptr.type, f"getelementptr {entry}, {_text(ptr.type)} {_reference(ptr)}, {place}")

@@ -68,6 +68,12 @@ def test_functions_of_mathematics(name):
     np.testing.assert_allclose(*found, rtol=4e-16)
 
 
+@pytest.mark.parametrize("call", ["sin(n)", "atan2(n, 3)", "abs(-n)", "max(1, n)", "np.floor(n)"])
+def test_whole_numbers_are_numbers_to_functions(call):
+    found = results(["n = 2", f"out[0] = {call} + n"])
+    np.testing.assert_allclose(*found, rtol=4e-16)
+
+
 def test_a_comparison_with_nan_is_false():
     lines = [
         "u = x[0]",
