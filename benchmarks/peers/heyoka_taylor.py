@@ -1,14 +1,15 @@
 """heyoka: Taylor series with terminal events, an integrator a mode, the state handed from one to the next.
 
 A Hertz force has no Taylor series where the contact begins. So a mode with a half-integer power of a gap
-``z`` is written on the clock ``dt = 2 w ds`` with ``w = sqrt(z)`` and carries ``w`` and the time along, which
-makes it smooth; without that heyoka does not start.
+``z`` is written on the clock ``dt = w ds`` with ``w = sqrt(z)`` and carries ``w`` and the time along, which
+makes it smooth; without that heyoka does not start. Each event costs it time: only a stay that the end of the
+run cuts short is integrated again, with the end as an event.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import heyoka as hy
@@ -24,8 +25,8 @@ DIRECTIONS = {
     1: hy.event_direction.positive,
 }
 W, END = sympy.symbols("w t_end")
-# Longer than any stay in a mode on its own clock.
-FOREVER = 1e9
+# Longer than any stay in a mode on its own clock, and more steps than one takes.
+FOREVER, MOST_STEPS = 1e9, 10_000
 
 
 def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
@@ -71,30 +72,44 @@ class _Stay:
             # Not w**3: the series of a power divides by its base, which is zero at the start.
             smooth = [e.subs(sympy.Max(0, gap) ** sympy.Rational(3, 2), W * gap) for e in field]
             rate = sum(gap.diff(s) * e for s, e in zip(given.x, smooth, strict=True))
-            field = (*(2 * W * e for e in smooth), rate, 2 * W)
+            field = (*(W * e for e in smooth), rate / 2, W)
             names, start = [*names, "w", "t"], np.zeros(n + 2)
-            guards = [(W, exits[0].direction), (given.t - END, 1)]
+            guards = [(W, exits[0].direction)]
         else:
             guards = [(leave.guard, leave.direction) for leave in exits]
         convert = functools.partial(_converted, symbols=symbols)
-        self.integrator = hy.taylor_adaptive(
-            [(hy.make_vars(name), convert(e)) for name, e in zip(names, field, strict=True)],
-            start,
-            tol=rtol,
-            t_events=[hy.t_event(convert(guard), direction=DIRECTIONS[d]) for guard, d in guards],
-        )
+
+        def integrator(guards: Sequence[tuple[sympy.Expr, int]]) -> Any:
+            return hy.taylor_adaptive(
+                [(hy.make_vars(name), convert(e)) for name, e in zip(names, field, strict=True)],
+                start,
+                tol=rtol,
+                t_events=[hy.t_event(convert(guard), direction=DIRECTIONS[d]) for guard, d in guards],
+            )
+
+        self.integrator = integrator(guards)
+        self.to_the_end = integrator([*guards, (given.t - END, 1)]) if self.clocked else None
 
     def run(self, t: float, x: np.ndarray, end: float) -> tuple[float, np.ndarray, int | None, int]:
         """Time and state where the mode is left, the exit or None at the end of the run, steps."""
-        ta = self.integrator
+        if not self.clocked:
+            return self._advanced(self.integrator, t, x, end)
+        stay = self._advanced(self.integrator, t, x, FOREVER)
+        if stay[0] <= end and stay[2] is not None:
+            return stay
+        return self._advanced(self.to_the_end, t, x, FOREVER)
+
+    def _advanced(
+        self, ta: Any, t: float, x: np.ndarray, end: float
+    ) -> tuple[float, np.ndarray, int | None, int]:
         ta.reset_cooldowns()
         ta.state[: self.n] = x
         if self.clocked:
             ta.state[self.n :] = 0.0, t
         ta.time = 0.0 if self.clocked else t
-        outcome, _, _, steps, *_ = ta.propagate_until(FOREVER if self.clocked else end)
+        outcome, _, _, steps, *_ = ta.propagate_until(end, max_steps=MOST_STEPS if self.clocked else 0)
         event = -int(outcome) - 1
-        if outcome == hy.taylor_outcome.time_limit:
+        if outcome in (hy.taylor_outcome.time_limit, hy.taylor_outcome.step_limit):
             event = self.exits
         elif not 0 <= event <= self.exits:
             raise RuntimeError(f"heyoka ended with {outcome}")
