@@ -42,6 +42,7 @@ MOST_TESTS = 4
 # Where names and imports do not lead to the tests of a file.
 NEAREST = {
     "hybrid/accuracy.py": ("test_accuracy.py", "test_work_precision.py"),
+    "hybrid/emitted.py": ("test_pulses.py", "test_proved_crossings.py", "test_compile.py"),
     "hybrid/ending.py": ("test_simulate.py", "test_tangent_status.py", "test_grazing.py", "test_instant.py"),
     "hybrid/factors.py": ("test_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/first_mode.py": ("test_simulate.py", "test_instant.py"),

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import attrs
 import numpy as np
 import pytest
 import sympy
@@ -352,7 +353,13 @@ def test_a_run_does_not_crawl_where_bounds_say_nothing(solver):
 
 
 def test_what_the_compiled_system_says():
-    assert "its forcing is bounded on each step" in repr(compile_system(oscillator("gauss")))
+    bounded = "its forcing is bounded on each step"
+    assert bounded in repr(compile_system(oscillator("gauss")))
+    # Programs of guards come before those of forcings; an affine guard has none.
+    for value in (lambda t, x, p: x.x - 2.0, lambda t, x, p: np.tanh(x.x) - 2.0):
+        marks = [Transition("swing", "swing", Guard(value, +1), name=name) for name in ("one", "other")]
+        system = attrs.evolve(oscillator("gauss"), transitions=marks)
+        assert bounded in repr(compile_system(system))
     plain = HybridSystem(
         state=("x",),
         modes=[Mode("lag", lambda t, x, p: (-x.x + np.cos(t) + t**2 + np.exp(-t) * np.sin(3 * t),))],
