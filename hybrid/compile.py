@@ -231,6 +231,8 @@ class CompiledSystem:
             **_program_runners(bool(self.emitted.programs.rows)),
             first_forcing=_indices(self.emitted.first_forcing),
             forcing_component=_indices(self.emitted.forcing_component),
+            first_residue=_indices(self.emitted.first_residue),
+            residue_component=_indices(self.emitted.residue_component),
             surface=_indices(self.emitted.surface),
             orientation=_indices(self.emitted.orientation),
             paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),

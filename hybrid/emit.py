@@ -30,6 +30,7 @@ from hybrid.printer import IMPORTS, assignments, unprintable
 from hybrid.probe import derivative_has_time_column
 from hybrid.program import programs
 from hybrid.propagator import Boundary, known_positive, propagator
+from hybrid.residues import residue_of_guard, residues
 from hybrid.roles import Role, condition_role, field_role, guard_role, reset_role
 from hybrid.series_loops import padded
 from hybrid.signs import simplified
@@ -94,6 +95,11 @@ def _emitted(system: HybridSystem) -> Emitted:
     surface, orientation = surfaces([transition.guard.function for transition in system.transitions], traced)
     pulses = [forcings(field.expressions, symbols) for field in fields]
     forcing = [each for of_mode in pulses for each in of_mode]
+    residual = [
+        residues(field.expressions, _gradients(system, mode.name, guards), symbols)
+        for field, mode in zip(fields, system.modes, strict=True)
+    ]
+    cancelling = [each for of_mode in residual for each in of_mode]
     not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
     return Emitted(
         texts={
@@ -103,9 +109,16 @@ def _emitted(system: HybridSystem) -> Emitted:
         opaque=writer.opaque,
         affine_guard=affine,
         guard_in_series=_guards_in_series(system, propagators),
-        programs=programs(not_affine, [each.expression for each in forcing], symbols),
+        programs=programs(
+            not_affine,
+            [each.expression for each in forcing],
+            [*(each.expression for each in cancelling), *(residue_of_guard(g, symbols) for g in traced)],
+            symbols,
+        ),
         first_forcing=tuple(accumulate(map(len, pulses), initial=0)),
         forcing_component=tuple(each.component for each in forcing),
+        first_residue=tuple(accumulate(map(len, residual), initial=0)),
+        residue_component=tuple(each.component for each in cancelling),
         traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,
@@ -295,6 +308,15 @@ def _boundaries(
         for transition, written in zip(system.transitions, guards, strict=True)
         if transition.source == mode and not transition.guard.at_start
     ]
+
+
+def _gradients(
+    system: HybridSystem, mode: str, guards: Sequence[_Written]
+) -> list[Sequence[sympy.Expr] | None]:
+    """The gradients of the guards in a mode; None for one that is not traced."""
+    pairs = zip(system.transitions, guards, strict=True)
+    written = [guard for transition, guard in pairs if transition.source == mode]
+    return [None if guard.jacobian is None or guard.given else guard.jacobian[0] for guard in written]
 
 
 def _where_it_jumps(

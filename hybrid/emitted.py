@@ -63,7 +63,7 @@ class Propagator:
 
 @attrs.frozen
 class Programs:
-    """The programs of all guards of a system, one after the other, and behind them those of its forcings.
+    """The programs of all guards of a system, behind them those of its forcings, and of its residues.
 
     Attributes
     ----------
@@ -75,8 +75,9 @@ class Programs:
     numbers
         The numbers that the operations refer to.
     first
-        By transition, then by forcing: the first of its rows, and behind them the number of all rows. A guard
-        without rows is affine, or could not be traced.
+        By transition, then by forcing, then by residue, then by transition for the residues of guards: the
+        first of its rows, and behind them the number of all rows. A guard without rows is affine, or could
+        not be traced.
     """
 
     rows: tuple[tuple[int, int, int, int], ...]
@@ -113,6 +114,11 @@ class Emitted:
         By mode: the first of its forcings, and behind them the number of all.
     forcing_component
         By forcing: the component of the state whose rate it is a term of, or -1.
+    first_residue
+        By mode: the first of its residues, which are rates that may cancel to their rounding, and behind them
+        the number of all.
+    residue_component
+        By residue: the component of the state whose rate it is.
     traced_field
         By mode: whether tracing could follow the field.
     affine_mode
@@ -141,6 +147,8 @@ class Emitted:
     programs: Programs
     first_forcing: tuple[int, ...]
     forcing_component: tuple[int, ...]
+    first_residue: tuple[int, ...]
+    residue_component: tuple[int, ...]
     traced_field: tuple[bool, ...]
     surface: tuple[int, ...]
     orientation: tuple[int, ...]

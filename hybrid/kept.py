@@ -166,8 +166,9 @@ def _read(path: Path) -> Emitted | None:
     try:
         found: dict[str, Any] = json.loads(text)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        of_modes = ("affine_mode", "autonomous", "discontinuities", "first_forcing", "traced_field")
-        for name in (*of_transitions, *of_modes, "timed_guard", "forcing_component"):
+        of_modes = ("affine_mode", "autonomous", "discontinuities", "traced_field")
+        parts = ("first_forcing", "forcing_component", "first_residue", "residue_component")
+        for name in (*of_transitions, *of_modes, "timed_guard", *parts):
             found[name] = tuple(found[name])
         names = ("rows", "checked", "numbers", "first")
         rows, checked, numbers, first = (found["programs"][name] for name in names)

@@ -65,9 +65,12 @@ class NoProgram(Exception):
 
 
 def programs(
-    guards: Sequence[sympy.Expr | None], forcings: Sequence[sympy.Expr], symbols: Symbols
+    guards: Sequence[sympy.Expr | None],
+    forcings: Sequence[sympy.Expr],
+    residues: Sequence[sympy.Expr | None],
+    symbols: Symbols,
 ) -> Programs:
-    """Programs of the guards' expressions and, behind them, of the forcings.
+    """Programs of the guards' expressions and, behind them, of the forcings and of the residues.
 
     None has no rows, and neither has an expression without interval arithmetic.
     """
@@ -75,12 +78,13 @@ def programs(
     checked: list[int] = []
     numbers: dict[float, int] = {}
     first = [0]
-    for place, expression in enumerate([*guards, *forcings]):
+    pulses = range(len(guards), len(guards) + len(forcings))
+    for place, expression in enumerate([*guards, *forcings, *residues]):
         if expression is not None:
             writer = _Writer(symbols, numbers)
             with suppress(NoProgram):
                 rows += writer.written(expression)
-                checked += writer.checked() if place >= len(guards) else [0] * len(writer.rows)
+                checked += writer.checked() if place in pulses else [0] * len(writer.rows)
         first.append(len(rows))
     return Programs(tuple(rows), tuple(checked), tuple(numbers), tuple(first))
 

@@ -1,5 +1,7 @@
 """Guards at a point: their value, their speed and acceleration, and what rounding can do to them."""
 
+import math
+
 from numba import njit
 
 from hybrid.kernels.bernstein import lowest
@@ -67,7 +69,7 @@ def rounding_band(model, run, transition, t, x, work):
         share = ROUNDING_OF_STATE * EPSILON
         band = abs(model.spread(model.programs, transition, t, x, run.scale, share, work.registers))
         return band if band >= 0.0 else 0.0
-    return smooth_band(model, run, t, work)
+    return smooth_band(model, run, transition, t, x, work)
 
 
 @njit(**KERNEL)
@@ -92,13 +94,24 @@ def was_left_behind(model, run, transition, t, x, speed, side, work):
 
 
 @njit(**INLINE)
-def smooth_band(model, run, t, work):
-    """``rounding_band`` from the gradient alone, which is ``work.gradient``."""
+def smooth_band(model, run, transition, t, x, work):
+    """``rounding_band`` from the gradient, which is ``work.gradient``, and from terms that may cancel."""
     n = model.dimension
     size = abs(work.gradient[n] * t)
     for i in range(n):
         size += abs(work.gradient[i]) * run.scale[i]
-    return ROUNDING_OF_STATE * EPSILON * size
+    program = transition + model.target.shape[0] + model.first_forcing[-1] + model.first_residue[-1]
+    return ROUNDING_OF_STATE * EPSILON * size + _spread_of_terms(model, run, program, t, x, work)
+
+
+@njit(**KERNEL)
+def _spread_of_terms(model, run, program, t, x, work):
+    """How far rounding can leave terms from their value; 0 if they have no program, or where they jump."""
+    if not has_program(model, program):
+        return 0.0
+    share = ROUNDING_OF_STATE * EPSILON
+    spread = model.spread(model.programs, program, t, x, run.scale, share, work.registers)
+    return spread if 0.0 < spread < math.inf else 0.0
 
 
 @njit(**KERNEL)
@@ -145,7 +158,19 @@ def speed_rounding(model, run, mode, t, work):
         for j in range(n):
             spread += abs(work.jacobian[i, j]) * run.scale[j]
         size += abs(work.gradient[i]) * spread
-    return 16 * EPSILON * size
+    return ROUNDING_OF_STATE * EPSILON * size + _rounding_of_residues(model, run, mode, t, work)
+
+
+@njit(**KERNEL)
+def _rounding_of_residues(model, run, mode, t, work):
+    """What rounding of terms in time and parameters alone does to the speed of the guard."""
+    size = 0.0
+    first = model.target.shape[0] + model.first_forcing[-1]
+    for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
+        slope = abs(work.gradient[model.residue_component[residue]])
+        if slope > 0.0:
+            size += slope * _spread_of_terms(model, run, first + residue, t, run.y, work)
+    return size
 
 
 @njit(**KERNEL)

@@ -26,8 +26,8 @@ class Programs(Structure):
     """The expressions of guards and forcings as operations (see ``operations``), with their parameters.
 
     ``rows[first[i]:first[i + 1]]`` is the program of transition ``i``, empty for a guard that is affine or
-    that could not be traced; those of the forcings follow. ``checked`` is 1 for the rows of a forcing that
-    could hide a pulse; ``numbers`` are the constants in the programs.
+    that could not be traced; those of the forcings and of the residues follow. ``checked`` is 1 for the rows
+    of a forcing that could hide a pulse; ``numbers`` are the constants in the programs.
     """
 
     rows: INDEX_MATRIX
@@ -60,7 +60,10 @@ class Model(Structure):
     surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0.
     ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of all transitions;
-    ``forcing_component`` is the component of the state whose rate a forcing is a term of, or -1.
+    ``forcing_component`` is the component of the state whose rate a forcing is a term of, or -1. Residues are
+    rates that may cancel to their rounding: ``first_residue[m]`` is the first of mode ``m``, their programs
+    are behind those of all forcings, and ``residue_component`` is the component that one is the rate of. The
+    residues of guards, those of their terms that may cancel so, have programs behind them.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
@@ -89,6 +92,8 @@ class Model(Structure):
     spread: SPREAD
     first_forcing: INDICES
     forcing_component: INDICES
+    first_residue: INDICES
+    residue_component: INDICES
     surface: INDICES
     orientation: INDICES
     paired: INDICES

@@ -61,7 +61,9 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     trend, order = value, 0
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
-        if has_program(model, transition) and abs(value) > SMOOTH * smooth_band(model, run, t, work):
+        if has_program(model, transition) and abs(value) > SMOOTH * smooth_band(
+            model, run, transition, t, x, work
+        ):
             if was_on and before != 0:
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
