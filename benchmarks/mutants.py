@@ -51,6 +51,7 @@ NEAREST = {
     "hybrid/program.py": ("test_proved_crossings.py", "test_crossings.py"),
     "hybrid/propagator.py": ("test_series.py", "test_emit.py", "test_simulate.py"),
     "hybrid/run.py": ("test_run.py", "test_simulate.py", "test_arguments.py"),
+    "hybrid/series_loops.py": ("test_series.py",),
     "hybrid/status.py": ("test_simulate.py", "test_tangent_status.py"),
     "hybrid/whole.py": ("test_periodicity.py", "test_arguments.py"),
     "hybrid/kernels/bounds.py": ("test_proved_crossings.py", "test_crossings.py"),
