@@ -53,6 +53,7 @@ MODELS = {
     "Chua": "models.chua_circuit()",
     "20 states, dense": "dense(20)",
 }
+RUNS = {"with tangent vectors": True, "state alone": False}
 # Numbers of masses in the chain.
 CHAINS = (2, 5, 10, 20, 50)
 # The same chain for heyoka, in the mode that it has for large systems.
@@ -78,6 +79,39 @@ integrator = hy.taylor_adaptive(rates, start, t_events=[wall], compact_mode=True
 integrator.propagate_until(1e-3)
 print(json.dumps(time.perf_counter() - begin))
 """
+# And for diffrax on JAX, whose arrays make the text that XLA compiles no longer for more masses.
+JAX = """
+import os
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+import json, time
+import diffrax, jax, jax.numpy as jnp, optimistix
+jax.config.update("jax_enable_x64", True)
+jax.jit(lambda u: u + 1.0)(jnp.ones(2)).block_until_ready()
+begin = time.perf_counter()
+n = {masses}
+def rates(t, x):
+    q, v = x[:n], x[n:]
+    stretch = jnp.diff(jnp.concatenate([jnp.zeros(1), q]))
+    pull = 2.0 * stretch + 0.5 * stretch**3
+    return jnp.concatenate([v, jnp.append(pull[1:], 0.0) - pull + 0.3 * jnp.cos(1.3 * t)])
+def carried(t, y, args):
+    x, vectors = y
+    if vectors is None:
+        return rates(t, x), None
+    along = jax.vmap(lambda v: jax.jvp(lambda x: rates(t, x), (x,), (v,))[1])
+    return rates(t, x), along(vectors)
+wall = diffrax.Event(
+    lambda t, y, args, **_: y[0][n - 1] - 0.5, optimistix.Newton(1e-8, 1e-8), direction=True
+)
+def run(y):
+    return diffrax.diffeqsolve(
+        diffrax.ODETerm(carried), diffrax.Dopri8(), 0.0, 1e-3, 1e-4, y,
+        stepsize_controller=diffrax.PIDController(rtol=1e-9, atol=1e-11), event=wall, max_steps=4096,
+    ).ys
+start = 0.01 * jnp.arange(1.0, 2 * n + 1)
+jax.block_until_ready(jax.jit(run)((start, jnp.eye(2 * n) if {tangent} else None)))
+print(json.dumps(time.perf_counter() - begin))
+"""
 KERNELS = "from hybrid.__main__ import compile_kernels; compile_kernels(2)"
 # The kernels are loaded by a model that is small and another one.
 PROGRAM = """
@@ -92,23 +126,27 @@ start = 0.05 * np.ones(system.dimension)
 seconds = []
 for _ in range(2):
     begin = time.perf_counter()
-    hybrid.simulate(system, start, (0.0, 1e-3), mode=system.mode_names[0], tangent=True)
+    hybrid.simulate(system, start, (0.0, 1e-3), mode=system.mode_names[0], tangent={tangent})
     seconds.append(time.perf_counter() - begin)
 print(json.dumps(seconds[0] - seconds[1]))
 """
 
 
-def wait(model: str, cache: str) -> float:
+def wait(model: str, cache: str, tangent: bool = True) -> float:
     """Seconds that a model waits in a new process whose kernels are compiled."""
-    program = PROGRAM.format(chain=CHAIN, model=model)
+    program = PROGRAM.format(chain=CHAIN, model=model, tangent=tangent)
     done = fresh_process(program, {"HYBRID_CACHE_DIR": cache})
     return float(json.loads(done.output.splitlines()[-1]))
 
 
-def wait_of_heyoka(masses: int, tangent: bool) -> float:
-    """Seconds from the equations of a chain to the end of the first step."""
-    done = fresh_process(HEYOKA.format(masses=masses, tangent=tangent))
+def wait_of_peer(program: str, masses: int, tangent: bool) -> float:
+    """Seconds from the equations of a chain to the end of the first run."""
+    done = fresh_process(program.format(masses=masses, tangent=tangent))
     return float(json.loads(done.output.splitlines()[-1]))
+
+
+# Colour and marker of each package.
+LOOKS = {"hybrid": ("0.1", "*"), "heyoka": ("tab:orange", "^"), "diffrax on JAX": ("tab:blue", "s")}
 
 
 def picture(waits: Mapping[str, Sequence[float]], path: Path) -> None:
@@ -118,19 +156,18 @@ def picture(waits: Mapping[str, Sequence[float]], path: Path) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    from hybrid.plot import COLOURS
-
     states = [2 * masses for masses in CHAINS]
     with plt.rc_context({"font.size": 9, "axes.linewidth": 0.7}):
         figure, axes = plt.subplots(figsize=(5.6, 3.6))
         for name, seconds in waits.items():
-            ours, dashed = name.startswith("hybrid"), "tangent" not in name
+            package, dashed = name.partition(",")[0], "tangent" not in name
+            colour, marker = LOOKS[package]
             axes.plot(
                 states,
                 seconds,
                 label=name,
-                color="0.1" if ours else COLOURS[1],
-                marker="*" if ours else "^",
+                color=colour,
+                marker=marker,
                 linestyle="--" if dashed else "-",
                 linewidth=1.1,
                 markersize=5,
@@ -165,10 +202,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         fresh_process(KERNELS, {"HYBRID_CACHE_DIR": folder})
         wait("models.bilinear_oscillator()", folder)
         table(["model", "seconds"], [[name, f"{wait(model, folder):.2f}"] for name, model in MODELS.items()])
-        waits = {"hybrid, with tangent vectors": [wait(f"chain({n})", folder) for n in CHAINS]}
-    if find_spec("heyoka") is not None:
-        waits["heyoka, with tangent vectors"] = [wait_of_heyoka(n, True) for n in CHAINS]
-        waits["heyoka, state alone"] = [wait_of_heyoka(n, False) for n in CHAINS]
+        waits = {
+            f"hybrid, {name}": [wait(f"chain({n})", folder, tangent) for n in CHAINS]
+            for name, tangent in RUNS.items()
+        }
+    for peer, module, program in (("heyoka", "heyoka", HEYOKA), ("diffrax on JAX", "diffrax", JAX)):
+        if find_spec(module) is not None:
+            for name, tangent in RUNS.items():
+                waits[f"{peer}, {name}"] = [wait_of_peer(program, n, tangent) for n in CHAINS]
     rows = [[name, *(f"{each:.2f}" for each in seconds)] for name, seconds in waits.items()]
     table(["a chain of", *(f"{2 * n} states" for n in CHAINS)], rows)
     if given.picture is not None:
