@@ -20,7 +20,7 @@ import numpy as np
 
 from hybrid.cache import cache_folder, keep, kept, source_key
 from hybrid.emitted import Emitted, Programs, Propagator, Series
-from hybrid.load import kernels_key
+from hybrid.load import kernels_key, sources_in
 from hybrid.roles import roles
 from hybrid.traced import TraceError, values_of
 
@@ -75,7 +75,7 @@ def models_folder() -> Path:
 
 @cache
 def _compiler() -> str:
-    paths = sorted((Path(__file__).parent / "compiler").glob("*.py"))
+    paths = sources_in(Path(__file__).parent / "compiler")
     return source_key(kernels_key(), *(path.read_text(encoding="utf-8") for path in paths))
 
 
@@ -146,7 +146,10 @@ def _tracer() -> str:
     """What does the tracing: this package and what it stands on."""
     import importlib.metadata
 
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+    package = Path(__file__).parent
+    kernels = package / "kernels"
+    # The folder is named after the kernels.
+    sources = [path for path in sources_in(package) if kernels not in path.parents]
     digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
     versions = [importlib.metadata.version(package) for package in ("sympy", "mpmath")]
     return " ".join([digest, sys.version, np.__version__, *versions])

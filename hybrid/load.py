@@ -77,10 +77,15 @@ def is_kept(module: str) -> bool:
     return any(_folder(module).rglob(f"{module.rpartition('.')[2]}.*.nbi"))
 
 
+def sources_in(folder: Path) -> list[Path]:
+    """All modules in a folder and in the folders in it."""
+    return sorted(folder.rglob("*.py"))
+
+
 @cache
 def kernels_key(module: str = DRIVER) -> str:
     """Key of all sources that go into a module of kernels: ours, and those of the package that it is from."""
-    sources = sorted((Path(__file__).parent / "kernels").glob("*.py"))
+    sources = sources_in(Path(__file__).parent / "kernels")
     if not module.startswith("hybrid."):
         sources += sorted(_own_sources(module))
     return source_key(*(path.read_text(encoding="utf-8") for path in sources))

@@ -322,3 +322,50 @@ def test_kernels_are_kept_by_the_loader_alone(tmp_path):
     kernel = numba.njit(numba.float64(numba.float64), **ENTRY)(lambda u: u + 1.0)
     assert kernel(1.0) == 2.0
     assert kernel._cache.cache_path is None
+
+
+KEYS = """
+from hybrid.kept import _compiler, _tracer
+from hybrid.load import kernels_key
+print(kernels_key(), kernels_key("lyapunov.kernels"), _compiler(), _tracer().split()[0])
+"""
+KERNELS, SPECTRUM, COMPILER, TRACER = range(4)
+
+
+@pytest.mark.parametrize(
+    ("edited", "changed"),
+    [
+        ("hybrid/kernels/linear.py", {KERNELS, SPECTRUM, COMPILER}),
+        ("hybrid/kernels/deeper/new.py", {KERNELS, SPECTRUM, COMPILER}),
+        ("hybrid/compiler/lowering.py", {COMPILER, TRACER}),
+        ("hybrid/compiler/deeper/new.py", {COMPILER, TRACER}),
+        ("hybrid/series.py", {TRACER}),
+        ("hybrid/solvers/deeper/new.py", {TRACER}),
+        ("lyapunov/statistics.py", {SPECTRUM}),
+        ("models/bouncing_ball.py", set()),
+    ],
+)
+def test_an_edit_changes_the_keys_of_what_it_goes_into(sources, edited, changed):
+    def keys():
+        done = subprocess.run(
+            [sys.executable, "-c", KEYS], cwd=sources, capture_output=True, text=True, check=True
+        )
+        return done.stdout.split()
+
+    before = keys()
+    path = sources / edited
+    content = path.read_text() if path.exists() else None
+    path.parent.mkdir(exist_ok=True)
+    path.write_text((content or "") + "# Another version.\n")
+    after = keys()
+    path.unlink() if content is None else path.write_text(content)
+    assert {i for i, (one, other) in enumerate(zip(before, after, strict=True)) if one != other} == changed
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory):
+    """A copy of the packages."""
+    folder = tmp_path_factory.mktemp("sources")
+    for package in ("hybrid", "lyapunov", "models"):
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
