@@ -12,7 +12,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.agreement import check_agreement
 from hybrid.cache import announced
-from hybrid.compiler import POINT, SERIES, TANGENT_SERIES, VARIATIONAL
+from hybrid.compiler import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.errors import ArgumentError
 from hybrid.kept import traced_or_kept
 from hybrid.kernels.codes import NARROW, NO_MODE, RUNGE_KUTTA
@@ -214,7 +214,8 @@ class CompiledSystem:
         first_outgoing, outgoing = _leaving(system, at_start=False)
         first_at_start, at_start = _leaving(system, at_start=True)
         return Model(
-            **self.functions(POINT),
+            **self.functions(FIELDS),
+            **self.functions(EVENTS),
             variational_flow=Absent(),
             series=Absent(),
             parameters=system.parameter_values(),

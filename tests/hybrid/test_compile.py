@@ -6,7 +6,8 @@ import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
-from hybrid.compiler import PARTS, POINT, SERIES, TANGENT_SERIES, VARIATIONAL
+from hybrid.compiler import EVENTS, FIELDS, PARTS, SERIES, TANGENT_SERIES, VARIATIONAL
+from hybrid.section import with_section
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
 
@@ -18,13 +19,14 @@ def test_once_for_all_calls():
 def test_models_alike_share_their_code():
     one, other = compile_system(bouncing_ball()), compile_system(bouncing_ball())
     assert one is not other
-    assert one.functions(POINT) is other.functions(POINT)
+    assert one.functions(FIELDS) is other.functions(FIELDS)
+    assert one.functions(EVENTS) is other.functions(EVENTS)
 
 
 def test_parameters_do_not_compile_anew():
     compiled = compile_system(bouncing_ball())
     moon = attrs.evolve(compiled.system, parameters={"g": 1.62, "e": 0.8})
-    assert compile_system(moon).functions(POINT) is compiled.functions(POINT)
+    assert compile_system(moon).functions(FIELDS) is compiled.functions(FIELDS)
     np.testing.assert_array_equal(compiled.model({"g": 1.62}).parameters, [1.62, 0.8])
 
 
@@ -69,7 +71,7 @@ def test_graph_as_indices():
 def test_roles_are_the_model_functions():
     system = impact_oscillator()
     compiled = compile_system(system)
-    assert set(compiled.functions(POINT)) == set(PARTS[POINT])
+    assert set(compiled.functions(FIELDS)) == set(PARTS[FIELDS])
     t, x, p = 0.7, np.array([0.3, -0.5]), compiled.model().parameters
     out = np.empty(2)
     from hybrid.load import load_kernels
@@ -88,18 +90,27 @@ def test_roles_are_the_model_functions():
 def test_a_run_compiles_only_what_it_needs():
     system = impact_oscillator()
     parts = compile_system(system).parts
-    assert set(parts) == {POINT}
+    needed = {FIELDS, EVENTS}
+    assert set(parts) == needed
     start, span = (0.3, -0.5), (0.0, 5.0)
     alone = hybrid.simulate(system, start, span)
-    assert set(parts) == {POINT, SERIES}
+    assert set(parts) == {*needed, SERIES}
     carried = hybrid.simulate(system, start, span, tangent=True)
-    assert set(parts) == {POINT, SERIES, TANGENT_SERIES}
+    assert set(parts) == {*needed, SERIES, TANGENT_SERIES}
     hybrid.simulate(system, start, span, solver=hybrid.DOP853())
     assert VARIATIONAL not in parts
     other = hybrid.simulate(system, start, span, solver=hybrid.DOP853(), tangent=True)
     assert set(parts) == set(PARTS)
     np.testing.assert_allclose(carried.x[-1], alone.x[-1], rtol=1e-12)
     np.testing.assert_allclose(other.fundamental, carried.fundamental, rtol=1e-6)
+
+
+def test_a_section_shares_the_fields_of_its_system():
+    system = impact_oscillator()
+    compiled = compile_system(system)
+    marked = compile_system(with_section(system, Guard(lambda t, x, p: x.v, -1)))
+    assert marked.functions(FIELDS) is compiled.functions(FIELDS)
+    assert marked.functions(EVENTS) is not compiled.functions(EVENTS)
 
 
 def test_no_system():

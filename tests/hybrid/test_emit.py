@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hybrid.compile import compile_system
-from hybrid.compiler import PARTS, POINT
+from hybrid.compiler import EVENTS, FIELDS, PARTS
 from hybrid.compiler.functions import functions_of, own_functions
 from hybrid.derivative import sample_points
 from hybrid.emit import emit
@@ -22,13 +22,15 @@ from tests.hybrid.text import called
 def load(emitted, *, compiled):
     """The six roles as functions."""
     if compiled:
-        functions = functions_of(emitted, POINT, own_functions(emitted))
+        own = own_functions(emitted)
+        functions = functions_of(emitted, FIELDS, own) | functions_of(emitted, EVENTS, own)
         return {name: called(function) for name, function in functions.items()}
     scope = {}
     for name, own in emitted.opaque.items():
         scope |= {name: in_python(own), f"{name}_slopes": slopes_in_python(own)}
-    exec(emitted.texts[POINT], scope)
-    return {name: scope[name] for name in PARTS[POINT]}
+    exec(emitted.texts[FIELDS], scope)
+    exec(emitted.texts[EVENTS], scope)
+    return {name: scope[name] for name in (*PARTS[FIELDS], *PARTS[EVENTS])}
 
 
 def in_python(own):
@@ -243,10 +245,10 @@ def test_division_by_zero_follows_ieee():
 
 
 def test_half_powers_are_roots_and_whole_powers_products():
-    source = emit(hertz()).texts[POINT]
+    source = emit(hertz()).texts[FIELDS]
     assert "sqrt(" in source
     assert "**1.5" not in source
-    assert "**" not in emit(mode_system(lambda t, x, p: (x.q**5, x.v**-1.5 + x.q**2.0))).texts[POINT]
+    assert "**" not in emit(mode_system(lambda t, x, p: (x.q**5, x.v**-1.5 + x.q**2.0))).texts[FIELDS]
 
 
 def test_what_is_proved():
