@@ -225,6 +225,9 @@ def test_bad_tolerances(solver):
         solver(atol=-1e-9)
     with pytest.raises(hybrid.ArgumentError, match="below what double precision can follow"):
         solver(rtol=1e-16)
+    with pytest.raises(hybrid.ArgumentError, match="allows errors larger than the state"):
+        solver(rtol=1.5)
+    assert (solver(rtol=1e-15).rtol, solver(rtol=1).rtol) == (1e-15, 1.0)
     with pytest.raises(hybrid.ArgumentError, match="max_step must be positive"):
         solver(max_step=0.0)
     with pytest.raises(hybrid.ArgumentError, match="rtol must be positive; got nan"):
