@@ -19,8 +19,8 @@ from scipy.special import comb
 import models
 from benchmarks.common import heading, table
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, Tsit5, simulate
-from hybrid.kernels.bernstein import NO_ROOT, first_crossing, restrict
-from hybrid.run import ISOLATION_DEPTH
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT, first_crossing, restrict
+from hybrid.simulation.memory import ISOLATION_DEPTH
 
 DEGREE = 7
 BATCH = 50_000

@@ -19,8 +19,8 @@ import numpy as np
 import models
 from benchmarks.common import ROOT, heading, table
 from hybrid import DOP853, simulate, stroboscopic_section
-from hybrid.arc import KINDS
 from hybrid.plot import COLOURS
+from hybrid.simulation.arc import KINDS
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from models.one_impact import one_impact_orbits
 

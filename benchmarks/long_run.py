@@ -15,8 +15,8 @@ import numpy as np
 import models
 from benchmarks.common import heading, table
 from hybrid import HybridSystem, Taylor
-from hybrid.kernels import codes
-from hybrid.run import start
+from hybrid.kernels.types import codes
+from hybrid.simulation.trajectory import start
 from hybrid.solvers import RungeKutta
 from models.one_impact import one_impact_orbits
 

@@ -106,7 +106,7 @@ def draw(results: dict[str, WorkPrecision], path: Path) -> None:
     for ax in grid.ravel()[len(results) :]:
         ax.set_axis_off()
     for ax, (title, result) in zip(grid.ravel(), results.items(), strict=False):
-        result.plot(ax, "fundamental" if "fundamental" in result.error else "state")
+        result.plot("fundamental" if "fundamental" in result.error else "state", ax=ax)
         ax.set_title(title, loc="left", fontsize=10)
     figure.savefig(path, dpi=90, metadata={"Software": None})
     plt.close(figure)

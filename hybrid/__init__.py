@@ -4,20 +4,20 @@ A model is a graph: modes are smooth vector fields, transitions are guards and r
 it the import of the compiler, waits for the first call that needs it.
 """
 
-from hybrid.accuracy import GlobalError, global_error
-from hybrid.answer import Answer
-from hybrid.arc import Grazing, HybridArc, Jump
-from hybrid.compile import CompiledSystem, compile_system
+from hybrid.accuracy.answer import Answer
+from hybrid.accuracy.global_error import GlobalError, global_error
+from hybrid.accuracy.work_precision import WorkPrecision, work_precision
+from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
-from hybrid.filippov import filippov
-from hybrid.orbit import PeriodicOrbit, periodic_orbit
-from hybrid.saltation import saltation_matrix
-from hybrid.section import Section, poincare_section, stroboscopic_section
-from hybrid.simulate import simulate
+from hybrid.orbits.periodic_orbit import PeriodicOrbit, periodic_orbit
+from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section
+from hybrid.simulation.arc import Grazing, HybridArc, Jump
+from hybrid.simulation.saltation import saltation_matrix
+from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
-from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.work_precision import WorkPrecision, work_precision
+from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.transform.filippov import filippov
 
 __all__ = [
     "DOP853",

@@ -8,10 +8,10 @@ import sys
 import time
 from collections.abc import Sequence
 
-from hybrid import beside
-from hybrid.cache import cache_directory
-from hybrid.load import ALL_KERNELS, is_kept
-from hybrid.progress import progress_bar
+from hybrid.compiler.cache import second_process
+from hybrid.compiler.cache.folder import cache_directory
+from hybrid.compiler.cache.loader import ALL_KERNELS, is_kept
+from hybrid.display.progress import progress_bar
 
 # Seconds between two looks at what has been compiled.
 LOOK = 0.3
@@ -25,7 +25,7 @@ def parser() -> argparse.ArgumentParser:
     compiling.add_argument(
         "--processes",
         type=int,
-        default=beside.processors(),
+        default=second_process.processors(),
         help="how many compile at once (default: %(default)s, all processors)",
     )
     return options
@@ -49,8 +49,8 @@ def compile_kernels(processes: int) -> list[str]:
 
 def _compiling(modules: Sequence[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-c", beside.PROGRAM, *modules],
-        env=beside.environment(),
+        [sys.executable, "-c", second_process.PROGRAM, *modules],
+        env=second_process.environment(),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
     )

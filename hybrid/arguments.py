@@ -17,7 +17,7 @@ import numpy as np
 from hybrid.errors import ArgumentError, unknown_name
 
 if TYPE_CHECKING:
-    from hybrid.system import HybridSystem
+    from hybrid.system.graph import HybridSystem
 
 Kind = TypeVar("Kind")
 LARGEST_COUNT = int(np.iinfo(np.int64).max)

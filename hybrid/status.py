@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import attrs
 
-from hybrid.kernels import codes
+from hybrid.kernels.types import codes
 
 if TYPE_CHECKING:
-    from hybrid.system import Transition
+    from hybrid.system.graph import Transition
 
 
 class StatusCode(IntEnum):

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import models
 from hybrid import DOP853, HybridError, Taylor, Tsit5
-from lyapunov import demo_figures, demo_report
-from lyapunov.demo_paper import PAPER, ROWS
-from lyapunov.demo_study import STARTS, Settings, study_regime
-from lyapunov.demo_tangents import explanations, tolerance_study
+from lyapunov.study import figures, report
+from lyapunov.study.paper import PAPER, ROWS
+from lyapunov.study.runs import STARTS, Settings, study_regime
+from lyapunov.study.tangents import explanations, tolerance_study
 
 SOLVERS = {solver.__name__: solver for solver in (Taylor, DOP853, Tsit5)}
 
@@ -105,18 +105,18 @@ def _run(omegas: Sequence[float], settings: Settings, folder: Path) -> None:
     regimes = []
     for omega in dict.fromkeys(omegas):
         regimes.append(study_regime(system, omega, settings))
-        print(demo_report.regime_text(regimes[-1]), end="\n\n", flush=True)
-        demo_report.write_histories(folder, regimes[-1])
-    demo_figures.write_figures(folder, regimes)
+        print(report.regime_text(regimes[-1]), end="\n\n", flush=True)
+        report.write_histories(folder, regimes[-1])
+    figures.write_figures(folder, regimes)
 
     trap = tolerance_study(system, settings)
-    print(demo_report.tolerance_text(trap), end="\n\n", flush=True)
-    demo_report.write_tolerances(folder, trap)
-    demo_figures.write_tolerance_figure(folder, trap)
+    print(report.tolerance_text(trap), end="\n\n", flush=True)
+    report.write_tolerances(folder, trap)
+    figures.write_tolerance_figure(folder, trap)
 
     found = explanations(system, list(dict.fromkeys(omegas)), settings)
-    print(demo_report.explanation_text(found), flush=True)
-    demo_report.write_explanations(folder, found)
+    print(report.explanation_text(found), flush=True)
+    report.write_explanations(folder, found)
 
 
 if __name__ == "__main__":

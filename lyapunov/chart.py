@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode, arguments, compile_system
-from hybrid.interrupt import Told
-from hybrid.kernels import codes
-from hybrid.load import load_kernels
-from hybrid.progress import progress_bar
-from hybrid.run import Trajectory, check_solver, plan_of, start
-from hybrid.section import strobe
+from hybrid.compiler.cache.loader import load_kernels
+from hybrid.display.progress import progress_bar
+from hybrid.kernels.types import codes
+from hybrid.orbits.sections import strobe
+from hybrid.simulation.interrupt import Told
+from hybrid.simulation.plan import check_solver, plan_of
+from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import RungeKutta
-from hybrid.system import as_system
+from hybrid.system.graph import as_system
 from lyapunov.spectrum import Estimate, first_vectors, interval_length
 
 UNTOUCHED = Status(
@@ -233,7 +234,7 @@ class _Rows:
     def load(self) -> None:
         """Load all kernels that rows need, before threads do so at once."""
         load_kernels("lyapunov.kernels")
-        load_kernels("hybrid.kernels.sections")
+        load_kernels("hybrid.kernels.events.sections")
         plan_of(compile_system(self.system), self.solver, self.vectors.shape[1])
 
     def start(

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
-from hybrid.interrupt import CTRL_C
-from hybrid.progress import progress_bar
+from hybrid.display.progress import progress_bar
+from hybrid.display.tables import table
+from hybrid.simulation.interrupt import CTRL_C
 from hybrid.solvers import RungeKutta
 from hybrid.status import SUCCESS
-from hybrid.system import as_system
-from hybrid.text import table
+from hybrid.system.graph import as_system
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
 
 

@@ -4,7 +4,8 @@ import math
 
 from numba import boolean, float64, int64, njit, types
 
-from hybrid.kernels.codes import (
+from hybrid.kernels.arithmetic.tangent import orthonormalise
+from hybrid.kernels.types.codes import (
     DIVERGENCE,
     DONE,
     ENTERING,
@@ -21,7 +22,7 @@ from hybrid.kernels.codes import (
     STEPS,
     STRAIN,
 )
-from hybrid.kernels.layout import (
+from hybrid.kernels.types.layout import (
     ADVANCE,
     ENTRY,
     INDICES,
@@ -35,7 +36,6 @@ from hybrid.kernels.layout import (
     VECTOR,
     WORK,
 )
-from hybrid.kernels.tangent import orthonormalise
 from lyapunov import statistics
 
 UNLIMITED = 9223372036854775807

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridArc, arguments
-from hybrid.plot import as_axes, as_component
+from hybrid.plot.style import as_axes, as_component
 from lyapunov.chart import Chart
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments
-from hybrid.interrupt import Bursts
-from hybrid.kernels import codes
-from hybrid.load import address, entry, load_kernels
-from hybrid.progress import Progress, progress_bar
-from hybrid.run import Trajectory, start
+from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.display.progress import Progress, progress_bar
+from hybrid.kernels.types import codes
+from hybrid.simulation.interrupt import Bursts
+from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import RungeKutta
-from hybrid.system import as_system
+from hybrid.system.graph import as_system
 from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
 from lyapunov.statistics import running_tapered_mean
 

@@ -13,8 +13,8 @@ import models
 from benchmarks.peers.scipy_ivp import Edge, with_events
 from benchmarks.stability.methods import EVENTS, LEAST, OURS, SCIPY, WITHOUT_PERIOD, Curves
 from hybrid import HybridSystem
-from hybrid.kernels import codes
-from hybrid.run import start
+from hybrid.kernels.types import codes
+from hybrid.simulation.trajectory import start
 from models.one_impact import one_impact_orbits
 
 # Two units of time a forcing period, and so few steps.

@@ -4,9 +4,21 @@ import math
 
 from numba import boolean, float64, int64, njit
 
-from hybrid.kernels.bernstein import crosses_towards
-from hybrid.kernels.clock import forward, set_clock, time_left
-from hybrid.kernels.codes import (
+from hybrid.kernels.arithmetic.bernstein import crosses_towards
+from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
+from hybrid.kernels.arithmetic.tangent import keep_apart
+from hybrid.kernels.events.guards import (
+    allowed,
+    guard_speed,
+    is_forced,
+    may_jump,
+    was_left_behind,
+    widen_scale,
+)
+from hybrid.kernels.events.onset import BY_STEP
+from hybrid.kernels.events.sides import side_of
+from hybrid.kernels.steps.series import series_step
+from hybrid.kernels.types.codes import (
     ACCUMULATION,
     AT_REST,
     DONE,
@@ -36,19 +48,7 @@ from hybrid.kernels.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.guards import (
-    allowed,
-    guard_speed,
-    is_forced,
-    may_jump,
-    was_left_behind,
-    widen_scale,
-)
-from hybrid.kernels.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
-from hybrid.kernels.onset import BY_STEP
-from hybrid.kernels.series import series_step
-from hybrid.kernels.sides import side_of
-from hybrid.kernels.tangent import keep_apart
+from hybrid.kernels.types.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
 
 # More jumps than this at one instant, in all or per transition, are not going to end.
 MOST_JUMPS_AT_ONCE = 1000

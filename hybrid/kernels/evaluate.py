@@ -2,7 +2,7 @@
 
 from numba import float64, int64, njit, void
 
-from hybrid.kernels.layout import ENTRY, MATRIX, MODEL, VECTOR
+from hybrid.kernels.types.layout import ENTRY, MATRIX, MODEL, VECTOR
 
 
 @njit(void(MODEL, int64, int64, float64, VECTOR, VECTOR), **ENTRY)

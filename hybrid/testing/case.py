@@ -11,17 +11,17 @@ import numpy as np
 from hypothesis.errors import UnsatisfiedAssumption
 
 from hybrid import arguments
-from hybrid.agreement import compiled_value
-from hybrid.arc import HybridArc, Jump
-from hybrid.compile import CompiledSystem, compile_system
-from hybrid.derivative import evaluate
+from hybrid.compiler.agreement import compiled_value
+from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
-from hybrid.roles import Role
-from hybrid.saltation import saltation_matrix
-from hybrid.simulate import simulate
+from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.saltation import saltation_matrix
+from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta
 from hybrid.status import StatusCode
-from hybrid.system import HybridSystem, Transition
+from hybrid.system.derivatives import evaluate
+from hybrid.system.functions import Role
+from hybrid.system.graph import HybridSystem, Transition
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
 # The same run with tolerances this much looser tells how far its end can be trusted.

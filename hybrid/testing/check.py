@@ -14,9 +14,9 @@ from hypothesis.errors import Unsatisfiable, UnsatisfiedAssumption
 from hypothesis.strategies import SearchStrategy
 
 from hybrid import arguments
-from hybrid.compile import compile_system
+from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import RungeKutta
-from hybrid.system import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives

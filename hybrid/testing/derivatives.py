@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.compile import compile_system
-from hybrid.derivative import derivative_fault, evaluate, reference_derivative
-from hybrid.roles import CONDITION, indexed_roles
+from hybrid.compiler.compiled import compile_system
+from hybrid.system.derivatives import derivative_fault, evaluate, reference_derivative
+from hybrid.system.functions import CONDITION, indexed_roles
 from hybrid.testing.case import Case, as_case, discard
 
 DERIVATIVES = "Given, traced and numerical derivatives agree"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.arc import Jump
-from hybrid.roles import guard_role
+from hybrid.simulation.arc import Jump
+from hybrid.system.functions import guard_role
 from hybrid.testing.case import Case, as_case, discard, guard_beyond, mode_after, stretches
 from hybrid.testing.saltation import event_told
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.agreement import disagreement
-from hybrid.compile import compile_system
-from hybrid.periodicity import period_fault_at
-from hybrid.roles import indexed_roles
+from hybrid.compiler.agreement import disagreement
+from hybrid.compiler.compiled import compile_system
+from hybrid.system.functions import indexed_roles
+from hybrid.system.periodicity import period_fault_at
 from hybrid.testing.case import Case, as_case, discard
 
 COMPILED = "The compiled functions equal the Python functions"

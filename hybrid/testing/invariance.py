@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from hybrid import arguments
-from hybrid.arc import HybridArc
-from hybrid.compile import compile_system
-from hybrid.system import HybridSystem
+from hybrid.compiler.compiled import compile_system
+from hybrid.simulation.arc import HybridArc
+from hybrid.system.graph import HybridSystem
 from hybrid.testing.case import Case, Run, as_case, discard, matrix_told, mode_after
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.arc import Jump
-from hybrid.compile import compile_system
+from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.roles import field_role, guard_role, reset_role
+from hybrid.simulation.arc import Jump
+from hybrid.system.functions import field_role, guard_role, reset_role
 from hybrid.testing.case import Case, as_case, discard, matrix_told, mode_after
 from hybrid.testing.variants import altered
 

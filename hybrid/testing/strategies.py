@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from hybrid import arguments
-from hybrid.derivative import evaluate
 from hybrid.errors import ArgumentError
-from hybrid.run import check_solver
+from hybrid.simulation.plan import check_solver
 from hybrid.solvers import RungeKutta
-from hybrid.system import HybridSystem, as_system
+from hybrid.system.derivatives import evaluate
+from hybrid.system.graph import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.

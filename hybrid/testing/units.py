@@ -8,9 +8,9 @@ from weakref import WeakKeyDictionary
 
 import attrs
 
-from hybrid.compile import compile_system
-from hybrid.names import PARAMETERS, STATE, named_values
-from hybrid.system import Guard, HybridSystem, Reset
+from hybrid.compiler.compiled import compile_system
+from hybrid.system.graph import Guard, HybridSystem, Reset
+from hybrid.system.variables import PARAMETERS, STATE, named_values
 from hybrid.testing.case import Case, as_case, discard
 from hybrid.testing.invariance import compare
 

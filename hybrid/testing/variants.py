@@ -9,9 +9,9 @@ from weakref import WeakKeyDictionary
 import attrs
 import numpy as np
 
-from hybrid.compile import compile_system
-from hybrid.names import PARAMETERS, named_values
-from hybrid.system import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.compiler.compiled import compile_system
+from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.system.variables import PARAMETERS, named_values
 
 AGAIN = " (copy)"
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 import hybrid.__main__ as command
-from hybrid.load import ALL_KERNELS, DRIVER, EVENTS
+from hybrid.compiler.cache.loader import ALL_KERNELS, DRIVER, EVENTS
 
 SOURCES = Path(command.__file__).parents[1]
-SMALL = ("hybrid.kernels.step", "hybrid.kernels.evaluate")
+SMALL = ("hybrid.kernels.steps.step", "hybrid.kernels.evaluate")
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import ctypes
 
 import numpy as np
 
-from hybrid.compiler.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, parsed
-from hybrid.compiler.machine import load, machine_code
-from hybrid.printer import IMPORTS
+from hybrid.compiler.llvm.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, parsed
+from hybrid.compiler.llvm.machine import load, machine_code
+from hybrid.symbolic.printer import IMPORTS
 
 SIGNATURES = (VECTOR_ROLE, MATRIX_ROLE, SERIES_ROLE)
 

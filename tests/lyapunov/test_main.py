@@ -4,9 +4,9 @@ import csv
 
 import pytest
 
-from lyapunov import demo_report
 from lyapunov.__main__ import main
-from lyapunov.demo_tangents import Explanation
+from lyapunov.study import report
+from lyapunov.study.tangents import Explanation
 
 
 @pytest.fixture(scope="module")
@@ -82,5 +82,5 @@ def test_the_verdict_may_be_that_the_question_is_open():
     as_it_is = Explanation("as it is", {7.40: -0.055, 7.46: 0.0})
     poor = Explanation("poor", {7.40: -0.055, 7.46: -0.009})
     good = Explanation("good", {7.40: -0.066, 7.46: -0.010})
-    assert demo_report.verdict([as_it_is, poor]).startswith("Open: the closest candidate, poor")
-    assert demo_report.verdict([as_it_is, poor, good]).startswith("Closest: good")
+    assert report.verdict([as_it_is, poor]).startswith("Open: the closest candidate, poor")
+    assert report.verdict([as_it_is, poor, good]).startswith("Closest: good")

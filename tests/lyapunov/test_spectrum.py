@@ -376,8 +376,8 @@ def test_rates_are_evaluated_anew_after_each_orthonormalisation():
 
 def test_vectors_that_only_rounding_tells_apart_are_reported():
     system = models.impact_oscillator()
-    trajectory = hybrid.run.start(system, (0.0, 0.0), 0.0, tangent=np.eye(2))
-    trajectory.run.count[hybrid.kernels.codes.INDISTINCT] = 2
-    status = trajectory.status(hybrid.kernels.codes.DONE)
+    trajectory = hybrid.simulation.trajectory.start(system, (0.0, 0.0), 0.0, tangent=np.eye(2))
+    trajectory.run.count[hybrid.kernels.types.codes.INDISTINCT] = 2
+    status = trajectory.status(hybrid.kernels.types.codes.DONE)
     assert status.code == hybrid.StatusCode.INDISTINCT_TANGENTS
     assert "2 times only rounding was left" in status.message

@@ -1,0 +1,1 @@
+"""How far a run is off, and what an accuracy costs."""

@@ -1,0 +1,398 @@
+"""Work and precision: how long methods take for the error that they make, against an answer known better."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.accuracy.answer import QUANTITIES, Answer, as_answer, errors_of, rounding_of
+from hybrid.display.tables import table
+from hybrid.errors import ArgumentError
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.simulate import simulate
+from hybrid.solvers import DOP853, RungeKutta, Taylor, Tsit5
+from hybrid.status import StatusCode
+from hybrid.system.graph import HybridSystem, as_system
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+METHODS: Mapping[str, RungeKutta] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5()}
+# The default reference, and the run of another method that its own error is taken from.
+REFERENCE = Taylor(rtol=1e-14, atol=1e-16)
+CHECK = DOP853(rtol=1e-13, atol=1e-15)
+# Seconds after which the time of short runs no longer depends on what ran before them.
+SETTLED = 0.05
+MOST_REPEATS = 1000
+
+Method = RungeKutta | Callable[[float], Any]
+
+
+@attrs.frozen(eq=False, repr=False)
+class WorkPrecision:
+    """Errors and times of several methods, a row a method and tolerance; ``print`` shows them as a table.
+
+    Attributes
+    ----------
+    method, tolerance
+        Names and tolerances, ``(rows,)``.
+    error
+        Columns ``(rows,)`` by quantity: of the ``state`` the largest difference of a component, of the event
+        ``times`` the largest of one, infinite if their number differs; of the ``saltation`` matrices and
+        the ``fundamental`` matrix the largest difference relative to the largest entry of the true one; of
+        the ``exponents`` the largest. nan where a method does not have the quantity or did not arrive.
+    seconds, compile_seconds
+        Median time of a run, until it was given up where it was, and what the first run took more,
+        ``(rows,)``.
+    steps, events
+        Steps and events of a run, nan where unknown, ``(rows,)``.
+    status
+        ``"SUCCESS"``, the name of another status code, or the first line of what was raised, ``(rows,)``.
+    reference_error
+        Error of the reference itself, by quantity: nothing below it was measured.
+    """
+
+    method: np.ndarray
+    tolerance: np.ndarray
+    error: Mapping[str, np.ndarray]
+    seconds: np.ndarray
+    compile_seconds: np.ndarray
+    steps: np.ndarray
+    events: np.ndarray
+    status: np.ndarray
+    reference_error: Mapping[str, float]
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Names of the methods in the order in which they ran."""
+        return tuple(dict.fromkeys(self.method.tolist()))
+
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """All columns by name, as frames of other packages take them."""
+        return {
+            "method": self.method,
+            "tolerance": self.tolerance,
+            **{f"error_{quantity}": column for quantity, column in self.error.items()},
+            "seconds": self.seconds,
+            "compile_seconds": self.compile_seconds,
+            "steps": self.steps,
+            "events": self.events,
+            "status": self.status,
+        }
+
+    def rows_of(self, method: str) -> np.ndarray:
+        """Mask ``(rows,)`` of one method's rows.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such method.
+        """
+        arguments.known("Method", method, self.methods, "Methods")
+        return self.method == method
+
+    def seconds_at(self, method: str, error: float, quantity: str = "state") -> float:
+        """Seconds a method needs for an error, between its rows on logarithmic scales; nan beyond them.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such method or quantity.
+        """
+        error = arguments.positive("error", error)
+        errors = self.error_of(quantity)
+        rows = self.rows_of(method) & (errors > 0) & np.isfinite(errors)
+        # A tighter tolerance that takes longer and is worse counts for nothing.
+        points: list[tuple[float, float]] = []
+        for found, seconds in sorted(zip(errors[rows], self.seconds[rows], strict=True)):
+            if not points or seconds < points[-1][1]:
+                points.append((float(found), float(seconds)))
+        if not points or not points[0][0] <= error:
+            return float("nan")
+        logs = np.log(np.array(points))
+        return float(np.exp(np.interp(np.log(error), logs[:, 0], logs[:, 1])))
+
+    def plot(self, quantity: str = "state", *, ax: Axes | None = None) -> Axes:
+        """Draw error over time, see :func:`hybrid.plot.plot_work_precision`."""
+        from hybrid.plot import plot_work_precision
+
+        return plot_work_precision(self, quantity, ax=ax)
+
+    def error_of(self, quantity: str) -> np.ndarray:
+        """Column ``(rows,)`` of the errors of a quantity.
+
+        Raises
+        ------
+        ArgumentError
+            If the quantity was not measured.
+        """
+        arguments.known("Quantity", quantity, self.error, "Quantities")
+        return self.error[quantity]
+
+    def __repr__(self) -> str:
+        return f"<WorkPrecision of {', '.join(self.methods)}, {len(self.method)} rows>"
+
+    def __str__(self) -> str:
+        headings = [
+            "method",
+            "tolerance",
+            *(f"error: {quantity}" for quantity in self.error),
+            *("ms", "compile ms", "steps", "events", "status"),
+        ]
+        rows = [
+            [
+                str(self.method[i]),
+                f"{self.tolerance[i]:.0e}",
+                *(_figure(column[i], ".1e") for column in self.error.values()),
+                _figure(1e3 * self.seconds[i], ".3f"),
+                _figure(1e3 * self.compile_seconds[i], ".0f"),
+                _figure(self.steps[i], ".0f"),
+                _figure(self.events[i], ".0f"),
+                str(self.status[i]),
+            ]
+            for i in range(len(self.method))
+        ]
+        floor = [_figure(self.reference_error[quantity], ".1e") for quantity in self.error]
+        rows.append(["the reference", "", *floor, *[""] * 5])
+        return table(headings, rows)
+
+
+def work_precision(
+    system: HybridSystem,
+    x0: ArrayLike,
+    t_span: tuple[float, float],
+    *,
+    methods: Mapping[str, Method] = METHODS,
+    tolerances: Sequence[float] = TOLERANCES,
+    reference: ArrayLike | Answer | HybridArc | None = None,
+    reference_error: Mapping[str, float] | None = None,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    tangent: bool = False,
+    repeats: int = 5,
+    longest: float = 10.0,
+    clock: Callable[[], float] = time.perf_counter,
+) -> WorkPrecision:
+    """Error against time of methods over a range of tolerances, on one run of one system.
+
+    Every method runs once to get ready at each tolerance, then at least ``repeats`` times; its time is the
+    median. The library's own solvers keep the end of the run and its jumps, no steps.
+
+    Parameters
+    ----------
+    system, x0, t_span, mode, parameters
+        The run, as for :func:`simulate`.
+    methods
+        Name to method: a solver, whose ``rtol`` the tolerance replaces and, in the same proportion, ``atol``;
+        or any function of the tolerance that solves the problem its own way and returns the state at the
+        end, an :class:`Answer` or a :class:`HybridArc`. By default ``Taylor``, ``DOP853`` and ``Tsit5``.
+    tolerances
+        Tolerances, each of which every method runs at.
+    reference
+        What is true: a state ``(n,)``, an :class:`Answer` or an arc. By default the arc of ``Taylor`` at
+        ``rtol = 1e-14``, and what ``DOP853`` at 1e-13 differs from it is taken for its error.
+    reference_error
+        Error of a given reference, by quantity; by default the rounding of its largest value.
+    tangent
+        Whether the solvers carry the fundamental matrix, whose error and exponents are then measured too.
+    repeats
+        Runs that the median is taken of, at least: short ones go on for a twentieth of a second, since what
+        ran before them is still in the processor's memories when they begin. With 1 there is one.
+    longest
+        Seconds beyond which a run is not repeated, and the method's finer tolerances are left out.
+    clock
+        Counts seconds: ``time.process_time`` where other work shares the processor.
+
+    Returns
+    -------
+    WorkPrecision
+
+    Raises
+    ------
+    ModelError
+        If the system cannot be compiled.
+    ArgumentError
+        If an argument does not fit, or a method returns no state of the system.
+
+    Examples
+    --------
+    >>> import models
+    >>> found = work_precision(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), tolerances=[1e-6], repeats=1)
+    >>> found.methods
+    ('Taylor', 'DOP853', 'Tsit5')
+    >>> bool(found.error["state"].max() < 1e-5)
+    True
+    """
+    as_system("system", system)
+    x0 = arguments.state("x0", x0, system)
+    t_span = arguments.time_span("t_span", t_span)
+    if mode is not None:
+        system.mode_index(mode)
+    system.parameter_values(parameters)
+    tangent = arguments.flag("tangent", tangent)
+    runs = {
+        name: _run(name, method, system, x0, t_span, mode, parameters, tangent)
+        for name, method in arguments.mapping("methods", methods, "map names to methods").items()
+    }
+    if not runs:
+        raise ArgumentError("methods must hold at least one solver or function; got none.")
+    levels = arguments.numbers("tolerances", tolerances, "be positive numbers, one or more")
+    if levels.ndim != 1 or not levels.size or not np.all((levels > 0) & np.isfinite(levels)):
+        raise arguments.refusal("tolerances", "be positive and at least one", tolerances)
+    repeats = arguments.count("repeats", repeats, 1)
+    longest = arguments.positive("longest", longest, "be a positive number of seconds", infinite=True)
+    arguments.function("clock", clock, "no arguments")
+    known_errors = {
+        arguments.known("reference_error: Quantity", quantity, QUANTITIES, "Quantities"): (
+            arguments.not_negative(f"reference_error[{quantity!r}]", value)
+        )
+        for quantity, value in arguments.mapping("reference_error", reference_error).items()
+    }
+    n, span = system.dimension, t_span[1] - t_span[0]
+    if reference is None:
+        truth, check = (
+            as_answer("reference", _own(solver, system, x0, t_span, mode, parameters, tangent), n, span)
+            for solver in (REFERENCE, CHECK)
+        )
+        floor = errors_of(check, truth)
+    else:
+        truth = as_answer("reference", reference, n, span)
+        floor = rounding_of(truth) | known_errors
+    rows = []
+    while runs:
+        name = next(iter(runs))
+        run = runs.pop(name)
+        slow = False
+        for tolerance in sorted(levels.tolist(), reverse=True):
+            if slow:
+                break
+            row = _measured(name, run, tolerance, truth, (n, span), repeats, longest, clock)
+            rows.append(row)
+            if row.status == StatusCode.INTERRUPTED.name:
+                runs = {}
+                break
+            slow = row.seconds > longest
+    quantities = [name for name in QUANTITIES if name in floor]
+    return WorkPrecision(
+        method=np.array([row.method for row in rows]),
+        tolerance=np.array([row.tolerance for row in rows]),
+        error={name: np.array([row.errors.get(name, np.nan) for row in rows]) for name in quantities},
+        seconds=np.array([row.seconds for row in rows]),
+        compile_seconds=np.array([row.compile_seconds for row in rows]),
+        steps=np.array([row.steps for row in rows]),
+        events=np.array([row.events for row in rows]),
+        status=np.array([row.status for row in rows]),
+        reference_error={name: floor[name] for name in quantities},
+    )
+
+
+@attrs.frozen
+class _Row:
+    method: str
+    tolerance: float
+    errors: Mapping[str, float] = attrs.Factory(dict)
+    seconds: float = np.nan
+    compile_seconds: float = np.nan
+    steps: float = np.nan
+    events: float = np.nan
+    status: str = "SUCCESS"
+
+
+def _run(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
+    """The method as a function of the tolerance."""
+    if isinstance(method, RungeKutta):
+        ratio = method.atol / method.rtol
+        return lambda rtol: _own(attrs.evolve(method, rtol=rtol, atol=rtol * ratio), *problem)
+    if isinstance(method, type) or not callable(method):
+        raise ArgumentError(
+            f"Method {name!r} must be a solver, Taylor() say, or a function of the tolerance; got {method!r}."
+        )
+    return method
+
+
+def _own(
+    solver: RungeKutta,
+    system: HybridSystem,
+    x0: ArrayLike,
+    t_span: tuple[float, float],
+    mode: str | None,
+    parameters: Mapping[str, float] | None,
+    tangent: bool,
+) -> HybridArc:
+    arc = simulate(
+        system,
+        x0,
+        t_span,
+        mode=mode,
+        parameters=parameters,
+        solver=solver,
+        tangent=tangent,
+        samples=[t_span[1]],
+    )
+    if arc.status.code == StatusCode.INTERRUPTED:
+        raise KeyboardInterrupt
+    return arc
+
+
+def _measured(
+    name: str,
+    run: Callable[[float], Any],
+    tolerance: float,
+    truth: Answer,
+    shape: tuple[int, float],
+    repeats: int,
+    longest: float,
+    clock: Callable[[], float],
+) -> _Row:
+    def timed() -> tuple[Any, float]:
+        start = clock()
+        result = run(tolerance)
+        seconds = clock() - start
+        own = result.seconds if isinstance(result, Answer) else None
+        return result, seconds if own is None else own
+
+    first, begin = float("nan"), clock()
+    # If the first run fails, so does the second, which tells how long that takes without compiling.
+    try:
+        with suppress(Exception):
+            first = timed()[1]
+        begin = clock()
+        result, seconds = timed()
+        times = [seconds]
+        most = repeats if repeats == 1 else max(repeats, MOST_REPEATS)
+        while len(times) < most and times[-1] <= longest:
+            if len(times) >= repeats and sum(times) >= SETTLED:
+                break
+            times.append(timed()[1])
+    except ArgumentError:
+        raise
+    except KeyboardInterrupt:
+        return _Row(name, tolerance, seconds=clock() - begin, status=StatusCode.INTERRUPTED.name)
+    except Exception as error:  # another package's failure is a result of the comparison
+        said = f"{type(error).__name__}: {error}".strip().splitlines()[0]
+        return _Row(name, tolerance, seconds=clock() - begin, status=said)
+    answer = as_answer(f"Method {name!r}: what it returns", result, *shape)
+    seconds = float(np.median(times))
+    return _Row(
+        method=name,
+        tolerance=tolerance,
+        errors=errors_of(answer, truth),
+        seconds=seconds,
+        compile_seconds=max(first - seconds, 0.0),
+        steps=np.nan if answer.steps is None else answer.steps,
+        events=np.nan if answer.times is None else len(answer.times),
+        status=result.status.code.name if isinstance(result, HybridArc) else "SUCCESS",
+    )
+
+
+def _figure(value: float, form: str) -> str:
+    return format(value, form) if np.isfinite(value) else "-"

@@ -1,0 +1,250 @@
+"""The compiled functions of a model beside the Python functions that they were made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.compiler.opaque import OpaqueFunction
+from hybrid.errors import ModelError
+from hybrid.symbolic.values import WHERE, TraceError, values_of
+from hybrid.system.derivatives import complex_step, evaluate, sample_points
+from hybrid.system.functions import CONDITION, Role, indexed_roles
+
+if TYPE_CHECKING:
+    from hybrid.compiler.compiled import CompiledSystem
+    from hybrid.system.graph import HybridSystem
+
+EPSILON = float(np.finfo(float).eps)
+# Sizes of state and time at which functions are compared, besides those near 1.
+SIZES = (1e-3, 30.0, 1e3)
+# Values that differ by less than this, relative to them, are the same without a closer look.
+SAME = 16 * EPSILON
+# How often a function is computed with roundings made up by chance, to see what they do to it.
+SHAKES = 8
+# The compiler's elementary functions are not NumPy's. What is traced can be shaken at each operation.
+ROUNDED = {True: 1e-13, False: 1e-8}
+# Share of the largest state that rounding of terms may leave of their difference.
+HIDDEN = 1e-12
+
+
+def check_agreement(compiled: CompiledSystem) -> None:
+    """Compare every compiled function with its Python function at points of many sizes.
+
+    Points at which Python raises an error, or a value is not finite, are passed over.
+
+    Raises
+    ------
+    ModelError
+        If a value differs by more than rounding.
+    """
+    points = [*comparison_points(compiled.system)]
+    for index, role in indexed_roles(compiled.system):
+        for t, x, values in points:
+            fault = disagreement(compiled, role, index, t, x, values)
+            if fault is not None:
+                raise ModelError(fault)
+
+
+def compiled_value(
+    compiled: CompiledSystem, role: Role, index: int, t: float, x: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """The compiled function as it runs."""
+    return compiled.value(role, index, t, x, values)
+
+
+Value = Callable[..., np.ndarray]
+
+
+def comparison_points(system: HybridSystem) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    """Times, states ``(n,)`` and parameter vectors ``(m,)``: the declared one, and others near to it."""
+    declared = system.parameter_values()
+    rng = np.random.default_rng(20261122)
+    for t, x in sample_points(system.dimension):
+        yield t, x, declared
+    for size in SIZES:
+        for near in (0.0, 0.1):
+            signs = rng.choice([-1.0, 1.0], system.dimension)
+            x = size * signs * rng.uniform(0.5, 1.5, system.dimension)
+            yield size * rng.uniform(0.5, 1.5), x, declared * (1.0 + near * rng.uniform(-1, 1, len(declared)))
+
+
+def disagreement(
+    compiled: CompiledSystem,
+    role: Role,
+    index: int,
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    value: Value = compiled_value,
+) -> str | None:
+    """Where a compiled function, or its derivative if Python has one, is not Python's; None if nowhere.
+
+    ``value`` is what evaluates the compiled function.
+    """
+    system = compiled.system
+    found = value(compiled, role, index, t, x, values)
+    opaque = _is_opaque(compiled, role.function)
+    text = _difference(system, role.title, role.function, found, t, x, values, opaque)
+    if text is not None or role.name == CONDITION:
+        return text
+    if role.derivative is not None:
+        found = compiled.derivative(role, index, t, x, values)
+        given = evaluate(system, role.derivative, t, x, values)
+        width = found.shape[1] if given is None else len(given) // role.rows
+        return _difference(
+            system, role.derivative_title, role.derivative, found[:, :width].ravel(), t, x, values, opaque
+        )
+    if not opaque:
+        return None
+    try:
+        wanted = complex_step(system, role, t, x, values)
+    except Exception:  # not at this point, then
+        return None
+    found = compiled.derivative(role, index, t, x, values)
+    wrong = np.isfinite(wanted) & ~(np.abs(found - wanted) <= 1e-7 * (1.0 + np.abs(wanted)))
+    if not np.any(wrong):
+        return None
+    i, j = (int(k) for k in np.argwhere(wrong)[0])
+    what = f"{role.title}: the derivative"
+    return _told(system, what, found[i, j], wanted[i, j], t, x, values, "a branch on the type of a number")
+
+
+def _is_opaque(compiled: CompiledSystem, function: Callable[..., Any]) -> bool:
+    return any(
+        isinstance(value, OpaqueFunction) and value.function is function
+        for value in compiled.emitted.opaque.values()
+    )
+
+
+def _difference(
+    system: HybridSystem,
+    title: str,
+    function: Callable[..., Any],
+    found: np.ndarray,
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    opaque: bool,
+) -> str | None:
+    wanted = evaluate(system, function, t, x, values)
+    if wanted is None or len(wanted) != len(found):
+        return None
+    apart = np.abs(found - wanted)
+    if np.all(apart <= SAME * np.abs(wanted)):
+        return None
+    band = rounding_band(system, function, t, x, values, wanted)
+    # What is nothing but rounding in Python may be a quotient of zeros in other operations. An opaque
+    # function tells of its errors by nan.
+    lost = ~np.isfinite(found) & (not opaque)
+    wrong = ~(apart <= band) & ~lost
+    if not np.any(wrong):
+        return None
+    i = int(np.argmax(wrong))
+    if np.isfinite(found[i]):
+        cause = (
+            "a branch on the type of a number, an error that it catches, a state of its own, or a global "
+            "that has changed. Model functions must be pure functions of the values of (t, x, p)"
+        )
+    else:
+        cause = (
+            "a whole number beyond 2**63 (write floats: 1.0 in place of 1, 7e9 in place of 7_000_000_000), "
+            "an index out of range or an error that it raises"
+        )
+    place = title if len(wanted) == 1 else f"{title}: value {i}"
+    return _told(system, place, found[i], wanted[i], t, x, values, cause)
+
+
+def _told(
+    system: HybridSystem,
+    what: str,
+    found: float,
+    wanted: float,
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    cause: str,
+) -> str:
+    return (
+        f"{what} is {found:.10g} compiled and {wanted:.10g} in Python, {place_told(system, t, x, values)}. "
+        f"Likely: {cause}."
+    )
+
+
+def place_told(system: HybridSystem, t: float, x: np.ndarray, values: np.ndarray) -> str:
+    """A point in words, with the parameters that are not as declared."""
+    changed = "".join(
+        f", {name} = {value:.10g}"
+        for (name, declared), value in zip(system.parameters.items(), values, strict=True)
+        if value != declared
+    )
+    return f"at t = {t:.6g}, x = ({', '.join(f'{value:.6g}' for value in x)}){changed}"
+
+
+def rounding_band(
+    system: HybridSystem,
+    function: Callable[..., Any],
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    value: np.ndarray,
+) -> np.ndarray:
+    """How far apart two ways to compute a function may come out by rounding alone.
+
+    It is computed several times with every result of an operation moved by a few units in the last place
+    (Monte Carlo arithmetic), or only its arguments if its operations cannot be seen.
+    """
+    rng = np.random.default_rng(1)
+    try:
+        shaken = [_shaken_operations(system, function, t, x, values, rng) for _ in range(SHAKES)]
+        traced = True
+    except Exception:
+        traced = False
+        moved = (
+            evaluate(system, function, *(_shake(each, rng) for each in (t, x, values))) for _ in range(SHAKES)
+        )
+        shaken = [sample for sample in moved if sample is not None]
+    spread = np.ptp(np.array(shaken), axis=0) if shaken else np.inf
+    # Differences of large terms inside a function whose operations cannot be seen.
+    hidden = 0.0 if traced else HIDDEN * np.abs(x).max()
+    return np.asarray(ROUNDED[traced] * np.abs(value) + 4.0 * spread + hidden)
+
+
+def _shake(value: Any, rng: np.random.Generator) -> Any:
+    return value * (1.0 + EPSILON * rng.uniform(-2.0, 2.0, np.shape(value)))
+
+
+def _shaken_operations(
+    system: HybridSystem,
+    function: Callable[..., Any],
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    symbols = _shake(t, rng), _shake(x, rng), _shake(values, rng)
+    with np.errstate(all="ignore"):
+        found = values_of(function, system.state, tuple(system.parameters), _Shaken(rng), symbols)
+    return np.array(found, dtype=float)
+
+
+class _Shaken:
+    """Traced numbers as floats, every result of an operation rounded by chance."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+
+    def number(self, value: Any) -> Any:
+        """The number as a float."""
+        return np.float64(value)
+
+    def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
+        """The function's value, its last digits by chance."""
+        value = np.where(*contents)[()] if name == WHERE else getattr(np, name)(*contents)
+        return _shake(value, self.rng) if isinstance(value, np.floating) else value
+
+    def expression(self, content: Any) -> Any:
+        """There is none."""
+        raise TraceError("there is no expression where numbers are computed")

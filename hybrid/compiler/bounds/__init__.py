@@ -1,0 +1,1 @@
+"""Interval programs: data with which the kernels bound guards, forcings and rounding over a step."""

@@ -1,0 +1,96 @@
+"""The parts of a field that depend on time and parameters alone, and could hide a pulse from a solver.
+
+A solver knows a field only where it looks: at the stages of a step, or in the series at its start. A pulse
+that is narrower than the step can lie between. Interval arithmetic on the expression of the pulse shows
+it, as it shows the crossings of a guard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import attrs
+import sympy
+
+from hybrid.symbolic.nodes import degree_of, mentions, once
+from hybrid.symbolic.tracing import Symbols
+
+# Products of more harmonics than these, such as ``cos(t)**100``, are narrow pulses.
+MOST_HARMONICS = 4
+# In place of a component of the state: the forcing is multiplied by something.
+NO_COMPONENT = -1
+
+
+@attrs.frozen
+class Forcing:
+    """An expression in time and parameters, and the component whose rate it is a term of, or NO_COMPONENT."""
+
+    expression: sympy.Expr
+    component: int
+
+
+def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forcing, ...]:
+    """The largest parts of a field in time and parameters alone, without what is harmless in them.
+
+    Empty for a field that was not traced, of which nothing is known.
+    """
+    if field is None:
+        return ()
+    found = (each for i, entry in enumerate(field) for each in _parts(entry, i, symbols))
+    return tuple(dict.fromkeys(found))
+
+
+@once
+def _parts(node: sympy.Expr, component: int, symbols: Symbols) -> tuple[Forcing, ...]:
+    return tuple(dict.fromkeys(_found_parts(node, component, symbols)))
+
+
+def _found_parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator[Forcing]:
+    if not mentions(node, (symbols.t,)):
+        return
+    own, others = [node], []
+    if node.is_Add or (node.is_Mul and mentions(node, symbols.x)):
+        own = [part for part in node.args if mentions(part, (symbols.t,)) and not mentions(part, symbols.x)]
+        others = [part for part in node.args if mentions(part, symbols.x)]
+    elif mentions(node, symbols.x):
+        own, others = [], [*node.args]
+    if node.is_Add:
+        own = [part for part in own if not is_harmless(part, symbols.t)]
+    whole = node.func(*own) if len(own) > 1 else own[0] if own else sympy.S.Zero
+    within = component if node.is_Add or not others else NO_COMPONENT
+    if not is_harmless(whole, symbols.t):
+        yield Forcing(whole, within)
+    for other in others:
+        yield from _parts(other, within, symbols)
+
+
+def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
+    """Whether an expression in time has no pulse that is narrower than what a solver resolves of it anyway.
+
+    Harmless are polynomials, exponentials of linear functions of time, and products of these with a few sines
+    and cosines of polynomials: polynomials and exponentials have no pulses, and a sine is as large in every
+    period as in any other, so a solver never sees it rest. Everything else may rest and then pulse.
+    """
+    harmonics = _harmonics(expression, t)
+    return harmonics is not None and harmonics <= MOST_HARMONICS
+
+
+@once
+def _harmonics(node: sympy.Expr, t: sympy.Symbol) -> int | None:
+    """Largest number of harmonics that are multiplied with one another; None if there are other functions."""
+    if node == t or not mentions(node, (t,)):
+        return 0
+    if node.is_Add or node.is_Mul:
+        parts = [_harmonics(part, t) for part in node.args]
+        numbers = [part for part in parts if part is not None]
+        if len(numbers) < len(parts):
+            return None
+        return sum(numbers) if node.is_Mul else max(numbers)
+    if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
+        factor = _harmonics(node.base, t)
+        return None if factor is None else factor * int(node.exp)
+    if isinstance(node, sympy.sin | sympy.cos):
+        return 1 if degree_of(node.args[0], frozenset((t,))) is not None else None
+    if isinstance(node, sympy.exp | sympy.sinh | sympy.cosh):
+        return None if mentions(node.args[0].diff(t), (t,)) else 0
+    return None

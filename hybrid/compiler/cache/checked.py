@@ -1,0 +1,94 @@
+"""Numba's cache of machine code with its contents checked: what is damaged is compiled anew."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from numba.core import caching, ccallback, dispatcher
+
+from hybrid.compiler.cache.folder import say
+
+DIGEST_LENGTH = 32
+
+
+class DamagedError(Exception):
+    """A file of the cache does not hold what was written to it."""
+
+
+class _CheckedFile(caching.IndexDataCacheFile):
+    """Data behind a digest of them."""
+
+    def _dump(self, obj: Any) -> bytes:
+        data: bytes = super()._dump(obj)
+        return data
+
+    def _save_data(self, name: str, data: Any) -> None:
+        content = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(hashlib.sha256(content).digest() + content)
+
+    def _load_data(self, name: str) -> Any:
+        with open(self._data_path(name), "rb") as file:
+            digest, content = file.read(DIGEST_LENGTH), file.read()
+        if hashlib.sha256(content).digest() != digest:
+            raise DamagedError(name)
+        return pickle.loads(content)
+
+
+class _InFolder(caching.CompileResultCacheImpl):
+    """Looks into the folder that was chosen, and into no other."""
+
+    _locator_classes = [caching.UserProvidedCacheLocator]  # noqa: RUF012
+
+
+class _CheckedCache(caching.FunctionCache):
+    """The compiled code of one function on disk. Nothing that is wrong with it stops the function."""
+
+    _impl_class = _InFolder
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        plain = self._cache_file
+        self._cache_file = _CheckedFile(self._cache_path, self._impl.filename_base, plain._source_stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            say(f"hybrid: compiled code in {self._cache_path} is damaged and is made again.")
+            with suppress(OSError):
+                self._cache_file.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:
+            reason = getattr(error, "strerror", None) or error
+            say(f"hybrid: compiled code cannot be kept: {reason}.")
+
+
+def _cache_of(function: Any) -> Any:
+    """The cache of a function; none where there is no folder for it."""
+    try:
+        return _CheckedCache(function)
+    except (RuntimeError, OSError):
+        return caching.NullCache()
+
+
+@contextmanager
+def checked_contents() -> Iterator[None]:
+    """Have numba use this cache for what is decorated inside the block."""
+    users: list[Any] = [dispatcher, ccallback]
+    before = [user.FunctionCache for user in users]
+    for user in users:
+        user.FunctionCache = _cache_of
+    try:
+        yield
+    finally:
+        for user, each in zip(users, before, strict=True):
+            user.FunctionCache = each

@@ -1,0 +1,160 @@
+"""Where compiled code is kept between processes, and what the user sees while it is made the first time."""
+
+from __future__ import annotations
+
+import atexit
+import getpass
+import hashlib
+import os
+import shutil
+import stat
+import sys
+import tempfile
+import threading
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+
+# Folder of this package.
+PACKAGE = Path(__file__).parents[2]
+_LOCK = threading.RLock()
+_SAID: set[str] = set()
+
+
+def cache_directory() -> Path:
+    """Folder of the compiled code: ``$HYBRID_CACHE_DIR``, or the user's cache folder of the platform.
+
+    What is in the folder becomes part of this process. So it must belong to the user, and nobody else may
+    write to it. Otherwise, or if it cannot be written to, a private folder takes its place, and one line says
+    so.
+    """
+    chosen = os.environ.get("HYBRID_CACHE_DIR")
+    if chosen:
+        return _usable(Path(chosen))
+    import platformdirs
+
+    return _usable(Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False)))
+
+
+def cache_folder(name: str) -> Path:
+    """A folder of that name in the cache, to which the same applies."""
+    return _usable(cache_directory() / name, name)
+
+
+@cache
+def _usable(folder: Path, name: str = "") -> Path:
+    objection = _objection(folder)
+    if objection is None:
+        return folder
+    private = _private_folder() / name
+    say(f"hybrid: compiled code is kept in {private}, not in {folder}: {objection}.")
+    return private
+
+
+def _objection(folder: Path) -> str | None:
+    """Why a folder, which is made if need be, cannot be used; None if it can."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if hasattr(os, "geteuid"):
+            found = folder.stat()
+            if found.st_uid != os.geteuid():
+                return "it belongs to another user"
+            if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+                return "others can write to it (chmod go-w)"
+        with tempfile.TemporaryFile(dir=folder) as draft:
+            draft.write(b"room")
+    except OSError as error:
+        return error.strerror or str(error)
+    return None
+
+
+@cache
+def _private_folder() -> Path:
+    """A folder that only this user can look into: the same in every process, if that is possible."""
+    user = os.geteuid() if hasattr(os, "geteuid") else getpass.getuser()
+    lasting = Path(tempfile.gettempdir()) / f"hybrid-systems-{user}"
+    if not lasting.is_symlink() and _objection(lasting) is None:
+        return lasting
+    passing = Path(tempfile.mkdtemp(prefix="hybrid-systems-"))
+    atexit.register(shutil.rmtree, passing, ignore_errors=True)
+    return passing
+
+
+def source_key(*texts: str) -> str:
+    """Short hash of source texts and of the compiler's version."""
+    import numba
+
+    digest = hashlib.sha256(numba.__version__.encode())
+    for text in texts:
+        digest.update(text.encode())
+    return digest.hexdigest()[:24]
+
+
+def keep(path: Path, content: bytes) -> bool:
+    """Write a file whole or not at all: other processes may be doing the same, or reading it.
+
+    Where that is impossible, one line says so: the next process does the work again.
+    """
+    draft = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:16]}")
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        draft.write_bytes(content)
+        draft.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+        say(f"hybrid: compiled code cannot be kept: {error.strerror or error}.")
+        return False
+    return True
+
+
+def kept(path: Path) -> bytes | None:
+    """Content of a file, None if there is none or it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return None
+
+
+@contextmanager
+def compiled_into(folder: Path) -> Iterator[None]:
+    """Let numba keep what is decorated inside this block in ``folder``, and nothing decorated elsewhere.
+
+    Numba stamps a compiled function with the age of its own file only. Kernels call one another across
+    files, so the folder must be named after all the sources that go into them.
+    """
+    from numba import config
+
+    from hybrid.compiler.cache.checked import checked_contents
+    from hybrid.kernels.types.options import INTO_FOLDER
+
+    with _LOCK:
+        before, outside = vars(config)["CACHE_DIR"], INTO_FOLDER.set(True)
+        vars(config)["CACHE_DIR"] = str(folder)
+        try:
+            with checked_contents():
+                yield
+        finally:
+            vars(config)["CACHE_DIR"] = before
+            INTO_FOLDER.reset(outside)
+
+
+def say(message: str) -> None:
+    """Print a line to standard error, once a process."""
+    if message not in _SAID:
+        _SAID.add(message)
+        print(message, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def announced(message: str, after: float = 1.0) -> Iterator[None]:
+    """Print ``message`` to standard error, once a process, if the block takes longer than ``after``."""
+    timer = threading.Timer(after, say, [message])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

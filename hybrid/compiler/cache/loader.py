@@ -1,0 +1,145 @@
+"""Import kernels with their compiled code kept under a name that follows from all their sources."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.util
+from contextlib import nullcontext
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from hybrid.compiler.cache import second_process
+from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, compiled_into, source_key
+
+DRIVER = "hybrid.kernels.drive"
+# What every run needs besides: a second process compiles them meanwhile.
+EVENTS = ("hybrid.kernels.jumps.jump", "hybrid.kernels.jumps.corner", "hybrid.kernels.events.initial_mode")
+# All that Python calls or hands on, those that take longest to compile first.
+ALL_KERNELS = (
+    DRIVER,
+    "hybrid.kernels.jumps.jump",
+    "hybrid.kernels.steps.radau",
+    "hybrid.kernels.steps.runge_kutta",
+    "hybrid.kernels.jumps.corner",
+    "hybrid.kernels.events.bounds",
+    "hybrid.kernels.steps.forcing",
+    "hybrid.kernels.events.sections",
+    "hybrid.kernels.steps.dense",
+    "hybrid.kernels.evaluate",
+    "hybrid.kernels.events.initial_mode",
+    "hybrid.kernels.steps.step",
+    "lyapunov.kernels",
+)
+MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
+
+
+@cache
+def load_kernels(module: str = DRIVER) -> ModuleType:
+    """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
+    kept = is_kept(module)
+    if module == DRIVER and not kept:
+        second_process.start([each for each in EVENTS if not is_kept(each)])
+    with nullcontext() if kept else announced(MESSAGE):
+        if module in EVENTS:
+            second_process.finish()
+        _import_numba()
+        with compiled_into(_folder(module)):
+            return importlib.import_module(module)
+
+
+@cache
+def _import_numba() -> None:
+    """Import numba's array functions without SciPy's linear algebra, which kernels do not need.
+
+    They look for its BLAS as they are imported, and it takes a fifth of a second. It is there, since this
+    package requires SciPy; what calls BLAS looks for it again.
+    """
+    from numba.np import linalg
+
+    look = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        from numba.np import arraymath
+    finally:
+        linalg.ensure_blas = look
+    vars(arraymath)["ensure_blas"] = look
+
+
+def _folder(module: str) -> Path:
+    return cache_folder(f"kernels-{kernels_key(module)}")
+
+
+def is_kept(module: str) -> bool:
+    """Whether compiled code of a module of kernels is on disk."""
+    return any(_folder(module).rglob(f"{module.rpartition('.')[2]}.*.nbi"))
+
+
+def sources_in(folder: Path) -> list[Path]:
+    """All modules in a folder and in the folders in it."""
+    return sorted(folder.rglob("*.py"))
+
+
+@cache
+def kernels_key(module: str = DRIVER) -> str:
+    """Key of all sources that go into a module of kernels: ours, and those of the package that it is from."""
+    sources = sources_in(PACKAGE / "kernels")
+    if not module.startswith("hybrid."):
+        sources += sorted(_own_sources(module))
+    return source_key(*(path.read_text(encoding="utf-8") for path in sources))
+
+
+def _own_sources(module: str) -> set[Path]:
+    """Files of a module and of what it imports from its own package, and so on."""
+    package, found, left = module.partition(".")[0], set[Path](), [module]
+    while left:
+        spec = importlib.util.find_spec(left.pop())
+        path = Path(spec.origin) if spec is not None and spec.origin else None
+        if path is None or path in found or path.name == "__init__.py":
+            continue
+        found.add(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == package:
+                left += [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]
+            elif isinstance(node, ast.Import):
+                left += [alias.name for alias in node.names if alias.name.partition(".")[0] == package]
+    return found
+
+
+@cache
+def entry(kernel: Any) -> Any:
+    """A compiled kernel as Python calls it fastest: arguments are taken to have the types that it states.
+
+    Numba's own call looks up the types of all arguments first, a third of a millisecond for our tuples.
+    """
+    (compiled,) = kernel.overloads.values()
+    return compiled.entry_point
+
+
+class Absent:
+    """Stands for a kernel that is never called."""
+
+    address = 0
+
+
+@cache
+def address(kernel: Any) -> Any:
+    """A compiled kernel as a first-class function for an argument or for a structure."""
+    from numba.core.types import WrapperAddressProtocol
+
+    (signature,) = kernel.nopython_signatures
+    compiled = kernel.overloads[signature.args]
+    pointer = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
+    class Address(WrapperAddressProtocol):
+        address = int(pointer)
+
+        def __wrapper_address__(self) -> int:
+            return self.address
+
+        def signature(self) -> Any:
+            return signature
+
+    return Address()

@@ -1,0 +1,67 @@
+"""Kernels compiled by a second process, into the same cache, while this one compiles others.
+
+A process of its own, since compilation holds the interpreter. Whatever becomes of it, this process goes on:
+what it does not find in the cache it compiles itself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from hybrid.compiler.cache.folder import PACKAGE, cache_directory
+
+PROGRAM = """\
+import sys
+from hybrid.compiler.cache.loader import load_kernels
+for module in sys.argv[1:]:
+    load_kernels(module)
+"""
+_helpers: list[subprocess.Popen[bytes]] = []
+
+
+def start(modules: Sequence[str]) -> None:
+    """Have these kernel modules compiled by a second process, if there is a second processor for it."""
+    interpreter = bool(sys.executable) and not getattr(sys, "frozen", False)
+    if not modules or not interpreter or processors() < 2:
+        return
+    try:
+        helper = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, *modules],
+            env=environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    except OSError:
+        return
+    atexit.register(helper.kill)
+    _helpers.append(helper)
+
+
+def finish() -> None:
+    """Wait for the second process, if there is one."""
+    while _helpers:
+        helper = _helpers.pop()
+        helper.wait()
+        atexit.unregister(helper.kill)
+
+
+def environment() -> dict[str, str]:
+    """The variables of a process that compiles what this one would, into the same cache."""
+    package = str(PACKAGE.parent)
+    return {
+        **os.environ,
+        "HYBRID_CACHE_DIR": str(cache_directory().absolute()),
+        "PYTHONPATH": os.pathsep.join([package, *filter(None, sys.path)]),
+    }
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

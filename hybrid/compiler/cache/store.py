@@ -1,0 +1,91 @@
+"""What was found out about systems, on disk, so that the next process need not wait for SymPy."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.compiler.cache.folder import PACKAGE, cache_folder, keep, kept, source_key
+from hybrid.compiler.cache.loader import kernels_key, sources_in
+from hybrid.compiler.emitted import Emitted, Programs, Propagator, Series
+
+
+def models_folder() -> Path:
+    """Folder of what is kept of models, named after what makes machine code of them."""
+    return cache_folder(f"models-{_compiler()}")
+
+
+def read(operations: str) -> Emitted | None:
+    """What was found out about the system of these operations; None if nothing is known, or it is damaged."""
+    return _read(_path(operations))
+
+
+def write(operations: str, emitted: Emitted) -> None:
+    """Keep what was found out about the system of these operations."""
+    text = json.dumps(attrs.asdict(emitted), default=int)
+    keep(_path(operations), f"{_checksum(text)}\n{text}".encode())
+
+
+def _path(operations: str) -> Path:
+    return models_folder() / f"emitted_{_digest(operations)}.json"
+
+
+@cache
+def _compiler() -> str:
+    paths = sources_in(PACKAGE / "compiler" / "llvm")
+    return source_key(kernels_key(), *(path.read_text(encoding="utf-8") for path in paths))
+
+
+def _digest(operations: str) -> str:
+    return hashlib.sha256(f"{_tracer()}\n{operations}".encode()).hexdigest()
+
+
+@cache
+def _tracer() -> str:
+    """What does the tracing: this package and what it stands on."""
+    import importlib.metadata
+
+    kernels = PACKAGE / "kernels"
+    # The folder is named after the kernels.
+    sources = [path for path in sources_in(PACKAGE) if kernels not in path.parents]
+    digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
+    versions = [importlib.metadata.version(package) for package in ("sympy", "mpmath")]
+    return " ".join([digest, sys.version, np.__version__, *versions])
+
+
+def _read(path: Path) -> Emitted | None:
+    checksum, _, text = (kept(path) or b"").decode(errors="replace").partition("\n")
+    if checksum != _checksum(text):
+        return None
+    try:
+        found: dict[str, Any] = json.loads(text)
+        of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
+        of_modes = ("affine_mode", "autonomous", "discontinuities", "traced_field")
+        parts = ("first_forcing", "forcing_component", "first_residue", "residue_component")
+        for name in (*of_transitions, *of_modes, "timed_guard", *parts):
+            found[name] = tuple(found[name])
+        names = ("rows", "checked", "numbers", "first")
+        rows, checked, numbers, first = (found["programs"][name] for name in names)
+        found["programs"] = Programs(
+            tuple(map(tuple, rows)), tuple(checked), tuple(map(float, numbers)), tuple(first)
+        )
+        found["propagators"] = tuple(map(_propagator, found["propagators"]))
+        return Emitted(**found)
+    except (ValueError, LookupError, TypeError):
+        return None
+
+
+def _propagator(found: dict[str, Any]) -> Propagator:
+    series = Series(**{**found["series"], "statements": (), "tangent_statements": ()})
+    return Propagator(found["kind"], found["degree"], found["reason"], series, tuple(found["guards"]))
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,323 @@
+"""From a model to machine code: a few small functions each, called by kernels that all models share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.compiler.agreement import check_agreement
+from hybrid.compiler.cache import store
+from hybrid.compiler.cache.folder import announced
+from hybrid.compiler.cache.loader import Absent, address, entry, load_kernels
+from hybrid.compiler.operations import operations_of
+from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
+from hybrid.compiler.surfaces import is_paired
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types.codes import NARROW, NO_MODE, RUNGE_KUTTA
+from hybrid.system.functions import CONDITION, Role
+from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.periodicity import period_fault
+
+if TYPE_CHECKING:
+    from hybrid.compiler.emitted import Emitted
+
+# The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
+ROLE_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
+GRADIENT = 3
+UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
+# Parameter vectors to remember.
+REMEMBERED = 10_000
+UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
+
+
+@attrs.frozen(eq=False, repr=False)
+class CompiledSystem:
+    """A system's roles as machine code and its graph as index arrays; one for all parameter values.
+
+    Attributes
+    ----------
+    system
+        The model.
+    emitted
+        The generated source and what tracing could prove of the model.
+    parts
+        The compiled functions by name, for each part of ``hybrid.compiler.parts`` that was needed so far.
+    plans
+        What runs by one solver have in common, kept here by those who make runs.
+    periodic_at
+        Parameter vectors at which the declared period was found to be one, where that is not proved.
+    """
+
+    system: HybridSystem
+    emitted: Emitted
+    parts: dict[str, Any] = attrs.field(factory=dict, init=False)
+    plans: dict[Any, Any] = attrs.field(factory=dict, init=False)
+    periodic_at: set[bytes] = attrs.field(factory=set, init=False)
+
+    def __repr__(self) -> str:
+        system = self.system
+        lines = [f"CompiledSystem of {system.name or 'a system'}: {system.dimension} states"]
+        modes = zip(system.mode_names, self.emitted.propagators, self.emitted.discontinuities, strict=True)
+        for mode, (name, propagator, jumps) in enumerate(modes):
+            lines.append(f"  mode {name}: {propagator}")
+            if not self.emitted.pulses_excluded(mode):
+                lines.append(f"    {UNBOUNDED}")
+            elif self.emitted.has_forcing(mode):
+                lines.append("    its forcing is bounded on each step, no pulse in time is stepped over")
+            if jumps:
+                lines.append(f"    its field jumps where {jumps}: {UNCARRIED}")
+        for index, name in enumerate(system.transition_names):
+            lines.append(f"  transition {name}: {self._crossings_of(index)}")
+        return "\n".join(lines)
+
+    def _crossings_of(self, transition: int) -> str:
+        """How the crossings of a guard are found, in words."""
+        emitted = self.emitted
+        if emitted.affine_guard[transition]:
+            return "affine guard, its crossings are isolated on each step"
+        if emitted.is_sampled(transition):
+            return "guard sampled on each step: its crossings are not proved"
+        return "guard bounded on each step, its crossings are proved"
+
+    def value(self, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """A compiled function of the mode or transition of that index, ``(rows,)``; nan if it fails."""
+        out = np.full(role.rows, np.nan)
+        offset = len(self.system.transitions) if role.name == CONDITION else 0
+        self._call("vector_role", ROLE_NUMBERS[role.name], index + offset, t, x, parameters, out)
+        return out
+
+    def derivative(
+        self, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+    ) -> np.ndarray:
+        """Its derivative ``(rows, n + 1)``, that in time last."""
+        out = np.full((role.rows, self.system.dimension + 1), np.nan)
+        if role.size is None:
+            self._call("vector_role", GRADIENT, index, t, x, parameters, out[0])
+        else:
+            self._call("matrix_role", ROLE_NUMBERS[role.name], index, t, x, parameters, out)
+        return out
+
+    def _call(
+        self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
+    ) -> None:
+        call = entry(vars(load_kernels("hybrid.kernels.evaluate"))[kernel])
+        model = self._model.replace(parameters=np.array(parameters, dtype=float))
+        call(model, number, index, float(t), np.array(x, dtype=float), out)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return compile_system, (self.system,)
+
+    def __copy__(self) -> CompiledSystem:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CompiledSystem:
+        return self
+
+    def functions(self, part: str) -> dict[str, Any]:
+        """The compiled functions of a part of ``hybrid.compiler.parts`` by name, each with its ``address``.
+
+        Raises
+        ------
+        ModelError
+            If a function that tracing could not follow cannot be compiled as it is.
+        """
+        if part not in self.parts:
+            # What imports LLVM waits until a model is compiled.
+            from hybrid.compiler.llvm.functions import functions_of
+
+            with announced(f"hybrid: compiling {self.system.name or 'the model'} ..."):
+                self.parts[part] = functions_of(self.emitted, part, self._own)
+        found: dict[str, Any] = self.parts[part]
+        return found
+
+    @cached_property
+    def _own(self) -> Any:
+        from hybrid.compiler.llvm.functions import own_functions
+
+        return own_functions(self.emitted)
+
+    def moving(self, kinds: Iterable[int], tangents: int) -> dict[str, Any]:
+        """The functions that advance modes by propagators of these kinds, by their names in a model."""
+        needed: dict[str, Any] = {}
+        if any(kind != RUNGE_KUTTA for kind in kinds):
+            part = TANGENT_SERIES if tangents else SERIES
+            [needed["series"]] = self.functions(part).values()
+        if tangents and RUNGE_KUTTA in kinds:
+            needed |= self.functions(VARIATIONAL)
+        return needed
+
+    def series_columns(self, tangents: int) -> int:
+        """Columns that the series of any mode need."""
+        groups = -(-arguments.count("tangents", tangents, 0) // NARROW)
+        widest = max(each.series.tangent_columns for each in self.emitted.propagators)
+        return self.emitted.tangent_start + groups * widest
+
+    def model(self, parameters: Mapping[str, float] | None = None) -> Any:
+        """What the kernels are given: functions at a point, parameter values, graph."""
+        return self.at(parameters, self._model)
+
+    def moved_by(self, moving: Mapping[str, Any], propagator: np.ndarray | None) -> Any:
+        """A model at its default parameters, with what ``moving`` returned, and with other propagators."""
+        changes = dict(moving) if propagator is None else {**moving, "propagator": propagator}
+        return self.at(None, self._model.replace(**changes))
+
+    def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
+        """A model at parameter values."""
+        from hybrid.system.graph import period_at
+
+        values = self.system.parameter_values(parameters)
+        # Runs may share a model.
+        values.flags.writeable = False
+        period = period_at(self.system, values) or 0.0
+        if parameters and not self.emitted.proved_period:
+            self._check_period(values, period)
+        changes: dict[str, Any] = {"parameters": values, "period": period}
+        if self.emitted.programs.rows:
+            changes["programs"] = self._programs.replace(parameters=values)
+        return model.replace(**changes)
+
+    def _check_period(self, values: np.ndarray, period: float) -> None:
+        """ArgumentError if the period is none at these values; they are remembered if it is one."""
+        key = values.tobytes()
+        if key in self.periodic_at:
+            return
+        fault = period_fault(self.system, values, period)
+        if fault is not None:
+            raise ArgumentError(fault)
+        if len(self.periodic_at) >= REMEMBERED:
+            self.periodic_at.clear()
+        self.periodic_at.add(key)
+
+    @cached_property
+    def _programs(self) -> Any:
+        from hybrid.kernels.types.layout import Programs
+
+        programs = self.emitted.programs
+        return Programs(
+            rows=np.array(programs.rows, dtype=np.int64).reshape(-1, 4),
+            checked=_indices(programs.checked),
+            numbers=np.array(programs.numbers, dtype=float),
+            first=_indices(programs.first),
+            parameters=self.system.parameter_values(),
+        )
+
+    @cached_property
+    def _model(self) -> Any:
+        from hybrid.kernels.types.layout import Model
+
+        system = self.system
+        transitions = system.transitions
+        first_outgoing, outgoing = _leaving(system, at_start=False)
+        first_at_start, at_start = _leaving(system, at_start=True)
+        return Model(
+            **self.functions(FIELDS),
+            **self.functions(EVENTS),
+            variational_flow=Absent(),
+            series=Absent(),
+            parameters=system.parameter_values(),
+            dimension=system.dimension,
+            first_outgoing=first_outgoing,
+            outgoing=outgoing,
+            first_at_start=first_at_start,
+            at_start=at_start,
+            target=_indices(_index_or_none(system, transition.target) for transition in transitions),
+            direction=_indices(transition.guard.direction for transition in transitions),
+            affine_guard=_indices(self.emitted.affine_guard),
+            guard_in_series=_indices(self.emitted.guard_in_series),
+            programs=self._programs,
+            **_program_runners(bool(self.emitted.programs.rows)),
+            first_forcing=_indices(self.emitted.first_forcing),
+            forcing_component=_indices(self.emitted.forcing_component),
+            first_residue=_indices(self.emitted.first_residue),
+            residue_component=_indices(self.emitted.residue_component),
+            surface=_indices(self.emitted.surface),
+            orientation=_indices(self.emitted.orientation),
+            paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
+            marker=_indices(transition.is_marker for transition in transitions),
+            accumulates_to=_indices(
+                _index_or_none(system, transition.accumulates_to) for transition in transitions
+            ),
+            propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
+            degree=_indices(propagator.degree for propagator in self.emitted.propagators),
+            timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
+            tangent_start=self.emitted.tangent_start,
+            tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
+            period=0.0,
+        )
+
+    def _is_timed(self, mode: int) -> bool:
+        """Whether the field of a mode, or one of the guards in it, may depend on time."""
+        emitted, name = self.emitted, self.system.mode_names[mode]
+        pairs = zip(self.system.transitions, emitted.timed_guard, strict=True)
+        return not emitted.autonomous[mode] or any(timed for each, timed in pairs if each.source == name)
+
+
+def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.ndarray]:
+    """First places, and the indices of the transitions that leave each mode, whose guards are of one kind."""
+    indices: list[int] = []
+    first = [0]
+    for name in system.mode_names:
+        indices += [
+            i
+            for i, transition in enumerate(system.transitions)
+            if transition.source == name and transition.guard.at_start == at_start
+        ]
+        first.append(len(indices))
+    return _indices(first), _indices(indices)
+
+
+def _program_runners(needed: bool) -> dict[str, Any]:
+    """The kernels that run programs; they are not loaded where there are none."""
+    if not needed:
+        return {"bound": Absent(), "spread": Absent()}
+    bounds = load_kernels("hybrid.kernels.events.bounds")
+    return {"bound": address(bounds.bound_guard), "spread": address(bounds.spread_by_rounding)}
+
+
+def _index_or_none(system: HybridSystem, mode: str | None) -> int:
+    return NO_MODE if mode is None else system.mode_index(mode)
+
+
+def _indices(values: Any) -> np.ndarray:
+    return np.array([int(value) for value in values], dtype=np.int64)
+
+
+def compile_system(system: HybridSystem) -> CompiledSystem:
+    """Trace, differentiate and compile a model; repeated calls return what the first one made.
+
+    Raises
+    ------
+    ModelError
+        If a function can be neither traced nor compiled, nor differentiated, or the compiled function is not
+        the Python function.
+    ArgumentError
+        If ``system`` is not a HybridSystem.
+    """
+    as_system("system", system)
+    compiled: CompiledSystem | None = system._compiled
+    if compiled is None:
+        load_kernels()
+        compiled = CompiledSystem(system, emitted_of(system))
+        check_agreement(compiled)
+        object.__setattr__(system, "_compiled", compiled)
+    return compiled
+
+
+def emitted_of(system: HybridSystem) -> Emitted:
+    """What `emit` makes of a system, or what it made of the same one before."""
+    operations = operations_of(system)
+    found = None if operations is None else store.read(operations)
+    if found is not None:
+        return found
+    # SymPy is imported only now.
+    from hybrid.compiler.emit import emit
+
+    emitted = emit(system)
+    if operations is not None and not emitted.opaque:
+        store.write(operations, emitted)
+    return emitted

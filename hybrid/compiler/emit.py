@@ -1,0 +1,428 @@
+"""The Python source of a system's compiled roles.
+
+Each role is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
+fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
+columns, time last. The variational flow is the one role that reads all of ``x (n (1 + k),)``: the state and
+``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import sympy
+
+from hybrid.compiler.bounds.forcing import forcings
+from hybrid.compiler.bounds.program import programs
+from hybrid.compiler.bounds.residues import residue_of_guard, residues
+from hybrid.compiler.emitted import Emitted, Propagator, Series
+from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
+from hybrid.compiler.parts import PARTS
+from hybrid.compiler.propagators import Boundary, known_positive, propagator
+from hybrid.compiler.surfaces import surfaces
+from hybrid.compiler.taylor.loops import padded
+from hybrid.errors import ModelError
+from hybrid.kernels.types.codes import WIDE
+from hybrid.symbolic.continuity import jumps_of, may_jump
+from hybrid.symbolic.expressions import JUMPING, ONE, ZERO, Select
+from hybrid.symbolic.nodes import forget, mentions, nodes_of
+from hybrid.symbolic.printer import IMPORTS, assignments, unprintable
+from hybrid.symbolic.signs import simplified
+from hybrid.symbolic.tracing import Symbols, TraceError, model_symbols, trace
+from hybrid.system.checks import derivative_has_time_column
+from hybrid.system.derivatives import complex_step_error, symbolic_jacobian
+from hybrid.system.functions import Role, condition_role, field_role, guard_role, reset_role
+from hybrid.system.periodicity import is_periodic
+
+if TYPE_CHECKING:
+    from hybrid.system.graph import HybridSystem, Transition
+
+# A cell of a matrix in the statements for a derivative.
+_CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
+_ZERO_CELL = re.compile(r"out\[\d+, \d+\] = 0\.0")
+# So many zeros are written by a loop.
+MANY_ZEROS = 50
+# A state or a parameter in an expression.
+_INDEXED = re.compile(r"\b[xp]\[\d+\]")
+
+
+def emit(system: HybridSystem) -> Emitted:
+    """Trace and differentiate every function of a system, and write the source of its roles.
+
+    Raises
+    ------
+    ModelError
+        If a function can neither be traced nor differentiated by the complex step, and comes without
+        a derivative.
+    """
+    try:
+        return _emitted(system)
+    finally:
+        forget()
+
+
+def _emitted(system: HybridSystem) -> Emitted:
+    writer = _Writer(system)
+    fields = [writer.write(field_role(system, mode)) for mode in system.modes]
+    guards = [writer.write(guard_role(transition)) for transition in system.transitions]
+    conditions = [_written_condition(writer, transition) for transition in system.transitions]
+    resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
+    boundaries = [_boundaries(system, mode.name, guards, writer.symbols) for mode in system.modes]
+    propagators = [
+        propagator(field.expressions, around, writer.symbols)
+        for field, around in zip(fields, boundaries, strict=True)
+    ]
+    n = system.dimension
+    series = [each.series for each in propagators]
+    bodies: dict[str, list[Sequence[str]]] = {
+        "flow": [field.value for field in fields],
+        "flow_jacobian": [_zeros_first(field.derivative, n) for field in fields],
+        "variational_flow": [_variational(field, n) for field in fields],
+        "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
+        "guard_gradient": [guard.derivative for guard in guards],
+        "reset": [reset.value for reset in resets],
+        "reset_jacobian": [_zeros_first(reset.derivative, n) for reset in resets],
+        "series": _placed(series, [each.statements for each in series]),
+        "tangent_series": _placed(series, [each.tangent_statements for each in series]),
+    }
+    symbols = writer.symbols
+    affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
+    traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
+    surface, orientation = surfaces([transition.guard.function for transition in system.transitions], traced)
+    pulses = [forcings(field.expressions, symbols) for field in fields]
+    forcing = [each for of_mode in pulses for each in of_mode]
+    residual = [
+        residues(field.expressions, _gradients(system, mode.name, guards), symbols)
+        for field, mode in zip(fields, system.modes, strict=True)
+    ]
+    cancelling = [each for of_mode in residual for each in of_mode]
+    not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
+    return Emitted(
+        texts={
+            part: "\n\n".join((IMPORTS, *(_function(name, bodies[name]) for name in names)))
+            for part, names in PARTS.items()
+        },
+        opaque=writer.opaque,
+        affine_guard=affine,
+        guard_in_series=_guards_in_series(system, propagators),
+        programs=programs(
+            not_affine,
+            [each.expression for each in forcing],
+            [*(each.expression for each in cancelling), *(residue_of_guard(g, symbols) for g in traced)],
+            symbols,
+        ),
+        first_forcing=tuple(accumulate(map(len, pulses), initial=0)),
+        forcing_component=tuple(each.component for each in forcing),
+        first_residue=tuple(accumulate(map(len, residual), initial=0)),
+        residue_component=tuple(each.component for each in cancelling),
+        traced_field=tuple(field.expressions is not None for field in fields),
+        surface=surface,
+        orientation=orientation,
+        affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
+        autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
+        discontinuities=tuple(
+            _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
+        ),
+        proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
+        timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
+        propagators=tuple(map(_without_text, propagators)),
+        tangent_start=_tangent_start(series),
+    )
+
+
+def _placed(series: Sequence[Series], statements: Sequence[Sequence[str]]) -> list[Sequence[str]]:
+    """The bodies of the series of all modes, each with its columns in the matrix that they share.
+
+    Every mode has a table of its own, which stays when another mode writes its series.
+    """
+    table, vectors = max(each.columns for each in series), _tangent_start(series)
+    bodies: list[Sequence[str]] = []
+    for each, lines in zip(series, statements, strict=True):
+        bodies.append([f"table = {table}", f"vectors = {vectors}", *lines] if lines else [])
+        table += each.table_columns
+    return bodies
+
+
+def _tangent_start(series: Sequence[Series]) -> int:
+    """The first column of tangent vectors: behind those of the state and behind all tables."""
+    whole = max(each.columns for each in series) + sum(each.table_columns for each in series)
+    return padded(whole, WIDE)
+
+
+def _without_text(propagator: Propagator) -> Propagator:
+    """The propagator without the statements, which are in the texts of the model."""
+    series = attrs.evolve(propagator.series, statements=(), tangent_statements=())
+    return attrs.evolve(propagator, series=series)
+
+
+@attrs.frozen
+class _Written:
+    """Statements for a function and its derivative; the expressions behind them if it was traced."""
+
+    value: list[str]
+    derivative: list[str]
+    expressions: list[sympy.Expr] | None = None
+    jacobian: list[list[sympy.Expr]] | None = None
+    given: bool = False
+
+
+class _Writer:
+    """Writes the statements of model functions, and gathers those that stay opaque."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        self.symbols: Symbols = model_symbols(system.dimension, len(system.parameters))
+        self.opaque: dict[str, OpaqueFunction] = {}
+
+    def write(self, role: Role) -> _Written:
+        targets = ["out[0]"] if role.size is None else [f"out[{i}]" for i in range(role.size)]
+        try:
+            expressions = self.traced(role.function)
+            jacobian = symbolic_jacobian(expressions, self.symbols.variables)
+            _check_printable(entry for row in jacobian for entry in row)
+        except ModelError as error:
+            return self._write_opaque(role, targets, error)
+        if role.derivative is None:
+            derivative = assignments(self._cells(role), [entry for row in jacobian for entry in row])
+        else:
+            derivative = self._given_derivative(role, role.derivative)
+        given = role.derivative is not None
+        return _Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
+
+    def condition(self, role: Role) -> _Written:
+        """Statements for the condition of a guard; a truth value becomes 1 or 0."""
+        try:
+            [value] = self.traced(role.function)
+        except ModelError as reason:
+            return _Written(self._opaque_value(role, ["out[0]"], reason), [])
+        statements = assignments(["out[0]"], [Select(value, ONE, ZERO) if value.is_Boolean else value])
+        return _Written(statements, [], [value])
+
+    def identity(self) -> _Written:
+        """The reset of a transition that has none."""
+        n = self.system.dimension
+        value = assignments([f"out[{i}]" for i in range(n)], self.symbols.x)
+        cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
+        entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
+        return _Written(value, assignments(cells, entries), [*self.symbols.x])
+
+    def traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
+        """Expressions of a function; ModelError if it has none that can be compiled."""
+        expressions = trace(function, self.system.state, tuple(self.system.parameters))
+        _check_printable(expressions)
+        return expressions
+
+    def _write_opaque(self, role: Role, targets: Sequence[str], reason: ModelError) -> _Written:
+        value = self._opaque_value(role, targets, reason)
+        if role.derivative is not None:
+            return _Written(value, self._given_derivative(role, role.derivative))
+        error = complex_step_error(self.system, role)
+        if error is not None:
+            raise ModelError(
+                f"{role.title} cannot be differentiated. Tracing stopped: {reason}. The complex step "
+                f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, "
+                f"np.maximum) or give its derivative as {role.derivative_name}=."
+            ) from (reason.__cause__ or error)
+        return _Written(value, self._complex_step(role, reason))
+
+    def _opaque_value(self, role: Role, targets: Sequence[str], reason: ModelError) -> list[str]:
+        shape = () if role.size is None else (role.size,)
+        name = self._opaque_name(role.title, role.function, reason, shape)
+        return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
+
+    def _complex_step(self, role: Role, reason: ModelError) -> list[str]:
+        shape = () if role.size is None else (role.size,)
+        name, columns = self._opaque_name(role.title, role.function, reason, shape), self.system.dimension + 1
+        self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
+        lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
+        cells = iter(self._cells(role))
+        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(role.rows) for j in range(columns)]
+        return lines
+
+    def _given_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
+        n, cells = self.system.dimension, self._cells(role)
+        try:
+            entries = self.traced(derivative)
+        except ModelError as reason:
+            return self._opaque_derivative(role, derivative, reason)
+        width = len(entries) // role.rows
+        zeros = [ZERO] * (n + 1 - width)
+        rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(role.rows)]
+        return assignments(cells, [entry for row in rows for entry in row])
+
+    def _opaque_derivative(self, role: Role, derivative: Callable[..., Any], reason: ModelError) -> list[str]:
+        n = self.system.dimension
+        width = n + 1 if derivative_has_time_column(self.system, role) else n
+        shape = (width,) if role.size is None else (role.size, width)
+        name = self._opaque_name(role.derivative_title, derivative, reason, shape)
+        cells = iter(self._cells(role))
+        lines = [f"r = {name}(t, x, p)"]
+        for i in range(role.rows):
+            entries = [*(f"r[{i * width + j}]" for j in range(width)), *["0.0"] * (n + 1 - width)]
+            lines += [f"{next(cells)} = {entry}" for entry in entries]
+        return lines
+
+    def _cells(self, role: Role) -> list[str]:
+        columns = range(self.system.dimension + 1)
+        if role.size is None:
+            return [f"out[{j}]" for j in columns]
+        return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
+
+    def _opaque_name(
+        self, title: str, function: Callable[..., Any], reason: ModelError, shape: tuple[int, ...]
+    ) -> str:
+        for name, known in self.opaque.items():
+            if known.function is function and known.shape == shape:
+                return name
+        check_plain(title, function)
+        name, names = f"model_{len(self.opaque)}", tuple(self.system.parameters)
+        why = str(reason).rstrip(".")
+        self.opaque[name] = OpaqueFunction(title, function, why, self.system.state, names, shape)
+        return name
+
+
+def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
+    missing = unprintable(expressions)
+    if missing is not None:
+        raise TraceError(f"the function {missing} has no compiled form")
+
+
+def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Written:
+    role = reset_role(system, system.transitions[index])
+    return writer.identity() if role is None else writer.write(role)
+
+
+def _boundaries(
+    system: HybridSystem, mode: str, guards: Sequence[_Written], symbols: Symbols
+) -> list[Boundary]:
+    return [
+        Boundary(
+            None if written.expressions is None else written.expressions[0],
+            -transition.guard.direction if _ends_mode(transition) else 0,
+            _is_affine(written, symbols.variables),
+        )
+        for transition, written in zip(system.transitions, guards, strict=True)
+        if transition.source == mode and not transition.guard.at_start
+    ]
+
+
+def _gradients(
+    system: HybridSystem, mode: str, guards: Sequence[_Written]
+) -> list[Sequence[sympy.Expr] | None]:
+    """The gradients of the guards in a mode; None for one that is not traced."""
+    pairs = zip(system.transitions, guards, strict=True)
+    written = [guard for transition, guard in pairs if transition.source == mode]
+    return [None if guard.jacobian is None or guard.given else guard.jacobian[0] for guard in written]
+
+
+def _where_it_jumps(
+    system: HybridSystem, index: int, field: _Written, boundaries: Sequence[Boundary], symbols: Symbols
+) -> str:
+    """Where the field of a mode jumps in the state, in words; empty if it is proved to jump nowhere."""
+    if field.expressions is None:
+        role = field_role(system, system.modes[index])
+        differentiable = role.derivative is None or complex_step_error(system, role) is None
+        return "it branches" if may_jump(role.function, differentiable) else ""
+    known = known_positive(boundaries)
+    places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
+    names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
+    names |= {f"p[{i}]": name for i, name in enumerate(system.parameters)}
+    return ", or ".join(_INDEXED.sub(lambda match: names[match[0]], place) for place in places)
+
+
+def _has_proved_period(system: HybridSystem, written: Iterable[_Written], writer: _Writer) -> bool:
+    """Whether all traced functions are proved to have the declared period, at any parameters."""
+    if system.period is None:
+        return True
+    period: Any = system.period
+    symbols = writer.symbols
+    if callable(period):
+        try:
+            [period] = writer.traced(lambda t, x, p: system.period(p))  # type: ignore[operator,misc]
+        except ModelError:
+            return False
+    return all(
+        each.expressions is not None and is_periodic(each.expressions, symbols.t, sympy.sympify(period))
+        for each in written
+    )
+
+
+def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -> tuple[bool, ...]:
+    """By transition: whether the series of its source mode hold its guard; none follow guards of a start."""
+    held = {mode: iter(each.guards) for mode, each in zip(system.mode_names, propagators, strict=True)}
+    return tuple(
+        not transition.guard.at_start and next(held[transition.source], False)
+        for transition in system.transitions
+    )
+
+
+def _ends_mode(transition: Transition) -> bool:
+    """Whether no state beyond the guard stays in the mode."""
+    return transition.source != transition.target and transition.guard.when is None
+
+
+def _written_condition(writer: _Writer, transition: Transition) -> _Written:
+    role = condition_role(transition)
+    return _Written([], [], []) if role is None else writer.condition(role)
+
+
+def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
+    """Source of a role with one branch per index; an empty one is left out."""
+    order = "order, " if name.endswith("series") else ""
+    lines = [f"def {name}(index, t, x, p, {order}out):"]
+    for index, statements in enumerate(branches):
+        if statements:
+            lines.append(f"    {'if' if len(lines) == 1 else 'elif'} index == {index}:")
+            lines += [f"        {statement}" for statement in statements]
+    if len(lines) == 1:
+        lines.append("    pass")
+    return "\n".join(lines) + "\n"
+
+
+def _zeros_first(statements: list[str], n: int) -> list[str]:
+    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
+    zeros = [each for each in statements if _ZERO_CELL.fullmatch(each)]
+    if len(zeros) < MANY_ZEROS:
+        return statements
+    others = [each for each in statements if not _ZERO_CELL.fullmatch(each)]
+    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
+    return [*loop, *others]
+
+
+def _variational(field: _Written, n: int) -> list[str]:
+    """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
+
+    Entries that are proved zero cost nothing, and what field and Jacobian share is computed once.
+    """
+    entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
+    if field.expressions is None or field.jacobian is None or field.given:
+        local = [_CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
+        lines = [*field.value, *local]
+    else:
+        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}
+        targets = [*(f"out[{i}]" for i in range(n)), *entry.values()]
+        lines = assignments(targets, [*field.expressions, *(field.jacobian[i][j] for i, j in entry)])
+    lines.append(f"for v in range({n}, len(x), {n}):")
+    for i in range(n):
+        terms = [f"{entry[i, j]}*x[v + {j}]" for j in range(n) if (i, j) in entry]
+        lines.append(f"    out[v + {i}] = {' + '.join(terms) or '0.0'}")
+    trace = [entry[i, i] for i in range(n) if (i, i) in entry]
+    return [*lines, f"out[len(x)] = {' + '.join(trace) or '0.0'}"]
+
+
+def _is_affine(written: _Written, variables: Sequence[sympy.Symbol]) -> bool:
+    """Whether the derivative in the variables, which come first, is proved to depend on none of them."""
+    if written.expressions is None or written.jacobian is None:
+        return False
+    # A floor or a sign has slope zero on both sides of its jumps.
+    jumps = nodes_of(JUMPING, *written.expressions)
+    entries = [entry for row in written.jacobian for entry in row[: len(variables)]]
+    return _is_free(jumps, variables) and _is_free(entries, variables)
+
+
+def _is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:
+    return expressions is not None and not any(mentions(expression, variables) for expression in expressions)

@@ -1,0 +1,176 @@
+"""What tracing has found out about a system, apart from SymPy, which found it."""
+
+from __future__ import annotations
+
+import attrs
+
+from hybrid.compiler.opaque import OpaqueFunction
+from hybrid.kernels.types.codes import PROPAGATORS
+
+
+@attrs.frozen
+class Series:
+    """The series of a mode as statements, and the columns that they fill.
+
+    Attributes
+    ----------
+    statements, tangent_statements
+        Body of the mode in the functions ``series`` and ``tangent_series``. ``table`` and ``vectors`` in it
+        are the first columns of its table and of the tangent vectors.
+    columns, table_columns, tangent_columns
+        Numbers of columns for the state and what it is made of, for a table that stays, and for four tangent
+        vectors.
+    """
+
+    statements: tuple[str, ...] = ()
+    tangent_statements: tuple[str, ...] = ()
+    columns: int = 0
+    table_columns: int = 0
+    tangent_columns: int = 0
+
+
+NO_SERIES = Series()
+
+
+@attrs.frozen
+class Propagator:
+    """How a mode is advanced, and why.
+
+    Attributes
+    ----------
+    kind
+        A code of ``hybrid.kernels.types.codes``: RUNGE_KUTTA, TAYLOR, EXACT, DESINGULARISED or
+        ROOTED.
+    degree
+        Degree in time of every solution, and of every guard along it, if those are polynomials, else 0.
+    reason
+        What tracing found.
+    series
+        The series of its solutions; nothing for RUNGE_KUTTA.
+    guards
+        By transition that leaves the mode: whether the series hold its guard in a column.
+    """
+
+    kind: int
+    degree: int
+    reason: str
+    series: Series = NO_SERIES
+    guards: tuple[bool, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{PROPAGATORS[self.kind]} ({self.reason})"
+
+
+@attrs.frozen
+class Programs:
+    """The programs of all guards of a system, behind them those of its forcings, and of its residues.
+
+    Attributes
+    ----------
+    rows
+        Operations with their operands (see ``hybrid.kernels.arithmetic.operations``). Operands count from the
+        start of their own program.
+    checked
+        By row: 1 for the rows of a forcing that could hide a pulse.
+    numbers
+        The numbers that the operations refer to.
+    first
+        By transition, then by forcing, then by residue, then by transition for the residues of guards: the
+        first of its rows, and behind them the number of all rows. A guard without rows is affine, or could
+        not be traced.
+    """
+
+    rows: tuple[tuple[int, int, int, int], ...]
+    checked: tuple[int, ...]
+    numbers: tuple[float, ...]
+    first: tuple[int, ...]
+
+    @property
+    def longest(self) -> int:
+        """Rows of the longest program."""
+        return max((b - a for a, b in zip(self.first, self.first[1:], strict=False)), default=0)
+
+
+@attrs.frozen
+class Emitted:
+    """What the compiler needs to know of a system.
+
+    Parameters
+    ----------
+    texts
+        By part of ``hybrid.compiler.parts``: text of a module with the functions of the part. Behind the
+        guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
+        model gives the same text, in any process.
+    opaque
+        The model functions that tracing could not follow, by their names in the text.
+    affine_guard
+        By transition: whether the guard's gradient, its slope in time included, is proved to depend on
+        parameters only.
+    guard_in_series
+        By transition: whether the series of its mode hold its guard in a column, which is a polynomial then.
+    programs
+        The guards that are neither affine nor opaque, and the forcings, as lists of operations.
+    first_forcing
+        By mode: the first of its forcings, and behind them the number of all.
+    forcing_component
+        By forcing: the component of the state whose rate it is a term of, or -1.
+    first_residue
+        By mode: the first of its residues, which are rates that may cancel to their rounding, and behind them
+        the number of all.
+    residue_component
+        By residue: the component of the state whose rate it is.
+    traced_field
+        By mode: whether tracing could follow the field.
+    affine_mode
+        By mode: whether the field's derivative in the state is proved not to depend on the state.
+    surface, orientation
+        By transition: the number of the guard's zero set, the same for guards that differ by a constant
+        factor, and the sign of that factor.
+    autonomous
+        By mode: whether the field is proved not to depend on time.
+    discontinuities
+        By mode: where the field jumps in the state, in words; empty where it is proved to be continuous.
+    proved_period
+        Whether every function is proved to have the declared period, whatever the parameters.
+    timed_guard
+        By transition: whether the guard may depend on time.
+    propagators
+        By mode: how it is best advanced.
+    tangent_start
+        The first column of tangent vectors in series.
+    """
+
+    texts: dict[str, str]
+    opaque: dict[str, OpaqueFunction]
+    affine_guard: tuple[bool, ...]
+    guard_in_series: tuple[bool, ...]
+    programs: Programs
+    first_forcing: tuple[int, ...]
+    forcing_component: tuple[int, ...]
+    first_residue: tuple[int, ...]
+    residue_component: tuple[int, ...]
+    traced_field: tuple[bool, ...]
+    surface: tuple[int, ...]
+    orientation: tuple[int, ...]
+    affine_mode: tuple[bool, ...]
+    autonomous: tuple[bool, ...]
+    discontinuities: tuple[str, ...]
+    proved_period: bool
+    timed_guard: tuple[bool, ...]
+    propagators: tuple[Propagator, ...]
+    tangent_start: int
+
+    def is_sampled(self, transition: int) -> bool:
+        """Whether the crossings of a guard are only sampled: tracing could not follow it."""
+        first = self.programs.first
+        return not self.affine_guard[transition] and first[transition] == first[transition + 1]
+
+    def has_forcing(self, mode: int) -> bool:
+        """Whether the field of a mode has parts in time alone that are bounded over each step."""
+        return self.first_forcing[mode] < self.first_forcing[mode + 1]
+
+    def pulses_excluded(self, mode: int) -> bool:
+        """Whether no pulse in time alone can be stepped over in a mode: all of its forcing can be bounded."""
+        first, guards = self.programs.first, len(self.affine_guard)
+        forcings = range(self.first_forcing[mode], self.first_forcing[mode + 1])
+        return self.traced_field[mode] and all(first[guards + i] < first[guards + i + 1] for i in forcings)

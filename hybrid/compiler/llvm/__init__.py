@@ -1,0 +1,1 @@
+"""From generated statements to LLVM's text and to machine code."""

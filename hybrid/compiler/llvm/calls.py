@@ -1,0 +1,122 @@
+"""What generated text may call, as LLVM's instructions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import attrs
+from llvmlite import ir
+from numba.core import cgutils
+
+from hybrid.kernels.arithmetic.columns import (
+    write_combination,
+    write_combination_of_tangents,
+    write_convolution,
+    write_spread,
+)
+from hybrid.kernels.arithmetic.doubled import write_divided_dot_product
+from hybrid.kernels.arithmetic.lanes import everywhere, read, write, write_down, write_row
+from hybrid.kernels.types.codes import NARROW
+
+NUMBER = ir.DoubleType()
+WHOLE = ir.IntType(64)
+
+
+@attrs.frozen
+class Call:
+    """A function that writes the instructions of a call.
+
+    Attributes
+    ----------
+    writer
+        Called with the builder and the arguments; returns the value.
+    on_numbers
+        Whether all arguments are floats.
+    known
+        Places of arguments that are whole numbers known from the text.
+    """
+
+    writer: Callable[..., Any]
+    on_numbers: bool = False
+    known: tuple[int, ...] = ()
+
+    def __call__(self, builder: Any, *arguments: Any) -> Any:
+        """Write the instructions."""
+        return self.writer(builder, *arguments)
+
+
+def _of_libm(name: str) -> Call:
+    """A function of C's library of mathematics."""
+    return Call(lambda builder, *numbers: _declared(builder, name, numbers), on_numbers=True)
+
+
+def _of_llvm(name: str) -> Call:
+    """A function that LLVM knows."""
+    return Call(lambda builder, *numbers: _declared(builder, f"llvm.{name}.f64", numbers), on_numbers=True)
+
+
+def _declared(builder: Any, name: str, numbers: tuple[Any, ...]) -> Any:
+    kind = ir.FunctionType(NUMBER, [NUMBER] * len(numbers))
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), numbers)
+
+
+def _remainder(builder: Any, a: Any, b: Any) -> Any:
+    """Of the sign of the divisor, as Python's; exact where C's is."""
+    zero = NUMBER(0.0)
+    rest = builder.frem(a, b)
+    is_negative = builder.fcmp_ordered("<", b, zero)
+    differs = builder.xor(is_negative, builder.fcmp_ordered("<", rest, zero))
+    whole = builder.select(is_negative, NUMBER(-0.0), zero)
+    moved = builder.select(differs, builder.fadd(rest, b), rest)
+    return builder.select(builder.fcmp_unordered("!=", rest, zero), moved, whole)
+
+
+def _largest(builder: Any, *numbers: Any) -> Any:
+    """As Python's ``max``: a later one takes the place of an earlier one that it is larger than."""
+    largest, *others = numbers
+    for other in others:
+        largest = builder.select(builder.fcmp_ordered(">", other, largest), other, largest)
+    return largest
+
+
+def _load(builder: Any, matrix: Any, row: Any, column: Any) -> Any:
+    return read(builder, matrix.address(row, column), NARROW)
+
+
+def _store(builder: Any, matrix: Any, row: Any, column: Any, value: Any) -> None:
+    lanes = everywhere(builder, value, NARROW) if value.type == NUMBER else value
+    write(builder, lanes, matrix.address(row, column))
+
+
+def _spread(builder: Any, y: Any, n: int, matrix: Any, first: Any, stride: Any) -> None:
+    write_spread(builder, y.data, y.length, n, matrix, first, stride)
+
+
+IN_LIBM = (
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cosh", "expm1", "hypot", "log1p", "sinh",
+    "tan", "tanh",
+)  # fmt: skip
+IN_LLVM = ("cos", "copysign", "exp", "log", "log10", "log2", "pow", "sin", "sqrt")
+
+CALLS = {
+    **{name: _of_libm(name) for name in IN_LIBM},
+    **{name: _of_llvm(name) for name in IN_LLVM},
+    **{f"np.{name}": _of_llvm(name) for name in ("floor", "ceil", "trunc")},
+    "abs": _of_llvm("fabs"),
+    "max": Call(_largest, on_numbers=True),
+    "np.fmod": Call(lambda builder, a, b: builder.frem(a, b), on_numbers=True),
+    "remainder": Call(_remainder, on_numbers=True),
+    "load": Call(_load),
+    "store": Call(_store),
+    "store_down": Call(write_down),
+    "store_row": Call(write_row),
+    "four_times": Call(lambda builder, number: everywhere(builder, number, NARROW)),
+    "convolve": Call(write_convolution, known=(5, 6)),
+    "convolve_pairs": Call(partial(write_convolution, pairs=True), known=(5, 6)),
+    "combine": Call(write_combination, known=(3,)),
+    "combine_tangents": Call(write_combination_of_tangents, known=(3, 5)),
+    "divided_dot_product": Call(write_divided_dot_product),
+    "spread_tangents": Call(_spread, known=(1,)),
+}

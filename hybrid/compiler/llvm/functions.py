@@ -1,0 +1,86 @@
+"""The compiled functions of a model, from their text or from what an earlier process has kept of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybrid.compiler.cache.folder import keep, kept, say, source_key
+from hybrid.compiler.cache.store import models_folder
+from hybrid.compiler.llvm.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, OwnFunction, parsed
+from hybrid.compiler.llvm.machine import load, machine_code, processor
+from hybrid.compiler.opaque import compiled_functions
+from hybrid.compiler.parts import PARTS
+
+if TYPE_CHECKING:
+    from hybrid.compiler.emitted import Emitted
+    from hybrid.compiler.llvm.machine import Compiled
+
+# Texts whose machine code stays in memory after their systems are gone.
+MOST_SOURCES = 128
+SIGNATURES = {
+    "flow_jacobian": MATRIX_ROLE,
+    "reset_jacobian": MATRIX_ROLE,
+    "series": SERIES_ROLE,
+    "tangent_series": SERIES_ROLE,
+}
+# The products of series may be fused into their sums; in a guard that could make a difference of equal terms
+# differ from zero.
+FUSED = ("series", "tangent_series")
+
+
+def own_functions(emitted: Emitted) -> dict[str, tuple[Any, int]]:
+    """What tracing could not follow, compiled as it is: by name, the code and how many numbers it returns.
+
+    Raises
+    ------
+    ModelError
+        If a function cannot be compiled.
+    """
+    own: dict[str, tuple[Any, int]] = {}
+    for name, opaque in emitted.opaque.items():
+        own |= {each: (code, opaque.size) for each, code in compiled_functions(name, opaque).items()}
+    return own
+
+
+def functions_of(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]]) -> dict[str, Compiled]:
+    """The compiled functions of a part of ``PARTS`` by name; ``own`` are those of ``own_functions``."""
+    if not own:
+        return roles_of(emitted.texts[part], part)
+    # Their addresses are of this process, so what calls them is not kept.
+    calls = {name: OwnFunction(code.address, size) for name, (code, size) in own.items()}
+    code = _code(emitted.texts[part], PARTS[part], calls)
+    return load(code, PARTS[part], needs=[each for each, _ in own.values()])
+
+
+@lru_cache(maxsize=MOST_SOURCES)
+def roles_of(source: str, part: str) -> dict[str, Compiled]:
+    """The compiled functions of a text that calls no function of the user's, shared by all who have it."""
+    path = models_folder() / f"model_{source_key(source, processor())}.o"
+    code = _checked(path)
+    if code is None:
+        code = _code(source, PARTS[part], {})
+        keep(path, hashlib.sha256(code).digest() + code)
+    return load(code, PARTS[part])
+
+
+def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction]) -> bytes:
+    functions = parsed(source)
+    roles = [(functions[name], SIGNATURES.get(name, VECTOR_ROLE), name in FUSED) for name in names]
+    return machine_code(roles, calls)
+
+
+def _checked(path: Path) -> bytes | None:
+    """What is kept at a place if it is what was written there."""
+    content = kept(path)
+    if content is None:
+        return None
+    size = hashlib.sha256().digest_size
+    digest, code = content[:size], content[size:]
+    if hashlib.sha256(code).digest() == digest:
+        return code
+    say(f"hybrid: compiled code in {path.parent} is damaged and is made again.")
+    return None

@@ -1,0 +1,14 @@
+"""From generated text to machine code, without numba's inference of types."""
+
+# The functions of a model, each with the index of a mode or of a transition first, in parts. A part is
+# compiled when a run first needs it; every run needs fields and events. Systems that differ in their guards
+# alone, such as one and its sections, share the fields.
+FIELDS, EVENTS, VARIATIONAL = "fields", "events", "variational flow"
+SERIES, TANGENT_SERIES = "series", "tangent series"
+PARTS = {
+    FIELDS: ("flow", "flow_jacobian"),
+    EVENTS: ("guard", "guard_gradient", "reset", "reset_jacobian"),
+    VARIATIONAL: ("variational_flow",),
+    SERIES: ("series",),
+    TANGENT_SERIES: ("tangent_series",),
+}

@@ -1,0 +1,68 @@
+"""Which guards are the same function, up to a constant factor: the sides of their zero set are the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import sympy
+
+    from hybrid.compiler.emitted import Emitted
+    from hybrid.system.graph import HybridSystem
+
+# Longer expressions are compared as they are, still longer ones not term by term.
+MOST_TERMS = 200
+MOST_SHOWN = 5000
+# Digits to which quotients of coefficients are compared.
+DIGITS = 12
+
+
+def surfaces(
+    functions: Iterable[Callable[..., Any]], expressions: Iterable[sympy.Expr | None]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Number of the zero set of each guard, and the sign of its factor.
+
+    ``expressions`` are None for functions that could not be traced: these are compared as objects. A guard
+    that is constant has no zero set that another could share.
+    """
+    known: dict[Any, int] = {}
+    numbers, signs = [], []
+    for i, (function, expression) in enumerate(zip(functions, expressions, strict=True)):
+        key, sign = (id(function), 1) if expression is None else _without_factor(expression)
+        numbers.append(known.setdefault((i, "constant") if key is None else key, len(known)))
+        signs.append(sign)
+    return tuple(numbers), tuple(signs)
+
+
+def _without_factor(expression: sympy.Expr) -> tuple[Any, int]:
+    """What is left of an expression when its leading coefficient is divided out, and the coefficient's sign.
+
+    None instead if it is a constant.
+    """
+    from hybrid.symbolic.nodes import is_larger_than, symbols_of
+
+    if not symbols_of(expression):
+        return None, 1
+    if is_larger_than(MOST_SHOWN, expression):
+        # As it stands: to write it out would take for ever.
+        return expression, 1
+    if not is_larger_than(MOST_TERMS, expression):
+        expression = expression.expand()
+    coefficients = expression.as_coefficients_dict()
+    terms = sorted((str(term), float(factor)) for term, factor in coefficients.items())
+    leading = terms[0][1]
+    scaled = tuple((term, f"{factor / leading:.{DIGITS}e}") for term, factor in terms)
+    return scaled, 1 if leading > 0.0 else -1
+
+
+def is_paired(system: HybridSystem, emitted: Emitted, index: int) -> bool:
+    """Whether others fire the other way, or both ways, across the guard of a transition in its mode."""
+    own = system.transitions[index]
+    towards = own.guard.direction * emitted.orientation[index]
+    return any(
+        other.source == own.source
+        and emitted.surface[i] == emitted.surface[index]
+        and other.guard.direction * emitted.orientation[i] != towards
+        for i, other in enumerate(system.transitions)
+    )

@@ -1,0 +1,1 @@
+"""Recurrences of Taylor coefficients, written from the expressions of a field."""

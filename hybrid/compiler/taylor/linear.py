@@ -1,0 +1,129 @@
+"""Series of modes that are linear in the state and in harmonic forcing, from a table.
+
+With ``y = (x, h, 1)``, ``h`` the sines, cosines and exponentials that drive it, such a mode is ``y' = M y``
+with a constant matrix, and its Taylor coefficients are ``M^o / o!`` times what a step starts from. These
+matrices are computed once a run, in two parts, so that each is right to its own rounding: after that no order
+waits for the one before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+import sympy
+
+from hybrid.compiler.taylor.loops import indented, padded
+from hybrid.kernels.types.codes import NARROW
+from hybrid.symbolic.constants import Constants
+from hybrid.symbolic.nodes import degree_of, mentions, replaced
+from hybrid.symbolic.tracing import Symbols
+
+# Beyond this a table is larger than the fastest memory, and products with it cost more than recurrences.
+LARGEST = 16
+
+
+@attrs.frozen
+class LinearForm:
+    """``y' = M y`` and guards ``C y`` of ``y = (x, h, 1)``.
+
+    Attributes
+    ----------
+    starts
+        What ``y`` is at the time ``t``.
+    rates
+        The rows of ``M``, in the parameters.
+    guards
+        The rows of ``C``.
+    """
+
+    starts: list[sympy.Expr]
+    rates: list[list[sympy.Expr]]
+    guards: list[list[sympy.Expr]]
+
+    def trace(self, n: int) -> sympy.Expr:
+        """Divergence of the field."""
+        return sympy.Add(*(self.rates[i][i] for i in range(n)))
+
+
+def linear_form(
+    field: Sequence[sympy.Expr],
+    guards: Sequence[sympy.Expr],
+    harmonics: dict[sympy.Expr, sympy.Symbol],
+    symbols: Symbols,
+) -> LinearForm | None:
+    """The linear form of an affine mode, if it has one; ``harmonics`` stand for what it is driven by."""
+    variables = [*symbols.x, *harmonics.values()]
+    turning = [function.diff(symbols.t) for function in harmonics]
+    rows = [_row(replaced(entry, harmonics), variables, symbols.t) for entry in (*field, *turning, *guards)]
+    if len(variables) >= LARGEST or any(row is None for row in rows):
+        return None
+    starts = [*symbols.x, *harmonics, sympy.Integer(1)]
+    whole = [row for row in rows if row is not None]
+    one = [sympy.Integer(0)] * len(starts)
+    return LinearForm(starts, [*whole[: len(variables)], one], whole[len(variables) :])
+
+
+def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbol) -> list[sympy.Expr] | None:
+    """Coefficients of the variables, then the constant term; None if it is not affine in them alone."""
+    # The derivative of a sign is zero too.
+    if degree_of(entry, frozenset(variables)) is None:
+        return None
+    slopes = [entry.diff(variable) for variable in variables]
+    rest = replaced(entry, dict.fromkeys(variables, sympy.Integer(0)))
+    if any(mentions(each, (time, *variables)) for each in (*slopes, rest)):
+        return None
+    return [*slopes, rest]
+
+
+def table_statements(
+    form: LinearForm, n: int, constants: Constants, starts: Sequence[str]
+) -> tuple[list[str], list[str], int, int]:
+    """Statements for the series and, behind them, for tangent vectors.
+
+    Besides, the numbers of columns of their table and of four tangent vectors. ``table`` and ``vectors`` are
+    the first columns of both, ``starts`` what ``y`` starts from.
+    """
+    size, guards = len(form.starts), len(form.guards)
+    front, one = padded(n + guards + 2), size - 1
+    begin = ["nothing = four_times(0.0)"]
+    for i in range(size):
+        unit = ", ".join(f"1.0 if c + {lane} == {i} else 0.0" for lane in range(NARROW))
+        begin.append(f"store_row(out, order + 2, table, ({unit},))")
+        begin.append(f"z{i}, l{i} = load(out, order + 2, table), nothing")
+    write = [_entry(f"z{i}", i, front) for i in range(n)]
+    for i, row in enumerate(form.guards):
+        write += [f"held, _ = {_product(row, '1.0', constants)}", _entry("held", n + i, front)]
+    write += [_entry("nothing", i, front) for i in range(n + guards, front)]
+    step = [f"r{i}, m{i} = {_product(form.rates[i], 'o + 1.0', constants)}" for i in range(one)]
+    step += [f"z{i}, l{i} = r{i}, m{i}" for i in range(one)]
+    step.append(f"z{one}, l{one} = nothing, nothing")
+    lines = [
+        # What the table was made of does not change in a run.
+        "if out[order + 2, table] != 1.0:",
+        f"    for c in range(0, {size}, {NARROW}):",
+        *indented(indented([*begin, "for o in range(order + 1):", *indented([*write, *step])])),
+        f"    out[1, table + {one * front + n + guards + 1}] = {constants.name(form.trace(n))}",
+        "    out[order + 2, table] = 1.0",
+        f"combine(out, order, table, {front}, ({', '.join(starts)},))",
+    ]
+    vectors = [
+        f"spread_tangents(x, {n}, out, vectors, {NARROW * n})",
+        "for g in range(groups):",
+        f"    combine_tangents(out, order, table, {front}, vectors + g*{NARROW * n}, {n})",
+    ]
+    return lines, vectors, padded(size) * front, NARROW * n
+
+
+def _entry(value: str, place: int, front: int) -> str:
+    return f"store_down(out, o, table + c*{front} + {place}, {front}, {value})"
+
+
+def _product(row: Sequence[sympy.Expr], by: str, constants: Constants) -> str:
+    """Text of the product of a row with ``z``, over ``by``, in two parts."""
+    places = [i for i, each in enumerate(row) if each != 0]
+    if not places:
+        return "nothing, nothing"
+    factors = "".join(f"{constants.name(row[i])}, " for i in places)
+    highs, lows = ("".join(f"{name}{i}, " for i in places) for name in "zl")
+    return f"divided_dot_product(({factors}), ({highs}), ({lows}), {by})"

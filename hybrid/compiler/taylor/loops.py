@@ -1,0 +1,153 @@
+"""The loop over orders that recurrences run in: the state, and with it four tangent vectors at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import sympy
+
+from hybrid.compiler.taylor.series import Recurrences
+from hybrid.kernels.types.codes import NARROW, WIDE
+
+
+def indented(statements: Iterable[str]) -> list[str]:
+    """One level deeper."""
+    return [f"    {statement}" for statement in statements]
+
+
+def padded(width: int, whole: int = NARROW) -> int:
+    """A width filled up to whole vectors."""
+    return -(-width // whole) * whole
+
+
+class StateLoop:
+    """Statements for the series of ``y' = rates`` from ``starts``, in the columns ``targets``.
+
+    What a sum of products needs of the orders before the last is added up an order in advance.
+
+    Parameters
+    ----------
+    symbols
+        What the rates call the components of ``y``, None for one that they do not read.
+    """
+
+    def __init__(
+        self,
+        symbols: Sequence[sympy.Symbol | None],
+        targets: Sequence[str],
+        rates: Sequence[sympy.Expr],
+        starts: Sequence[str],
+        block: Recurrences,
+    ) -> None:
+        self.block, self.starts = block, starts
+        self.front: list[str] = []
+        self.names = {target: f"{block.prefix}y{i}" for i, target in enumerate(targets)}
+        names = self.names.values()
+        block.variables |= {symbol: name for symbol, name in zip(symbols, names, strict=True) if symbol}
+        values = [block.coefficient(rate) for rate in rates]
+        self.rates = [f"{block.prefix}r{i} = {value}" for i, value in enumerate(values)]
+
+    def write_front(self, width: int, others: dict[str, str]) -> None:
+        """Let the first columns be written as one vector: those of ``y``, and the texts of ``others``."""
+        columns = self.names | others
+        self.front = [columns.get(str(i), "0.0") for i in range(width)]
+
+    def first(self) -> list[str]:
+        """Order zero."""
+        block = self.block
+        begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
+        # Order one is read, and multiplied by what is not there yet, before it is written.
+        nothing = f"store_row(out, 1, 0, ({'0.0, ' * len(self.front)}))"
+        before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.before())]
+        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
+
+    def higher(self) -> list[str]:
+        """Order ``o``, once ``shrink`` is 1/o."""
+        block = self.block
+        inner = [f"{block.prefix}s{i} = out[o, {block.prefix}b + {i}]" for i in range(len(block.pairs))]
+        step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
+        after = [f"{name} = {value}" for name, value in block.before().items()]
+        sums = [*inner, *self._sums("o + 1")]
+        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
+
+    def _separate(self) -> list[str]:
+        """Columns of ``y`` that are not among the first are written one by one."""
+        behind = [target for target in self.names if int(target) >= len(self.front)]
+        return [f"out[o, {target}] = {self.names[target]}" for target in behind]
+
+    def _rows(self) -> list[str]:
+        """What stands side by side is written as one vector, so that it can be read as one soon."""
+        block, rows = self.block, [("0", self.front)]
+        if block.pairs:
+            rows.append((f"{block.prefix}b", list(block.pairs.values())))
+        if block.pairs and block.common_left is None:
+            rows.append((f"{block.prefix}a", [f"out[o, {left}]" for left, _ in block.pairs]))
+        return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
+
+    def _sums(self, order: str) -> list[str]:
+        prefix, width = self.block.prefix, padded(len(self.block.pairs))
+        left = self.block.common_left
+        if not width:
+            return []
+        if left is None:
+            return [f"convolve_pairs(out, {order}, 2, {prefix}a, {prefix}b, {width}, {WIDE})"]
+        return [f"convolve(out, {order}, 2, {left}, {prefix}b, {width}, {WIDE})"]
+
+
+class TangentLoop:
+    """Statements for the series of four tangent vectors at a time, whose columns begin at ``vectors``.
+
+    The four coefficients of a component are one vector, those of the components stand one after the other,
+    behind them what is multiplied by common factors.
+    """
+
+    def __init__(self, seeds: Sequence[sympy.Symbol], block: Recurrences) -> None:
+        block.rows |= {seed: f"v + {NARROW * i}" for i, seed in enumerate(seeds)}
+        self.components, self.block = len(seeds), block
+        self.values: list[str] = []
+
+    def compute(self, rates: Sequence[sympy.Expr]) -> None:
+        """Write the recurrences of the rates; what they need of the state is asked for now."""
+        self.values = [self.block.coefficient(rate) for rate in rates]
+
+    @property
+    def columns(self) -> int:
+        """Columns that four tangent vectors need."""
+        return NARROW * (self.components + sum(map(len, self.block.blocks.values())))
+
+    def first(self) -> list[str]:
+        """Order zero, and of the vectors themselves order one."""
+        later = self._later("1", "{}")
+        return [
+            f"spread_tangents(x, {self.components}, out, vectors, {self.columns})",
+            *self._each([*self.block.first, *later]),
+        ]
+
+    def higher(self) -> list[str]:
+        """Order ``o``, and of the vectors themselves order ``o + 1``."""
+        block = self.block
+        sums, inner = [], []
+        for i, (left, rights) in enumerate(block.blocks.items()):
+            base = f"{block.prefix}b{i}"
+            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)}, {WIDE})")
+            inner += [
+                f"{block.prefix}s{i}_{place} = load(out, o, {base} + {NARROW * place})"
+                for place in range(len(rights))
+            ]
+        later = self._later("o + 1", "later*({})")
+        return ["later = 1.0/(o + 1)", *self._each([*sums, *inner, *block.higher, *later])]
+
+    def _later(self, order: str, value: str) -> list[str]:
+        return [
+            f"store(out, {order}, v + {NARROW * i}, {value.format(each)})"
+            for i, each in enumerate(self.values)
+        ]
+
+    def _each(self, statements: Iterable[str]) -> list[str]:
+        """The statements for all vectors, four at a time."""
+        bases, place = [], NARROW * self.components
+        for i, rights in enumerate(self.block.blocks.values()):
+            bases.append(f"{self.block.prefix}b{i} = v + {place}")
+            place += NARROW * len(rights)
+        start = f"v = vectors + g*{self.columns}"
+        return ["for g in range(groups):", *indented([start, *bases, *statements])]

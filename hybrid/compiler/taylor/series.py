@@ -1,0 +1,500 @@
+"""Taylor series of a mode's solutions: recurrences for their coefficients, written as code.
+
+Every expression of the field is cut into elementary operations, each with a recurrence for its normalised
+Taylor coefficients along a solution (Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904; Griewank and
+Walther, Evaluating Derivatives, 2nd ed. 2008, table 13.2). Linear operations cost one multiplication an
+order, products and functions a convolution.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import sympy
+from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+
+from hybrid.compiler.taylor.sums import Term, added
+from hybrid.kernels.types.codes import NARROW
+from hybrid.symbolic.constants import Constants
+from hybrid.symbolic.nodes import mentions, nodes, operations_of, symbols_of
+from hybrid.symbolic.printer import MATH_FUNCTIONS, power_text
+
+# Functions whose derivative is again made of what has a recurrence.
+BY_DERIVATIVE = (
+    sympy.log, log1p, log2, log10, expm1,
+    sympy.asin, sympy.acos, sympy.atan, sympy.asinh, sympy.acosh, sympy.atanh,
+)  # fmt: skip
+# A pair, and the sign of the second's derivative: cos' = -sin, cosh' = sinh.
+PAIRS = {
+    sympy.sin: (sympy.sin, sympy.cos, "-"),
+    sympy.cos: (sympy.sin, sympy.cos, "-"),
+    sympy.sinh: (sympy.sinh, sympy.cosh, ""),
+    sympy.cosh: (sympy.sinh, sympy.cosh, ""),
+}
+# ``y' = (1 -+ y^2) u'``.
+OWN_SQUARE = {sympy.tanh: "-", sympy.tan: ""}
+
+
+# Longer inner sums are not taken apart: others may need them too.
+MOST_TERMS = 4
+
+
+class NoSeries(Exception):
+    """An expression has no Taylor recurrence here; the text says which part."""
+
+
+class Recurrences:
+    """The statements that compute the coefficients of some expressions, order by order.
+
+    The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
+    ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
+    ``o``. Convolutions are taken in parts: the terms at their ends hold what this order and the one before
+    bring, all those between hold lower orders only and can be summed early, all side by side: ``pairs`` lists
+    the column of the first factor and the second, with the text of its coefficient. In every sum what is
+    known last is added last: nothing waits for it twice.
+
+    With ``lanes`` a coefficient is that of four tangent vectors at once, in four columns. These have been
+    written as one and are read as one, which is quick even for the order before. ``blocks`` lists, by the
+    column of a factor that is one number, what it is multiplied by.
+
+    Parameters
+    ----------
+    rows
+        Where the series of a symbol is: text of its column in ``out``.
+    time
+        The symbol of time and the text of its first-order and higher coefficient; None if it is a symbol
+        among ``rows``.
+    allot
+        Called for a new column, returns its text.
+    prefix
+        Begins the names of local variables.
+    known
+        Recurrences that run before these and hold the series of all that is free of the symbols in ``rows``.
+    at_start
+        Text of order zero of expressions for which there is a better one than their operations give.
+    lanes
+        Whether the symbols in ``rows`` stand for four numbers each.
+    """
+
+    def __init__(
+        self,
+        rows: dict[sympy.Symbol, str],
+        time: tuple[sympy.Symbol, str] | None,
+        allot: Callable[[], str],
+        prefix: str,
+        constants: Constants,
+        known: Recurrences | None = None,
+        at_start: Mapping[sympy.Expr, str] | None = None,
+        lanes: bool = False,
+    ) -> None:
+        self.rows: dict[sympy.Expr, str] = dict(rows)
+        self.lanes = lanes
+        self.time = time
+        self.allot = allot
+        self.prefix = prefix
+        self.constants = constants
+        self.known = known
+        self.at_start = at_start or {}
+        self.first: list[str] = []
+        self.higher: list[str] = []
+        self.pairs: dict[tuple[str, sympy.Expr], str] = {}
+        self.blocks: dict[str, list[sympy.Expr]] = {}
+        self.variables: dict[sympy.Expr, str] = {}
+        self.slopes: dict[sympy.Expr, str] = {}
+        self.shared: Counter[sympy.Expr] = Counter()
+        self.lateness: dict[sympy.Expr, int] = {}
+        self.readiness: dict[sympy.Expr, tuple[int, int]] = {}
+        self.own = frozenset(rows)
+        if known is None and time is not None:
+            self.own |= {time[0]}
+
+    def expect(self, symbols: Iterable[sympy.Symbol | None], rates: Sequence[sympy.Expr]) -> None:
+        """Look at the rates of symbols that are to come.
+
+        The factors of products are counted: one that many share goes into their common block. And what takes
+        long to compute is known late: its symbol is added last in every sum.
+        """
+        self.readiness.clear()
+        for symbol, rate in zip(symbols, rates, strict=True):
+            if symbol is not None:
+                self.lateness[symbol] = operations_of(rate)
+            for node in nodes(rate):
+                if node.is_Mul:
+                    self.shared.update(node.args)
+
+    def coefficient(self, expression: sympy.Expr) -> str:
+        """Text of the coefficient of order ``o``."""
+        if expression in self.variables:
+            return self.variables[expression]
+        if expression in self.rows:
+            return self.at("o", self.rows[expression])
+        if self._is_known(expression):
+            return self._known_coefficient(expression)
+        if self._is_constant(expression):
+            return self._bind(expression, self.constants.name(expression), "0.0")
+        return self._operation(expression)
+
+    def row(self, expression: sympy.Expr) -> str:
+        """Text of the column that holds the series of the expression."""
+        if expression in self.rows:
+            return self.rows[expression]
+        if self._is_known(expression):
+            assert self.known is not None
+            return self.known.row(expression)
+        text = self.coefficient(expression)
+        if expression not in self.rows:
+            self.rows[expression] = self.allot()
+            self._both(self.put("o", self.rows[expression], text))
+        return self.rows[expression]
+
+    def at(self, order: str, column: str) -> str:
+        """Text of an entry of a column of these recurrences."""
+        return f"load(out, {order}, {column})" if self.lanes else f"out[{order}, {column}]"
+
+    def put(self, order: str, column: str, value: str) -> str:
+        """Statement that writes there."""
+        if self.lanes:
+            return f"store(out, {order}, {column}, {value})"
+        return f"out[{order}, {column}] = {value}"
+
+    def _is_known(self, expression: sympy.Expr) -> bool:
+        return self.known is not None and not mentions(expression, self.own)
+
+    def _known_coefficient(self, expression: sympy.Expr) -> str:
+        assert self.known is not None
+        row = self.known.row(expression)
+        return self.known.variables.get(expression, f"out[o, {row}]")
+
+    def _is_constant(self, expression: sympy.Expr) -> bool:
+        return not mentions(expression, self.own) and (
+            self.known is None or self.known._is_constant(expression)
+        )
+
+    def _both(self, statement: str) -> None:
+        self.first.append(statement)
+        self.higher.append(statement)
+
+    def _bind(self, expression: sympy.Expr, first: str, *higher: str, name: str | None = None) -> str:
+        """A variable for the expression: its value at order zero, and statements or a value above that."""
+        name = name or self._name(expression)
+        self.first.append(f"{name} = {self.at_start.get(expression, first)}")
+        value, *more = higher
+        self.higher += [f"{name} = {value}", *more]
+        return name
+
+    def _name(self, expression: sympy.Expr) -> str:
+        return self.variables.setdefault(expression, f"{self.prefix}{len(self.variables)}")
+
+    def _kept(self, expression: sympy.Expr, column: str | None = None) -> tuple[str, str]:
+        """Name and column of an expression whose recurrence reads its own earlier coefficients."""
+        self.rows[expression] = column or self.allot()
+        return self._name(expression), self.rows[expression]
+
+    def _store(self, *expressions: sympy.Expr) -> None:
+        for expression in expressions:
+            self._both(self.put("o", self.rows[expression], self.variables[expression]))
+
+    def _place(self, left: str, right: sympy.Expr) -> tuple[str, str]:
+        """A convolution with the column ``left`` but for its ends, and the column for its other factor."""
+        if self.lanes:
+            rights = self.blocks.setdefault(left, [])
+            if right not in rights:
+                rights.append(right)
+            block, place = list(self.blocks).index(left), rights.index(right)
+            return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {NARROW * place}"
+        self.pairs.setdefault((left, right), "")
+        place = list(self.pairs).index((left, right))
+        column = f"{self.prefix}b + {place}"
+        # The second factor is often made of the first, and known later.
+        inner = f"{self.prefix}s{place} + {self._left_before(left)}*out[1, {column}]"
+        return f"({inner} + out[1, {left}]*{self.prefix}p{place})", column
+
+    def _left_before(self, left: str) -> str:
+        """Name of the last coefficient but one of a first factor."""
+        return f"{self.prefix}q{[each for each, _ in self.pairs].index(left)}"
+
+    def before(self) -> dict[str, str]:
+        """Names of the last coefficients but one of all factors, and what they are once an order is done.
+
+        For the first order there are none, for the second both terms with them would be the same.
+        """
+        lefts = {self._left_before(left): f"out[o, {left}] if o > 1 else 0.0" for left, _ in self.pairs}
+        return lefts | {f"{self.prefix}p{i}": value for i, value in enumerate(self.pairs.values())}
+
+    @property
+    def common_left(self) -> str | None:
+        """The column of the first factor of all pairs, if they have one in common."""
+        lefts = {left for left, _ in self.pairs}
+        return lefts.pop() if len(lefts) == 1 else None
+
+    def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
+        """``_place``, and the coefficient of the other factor, which is written there."""
+        value = self.coefficient(right)
+        inner, column = self._place(left, right)
+        self._enter(left, right, column, value)
+        return inner, column, value
+
+    def _enter(self, left: str, right: sympy.Expr, column: str, value: str) -> None:
+        """Give a convolution the coefficient of its other factor. All of them are written together."""
+        if self.lanes:
+            self._both(self.put("o", column, value))
+        else:
+            self.pairs[left, right] = value
+
+    def _slope(self, u: sympy.Expr) -> str:
+        """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""
+        if u not in self.slopes:
+            value = self.coefficient(u)
+            self.slopes[u] = self.allot()
+            self._both(f"out[o, {self.slopes[u]}] = o*{value}")
+        return self.slopes[u]
+
+    def _operation(self, expression: sympy.Expr) -> str:
+        if self.time is not None and expression == self.time[0]:
+            return self._bind(expression, "t", self.time[1])
+        if expression.is_Add:
+            return self._sum(expression)
+        if expression.is_Mul:
+            return self._product(expression)
+        if expression.is_Pow and expression.base is sympy.E:
+            return self._exponential(expression, expression.exp)
+        if expression.is_Pow:
+            return self._power(expression)
+        if isinstance(expression, sympy.exp):
+            return self._exponential(expression, expression.args[0])
+        if expression.func in PAIRS:
+            return self._pair(expression)
+        if expression.func in OWN_SQUARE:
+            return self._own_square(expression)
+        if isinstance(expression, hypot):
+            a, b = expression.args
+            return self._bind(expression, *2 * (self.coefficient(sympy.sqrt(a**2 + b**2)),))
+        if isinstance(expression, exp2):
+            return self._bind(
+                expression, *2 * (self.coefficient(sympy.exp(sympy.log(2) * expression.args[0])),)
+            )
+        if isinstance(expression, BY_DERIVATIVE):
+            return self._by_derivative(expression)
+        raise NoSeries(f"{type(expression).__name__} is not analytic")
+
+    def _sum(self, expression: sympy.Expr) -> str:
+        terms = self._terms(expression)
+        constant = sympy.Add(*(factor for factor, rest in terms if rest == 1))
+        moving = [(factor, rest) for factor, rest in terms if rest != 1]
+        first = added([self._times(*term) for term in moving])
+        if constant != 0:
+            first = f"{first} + {self.constants.name(constant)}"
+        return self._bind(expression, first, added([self._higher_times(*term) for term in moving]))
+
+    def _terms(self, expression: sympy.Expr) -> list[tuple[sympy.Expr, sympy.Expr]]:
+        """The terms of a sum as constant factors and what moves; inner sums are taken apart.
+
+        Each level of a sum of sums would wait for the one before. But a difference of states, whose digits
+        may cancel, is left as it is.
+        """
+        found = []
+        for factor, rest in map(self._split, sympy.Add.make_args(expression)):
+            if self._comes_apart(rest):
+                found += [(factor * each, moving) for each, moving in self._terms(rest)]
+            else:
+                found.append((factor, rest))
+        return found
+
+    def _comes_apart(self, rest: sympy.Expr) -> bool:
+        at_hand = self._is_known(rest) or rest in self.variables or rest in self.rows
+        if not rest.is_Add or at_hand or len(rest.args) > MOST_TERMS:
+            return False
+        return not all(self._is_constant(term) or self._is_plain(*self._split(term)) for term in rest.args)
+
+    @staticmethod
+    def _is_plain(factor: sympy.Expr, rest: sympy.Expr) -> bool:
+        return rest.is_Symbol and factor in (1, -1)
+
+    def _split(self, term: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+        """The constant factors of a term, and the others."""
+        factors = sympy.Mul.make_args(term)
+        constant = [factor for factor in factors if self._is_constant(factor)]
+        return sympy.Mul(*constant), sympy.Mul(*(factor for factor in factors if factor not in constant))
+
+    def _times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
+        text = self.coefficient(rest)
+        if constant != 1:
+            text = f"{self.constants.name(constant)}*{text}"
+        return Term(self._ready(rest), text, constant != 1)
+
+    def _higher_times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
+        """The same above order zero, where a sum with one moving term is a multiple of that."""
+        self.coefficient(rest)
+        while rest.is_Add or rest.is_Mul:
+            moving = [each for each in sympy.Add.make_args(rest) if not self._is_constant(each)]
+            factor, inner = self._split(moving[0])
+            if len(moving) > 1 or (factor == 1 and inner == rest):
+                break
+            constant, rest = constant * factor, inner
+        return self._times(constant, rest)
+
+    def _ready(self, expression: sympy.Expr) -> tuple[int, int]:
+        """When a coefficient is known: how many operations after those of the states, and theirs."""
+        if expression.is_Symbol:
+            return 1, self.lateness.get(expression, 0)
+        if expression not in self.readiness:
+            moving = [each for each in expression.args if not self._is_constant(each)]
+            depth, late = 0, 0
+            if moving and not self._is_known(expression):
+                depth, late = max(map(self._ready, moving))
+                depth += 1 if expression.is_Add or expression.is_Mul else 2
+            self.readiness[expression] = depth, late
+        return self.readiness[expression]
+
+    def _product(self, expression: sympy.Expr) -> str:
+        factors = expression.args
+        if any(self._is_constant(factor) for factor in factors):
+            term = self._split(expression)
+            return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
+        below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
+        # A divisor that is known has its reciprocal kept, and is multiplied by.
+        below = [f for f in below if self.known is None or mentions(f, self.own)]
+        if below and len(below) < len(factors):
+            above = sympy.Mul(*(f for f in factors if f not in below))
+            return self._quotient(expression, above, sympy.Mul(*(1 / f for f in below)))
+        if len(below) > 1:
+            return self._quotient(expression, None, sympy.Mul(*(1 / f for f in below)))
+        # What is known goes first, then what most products share.
+        *others, last = sorted(factors, key=lambda factor: (-mentions(factor, self.own), self.shared[factor]))
+        return self._convolution(expression, last, sympy.Mul(*others))
+
+    def _convolution(self, expression: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> str:
+        left = self.row(a)
+        factor = self._known_coefficient(a) if self._is_known(a) else self.coefficient(a)
+        inner, right, value = self._beside(left, b)
+        first = self.at("0", right)
+        return self._bind(
+            expression,
+            f"{factor}*{value}",
+            f"{inner} + {factor}*{first} + out[0, {left}]*{value}",
+        )
+
+    def _quotient(self, expression: sympy.Expr, above: sympy.Expr | None, below: sympy.Expr) -> str:
+        text = None if above is None else self.coefficient(above)
+        divisor, value = self.row(below), self.coefficient(below)
+        inner, column = self._place(divisor, expression)
+        name, column = self._kept(expression, column)
+        # Of one sign, so that nothing has to be taken from zero.
+        self.first.append(f"{name}d = -1.0/{value}")
+        inner = inner if text is None else f"({inner} - {text})"
+        self._bind(
+            expression,
+            f"{text or '1.0'}/{value}",
+            f"({inner} + {value}*out[0, {column}])*{name}d",
+        )
+        self._enter(divisor, expression, column, name)
+        return name
+
+    def _power(self, expression: sympy.Expr) -> str:
+        base, exponent = expression.args
+        if not self._is_constant(exponent):
+            return self._bind(expression, *2 * (self.coefficient(sympy.exp(exponent * sympy.log(base))),))
+        if exponent.is_Integer and exponent.is_negative:
+            return self._quotient(expression, None, base**-exponent)
+        if exponent.is_Integer:
+            half = base ** (exponent // 2)
+            return self._convolution(
+                expression, *((base, base ** (exponent - 1)) if exponent.p % 2 else (half, half))
+            )
+        u, slope, k = self.row(base), self._slope(base), self.constants.name(exponent)
+        value = self.coefficient(base)
+        inner, column = self._place(u, expression)
+        moving, copy = self._place(slope, expression)
+        name, column = self._kept(expression, column)
+        self.first.append(f"{name}d = 1.0/{value}")
+        self._bind(
+            expression,
+            power_text(value, exponent, k),
+            f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})*shrink*{name}d",
+        )
+        self._enter(u, expression, column, name)
+        self._enter(slope, expression, copy, name)
+        return name
+
+    def _rate(self, u: sympy.Expr) -> str | None:
+        """The constant rate of an argument that is linear in time, None for others."""
+        if self.time is None or self.time[1] != ONE_THEN_ZERO:
+            return None
+        if symbols_of(u) & self.own - {self.time[0]}:
+            return None
+        slope = u.diff(self.time[0])
+        return self.constants.name(slope) if self._is_constant(slope) else None
+
+    def _exponential(self, expression: sympy.Expr, u: sympy.Expr) -> str:
+        rate = self._rate(u)
+        argument = self.coefficient(u)
+        if rate:
+            name, column = self._kept(expression)
+            self._bind(expression, f"exp({argument})", f"shrink*{rate}*out[o - 1, {column}]")
+            self._store(expression)
+            return name
+        slope = self._slope(u)
+        inner, column = self._place(slope, expression)
+        name, column = self._kept(expression, column)
+        value = f"({inner} + out[o, {slope}]*out[0, {column}])*shrink"
+        self._bind(expression, f"exp({argument})", value)
+        self._enter(slope, expression, column, name)
+        return name
+
+    def _pair(self, expression: sympy.Expr) -> str:
+        odd, even, sign = PAIRS[expression.func]
+        (u,) = expression.args
+        s, c = odd(u, evaluate=False), even(u, evaluate=False)
+        rate = self._rate(u)
+        argument = self.coefficient(u)
+        if rate:
+            (s_name, s_column), (c_name, c_column) = self._kept(s), self._kept(c)
+            values = [f"shrink*{rate}*out[o - 1, {c_column}]", f"{sign}shrink*{rate}*out[o - 1, {s_column}]"]
+        else:
+            slope = self._slope(u)
+            (s_sum, s_column), (c_sum, c_column) = (self._place(slope, each) for each in (s, c))
+            (s_name, _), (c_name, _) = self._kept(s, s_column), self._kept(c, c_column)
+            values = [
+                f"({c_sum} + out[o, {slope}]*out[0, {c_column}])*shrink",
+                f"{sign}({s_sum} + out[o, {slope}]*out[0, {s_column}])*shrink",
+            ]
+        self.first += [f"{s_name} = {odd.__name__}({argument})", f"{c_name} = {even.__name__}({argument})"]
+        self.higher += [f"{s_name} = {values[0]}", f"{c_name} = {values[1]}"]
+        if rate:
+            self._store(s, c)
+        else:
+            self._enter(slope, s, s_column, s_name)
+            self._enter(slope, c, c_column, c_name)
+        return self.variables[expression]
+
+    def _own_square(self, expression: sympy.Expr) -> str:
+        sign = OWN_SQUARE[expression.func] or "+"
+        (u,) = expression.args
+        argument, rate = self.coefficient(u), self._slope(u)
+        slope = 1 - expression**2 if sign == "-" else 1 + expression**2
+        moving, slope_column = self._place(rate, slope)
+        name, row = self._kept(expression)
+        slope_name, _ = self._kept(slope, slope_column)
+        inner, copy = self._place(row, expression)
+        self.first.append(f"{name} = {expression.func.__name__}({argument})")
+        self.higher.append(f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])*shrink")
+        self._store(expression)
+        self._enter(row, expression, copy, name)
+        self.first.append(f"{slope_name} = 1.0 {sign} {name}*{name}")
+        self.higher.append(f"{slope_name} = {sign}({inner} + 2.0*out[0, {row}]*{name})")
+        self._enter(rate, slope, slope_column, slope_name)
+        return name
+
+    def _by_derivative(self, expression: sympy.Expr) -> str:
+        (u,) = expression.args
+        argument, rate = self.coefficient(u), self._slope(u)
+        inner, slope, _ = self._beside(rate, expression.fdiff())
+        return self._bind(
+            expression,
+            f"{MATH_FUNCTIONS[expression.func]}({argument})",
+            f"({inner} + out[o, {rate}]*out[0, {slope}])*shrink",
+        )
+
+
+ONE_THEN_ZERO = "(1.0 if o == 1 else 0.0)"

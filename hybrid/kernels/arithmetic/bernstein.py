@@ -1,0 +1,216 @@
+"""Real roots of a polynomial in Bernstein form by Descartes' rule: none missed, none counted twice.
+
+The number of sign variations of the Bernstein coefficients bounds the number of roots in the open interval
+and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 1 are proofs and anything
+else is cut in two. The coefficients' hull makes "no root" the cheap case, which nearly every step is.
+"""
+
+from numba import njit
+
+from hybrid.kernels.types.layout import INLINE, KERNEL
+
+NO_ROOT = 2.0
+# Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
+CLUSTER = 1e-14
+# A Newton step this short has entered the quadratic convergence to a root that is simple to rounding.
+SETTLED = 1e-8
+
+
+@njit(**KERNEL)
+def value_and_slope(coefficients, degree, theta):
+    """Value and derivative at ``theta`` on [0, 1]; ``coefficients (degree + 1,)``.
+
+    After one step of de Casteljau's what is left is of one degree less, and its basis, with only positive
+    members, is summed as it stands. From the nearer end on, each member is the one before times a ratio of
+    at most the degree.
+    """
+    if degree == 0:
+        return coefficients[0], 0.0
+    backwards = theta > 0.5
+    distance = 1.0 - theta if backwards else theta
+    basis, ratio = (1.0 - distance) ** (degree - 1), distance / (1.0 - distance)
+    value, slope = 0.0, 0.0
+    for j in range(degree):
+        row = degree - 1 - j if backwards else j
+        difference = coefficients[row + 1] - coefficients[row]
+        value += basis * (coefficients[row] + theta * difference)
+        slope += basis * difference
+        step = (degree - 1 - j) / (j + 1.0)
+        basis *= ratio * step
+    return value, degree * slope
+
+
+@njit(**KERNEL)
+def simple_root(coefficients, degree, sign_left):
+    """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
+    low, high, last = 0.0, 1.0, 1.0
+    # The secant's root, unless an end is a root too: that one is not in the open interval.
+    theta = coefficients[0] / (coefficients[0] - coefficients[degree])
+    if not (low < theta < high):
+        theta = 0.5
+    for _ in range(100):
+        value, slope = value_and_slope(coefficients, degree, theta)
+        if value == 0.0:
+            return theta
+        if (value > 0.0) == (sign_left > 0):
+            low = theta
+        else:
+            high = theta
+        newton = theta - value / slope if slope != 0.0 else -1.0
+        change = abs(newton - theta)
+        # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
+        if change <= 2e-16 * theta or (last < SETTLED * theta and change > 0.25 * last):
+            return theta
+        if not (low < newton < high):
+            newton = 0.5 * (low + high)
+            change = 1.0
+        if high - low <= 2e-16 * high:
+            return newton
+        theta, last = newton, change
+    return theta
+
+
+@njit(**KERNEL)
+def first_crossing(coefficients, degree, side, direction, stack):
+    """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
+
+    ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
+    that differs at once is a crossing at 0, or 0 if there was none, and then roots that cannot be told from 0
+    are no crossings; ``stack (depth, >= degree + 3)`` is scratch. Returns ``(NO_ROOT, side at the end)``
+    where nothing crosses in that direction. A zero at 1 exactly counts as crossed if the slope there leads
+    across.
+    """
+    start, end, top, side = bracket_crossing(coefficients, degree, side, direction, stack)
+    if start == end:
+        return start, side
+    return start + (end - start) * simple_root(stack[top][2:], degree, -side), side
+
+
+@njit(**INLINE)
+def crosses_towards(direction, side):
+    """Whether a transition fires on a crossing to that side."""
+    return direction == 0 or direction == side
+
+
+@njit(**INLINE)
+def halve(stack, top, degree):
+    """Cut the part in a row of the stack in two: the left half, to be looked at first, goes on top."""
+    row, left = stack[top], stack[top + 1]
+    middle = 0.5 * (row[0] + row[1])
+    left[0], left[1] = row[0], middle
+    row[0] = middle
+    for level in range(degree, -1, -1):
+        left[2 + degree - level] = row[2]
+        for i in range(2, level + 2):
+            row[i] = 0.5 * (row[i] + row[i + 1])
+
+
+@njit(**KERNEL)
+def bracket_crossing(coefficients, degree, side, direction, stack):
+    """Where ``first_crossing`` is: ``(start, end, row, side after it)``, a place if the ends agree.
+
+    Else it is the one root in between, and ``stack[row, 2:]`` the polynomial there.
+    """
+    top, unknown = 0, side == 0
+    stack[0, 0] = 0.0
+    stack[0, 1] = 1.0
+    for i in range(degree + 1):
+        stack[0, 2 + i] = coefficients[i]
+    while top >= 0:
+        row = stack[top]
+        start, end = row[0], row[1]
+        first, last, variations = 0, 0, 0
+        for i in range(2, degree + 3):
+            if row[i] != 0.0:
+                sign = 1 if row[i] > 0.0 else -1
+                if last != 0 and sign != last:
+                    variations += 1
+                if first == 0:
+                    first = sign
+                last = sign
+        if first == 0:
+            top -= 1
+            continue
+        if side == 0:
+            side = first
+        if first != side:
+            side = first
+            if crosses_towards(direction, first):
+                return start, start, top, side
+        if variations > 1 and end - start > CLUSTER:
+            halve(stack, top, degree)
+            top += 1
+            continue
+        if last != side:
+            side = last
+            at_start = unknown and start == 0.0 and variations > 1
+            if not at_start and crosses_towards(direction, last):
+                return start, start if variations > 1 else end, top, side
+        top -= 1
+    if coefficients[degree] == 0.0:
+        # Odd or even multiplicity at 1 cannot be told from the sign before it alone: look at the slope.
+        slope = -coefficients[degree - 1]
+        after = 1 if slope > 0.0 else (-1 if slope < 0.0 else side)
+        if after != side:
+            side = after
+            if crosses_towards(direction, after):
+                return 1.0, 1.0, 0, side
+    return NO_ROOT, NO_ROOT, 0, side
+
+
+@njit(**INLINE)
+def stays(coefficients, degree, side, band):
+    """Whether all coefficients lie beyond ``band`` on one side: the proof that serves nearly every step."""
+    for i in range(degree + 1):  # noqa: SIM110 (no generators in kernels)
+        if not coefficients[i] * side > band:
+            return False
+    return True
+
+
+@njit(**KERNEL)
+def restrict(coefficients, degree, start):
+    """Replace a polynomial, in place, by its restriction to ``[start, 1]`` as a polynomial on ``[0, 1]``."""
+    for level in range(degree, 0, -1):
+        for i in range(level):
+            coefficients[i] += start * (coefficients[i + 1] - coefficients[i])
+
+
+@njit(**KERNEL)
+def lowest(coefficients, degree, side, stack):
+    """Place and value of the deepest interior minimum of ``side * polynomial``; ``NO_ROOT`` if there is none.
+
+    Minima are where the derivative crosses zero upwards. ``stack (depth, >= degree + 3)`` is scratch.
+    """
+    slope = stack[stack.shape[0] - 2]
+    best, depth = NO_ROOT, 0.0
+    start = 0.0
+    # The derivative has fewer roots than the polynomial; what lies before ``start`` has been looked at.
+    for _ in range(2 * degree):
+        for i in range(degree):
+            slope[i] = side * (coefficients[i + 1] - coefficients[i])
+        restrict(slope, degree - 1, start)
+        rising = slope[0] > 0.0
+        theta, _ = first_crossing(slope, degree - 1, 1 if rising else -1, -1 if rising else 1, stack)
+        if theta > 1.0:
+            break
+        start += theta * (1.0 - start)
+        if not rising:
+            value, _ = value_and_slope(coefficients, degree, start)
+            if best > 1.0 or side * value < side * depth:
+                best, depth = start, value
+        start += CLUSTER
+        if start >= 1.0:
+            break
+    return best, depth
+
+
+@njit(**KERNEL)
+def divide_by_theta(coefficients, degree):
+    """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree.
+
+    A known root at the start of a step is taken out exactly, so that it can be neither found again nor
+    hide a second root near it.
+    """
+    for i in range(degree):
+        coefficients[i] = coefficients[i + 1] * degree / (i + 1)
+    return degree - 1

@@ -1,0 +1,296 @@
+"""Arithmetic on many series side by side in vector registers, which the compiler does not find by itself.
+
+A matrix of series ``(orders, columns)`` has its columns next to one another in memory. What is done to all of
+them alike, order after order, takes whole vectors of columns at a time. A processor has to wait for memory
+when it reads as one vector what it has just written as several: those of the state are read as wide as
+``store_row`` writes them, and those of tangent vectors four columns at a time.
+"""
+
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload, register_jitable
+
+from hybrid.kernels.arithmetic.lanes import (
+    HERE,
+    built_in,
+    everywhere,
+    matrix_of,
+    multiply_add,
+    read,
+    vector_of,
+    whole_registers,
+    write,
+)
+from hybrid.kernels.types.codes import NARROW, WIDE
+
+# Sums that grow side by side: each term waits for the one before it in the same sum.
+AT_ONCE = 4
+
+
+def convolve(series, order, inset, left, first, width, widest):
+    """Sums of ``series[j, left] * series[order - j, c]`` over ``inset <= j <= order - inset``.
+
+    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4, from ``first`` on. No
+    register is wider than ``widest``; both are known to the compiler. The terms left out at both ends are
+    those with the coefficients of the highest orders.
+    """
+    sums = np.zeros(width)
+    for j in range(inset, order - inset + 1):
+        sums += series[j, left] * series[order - j, first : first + width]
+    series[order, first : first + width] = sums
+
+
+def convolve_pairs(series, order, inset, left, first, width, widest):
+    """As ``convolve``, but each column has a factor of its own: these begin at ``left``."""
+    sums = np.zeros(width)
+    for j in range(inset, order - inset + 1):
+        sums += series[j, left : left + width] * series[order - j, first : first + width]
+    series[order, first : first + width] = sums
+
+
+def evaluate(series, order, s, first, width):
+    """Values at ``s`` of ``width`` series, a multiple of 4, from ``first`` on, into ``series[order + 1]``.
+
+    The order is at least 1.
+    """
+    total = series[order, first : first + width].copy()
+    for o in range(order - 1, -1, -1):
+        total = total * s + series[o, first : first + width]
+    series[order + 1, first : first + width] = total
+
+
+def evaluate_with_sizes(series, order, s, first, width):
+    """As ``evaluate``, and the sums of the magnitudes of all terms into ``series[order + 2]``; ``s >= 0``."""
+    evaluate(series, order, s, first, width)
+    total = abs(series[order, first : first + width])
+    for o in range(order - 1, -1, -1):
+        total = total * s + abs(series[o, first : first + width])
+    series[order + 2, first : first + width] = total
+
+
+def combine(series, order, table, width, numbers):
+    """Every order of the first ``width`` columns as a combination of blocks of as many columns of that order.
+
+    The blocks begin at the column ``table``, one for each of the tuple ``numbers``.
+    """
+    rows = series[: order + 1, table : table + width * len(numbers)]
+    series[: order + 1, :width] = np.tensordot(rows.reshape(order + 1, -1, width), numbers, (1, 0))
+
+
+def combine_tangents(series, order, table, width, first, n):
+    """Every order but zero of four tangent vectors from order zero and the first ``n`` blocks of a table."""
+    rows = series[1 : order + 1, table : table + width * n].reshape(order, n, width)[:, :, :n]
+    vectors = series[0, first : first + NARROW * n].reshape(n, NARROW)
+    series[1 : order + 1, first : first + NARROW * n] = np.einsum("oji,jl->oil", rows, vectors).reshape(
+        order, -1
+    )
+
+
+def spread_tangents(y, n, series, first, stride):
+    """Tangent vectors from ``y (n (1 + k),)`` into order zero of their series: four at a time, by component.
+
+    Those of four vectors begin at ``first``, those of the next four ``stride`` columns further.
+    """
+    count = len(y) // n - 1
+    for vector in range(whole_registers(count, NARROW)):
+        column = first + vector // NARROW * stride + vector % NARROW
+        for i in range(n):
+            series[0, column + NARROW * i] = y[n * (1 + vector) + i] if vector < count else 0.0
+
+
+@register_jitable
+def gather_tangents(series, order, n, first, stride, y):
+    """The inverse of ``spread_tangents`` from row ``order``."""
+    for vector in range(len(y) // n - 1):
+        column = first + vector // NARROW * stride + vector % NARROW
+        for i in range(n):
+            y[n * (1 + vector) + i] = series[order, column + NARROW * i]
+
+
+@overload(evaluate, jit_options=HERE)
+def _overload_evaluate(series, order, s, first, width):
+    def in_registers(series, order, s, first, width):
+        # Sums in one loop do not wait for each other.
+        four = width // (4 * NARROW) * 4 * NARROW
+        _evaluate_in_registers(series, order, s, first, four, NARROW, 4, False)
+        two = (width - four) // (2 * NARROW) * 2 * NARROW
+        _evaluate_in_registers(series, order, s, first + four, two, NARROW, 2, False)
+        _evaluate_in_registers(series, order, s, first + four + two, width - four - two, NARROW, 1, False)
+
+    return in_registers
+
+
+@overload(evaluate_with_sizes, jit_options=HERE)
+def _overload_evaluate_with_sizes(series, order, s, first, width):
+    def in_registers(series, order, s, first, width):
+        wide = width // WIDE * WIDE
+        _evaluate_in_registers(series, order, s, first, wide, WIDE, 1, True)
+        _evaluate_in_registers(series, order, s, first + wide, width - wide, NARROW, 1, True)
+
+    return in_registers
+
+
+def _registers(width, widest):
+    """First column and width of each register, the widest first."""
+    whole = width // widest * widest
+    wide = [(place, widest) for place in range(0, whole, widest)]
+    return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
+
+
+def _as_known(*kinds):
+    """The types of numbers that instructions are written for: what the compiler knows stays known.
+
+    Numba looks for what it has written by these types alone. It would take one width for another.
+    """
+    return tuple(kind if isinstance(kind, types.Literal) else types.intp for kind in kinds)
+
+
+def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
+    """The instructions of ``convolve``, or of ``convolve_pairs``."""
+    registers = _registers(width, widest)
+    sums_at_once = max(1, AT_ONCE // len(registers))
+    number = order.type
+    # The lowest orders of the columns come first: what was written last is the slowest to read.
+    factor = rows.walker(builder.sub(order, inset), left)
+    other = rows.walker(inset, first)
+    totals = [
+        [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for _, each in registers]
+        for _ in range(sums_at_once)
+    ]
+
+    def add_term(row_of_totals):
+        a, b = rows.walk(factor, -1), rows.walk(other, 1)
+        for (place, each), total in zip(registers, row_of_totals, strict=True):
+            term = read(builder, rows.beside(b, place), each)
+            if pairs:
+                times = read(builder, rows.beside(a, place), each)
+            else:
+                times = everywhere(builder, builder.load(a), each)
+            builder.store(multiply_add(builder, times, term, builder.load(total)), total)
+
+    terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
+    terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
+    with cgutils.for_range(builder, builder.udiv(terms, number(sums_at_once)), intp=number):
+        for each in totals:
+            add_term(each)
+    if sums_at_once > 1:
+        with cgutils.for_range(builder, builder.urem(terms, number(sums_at_once)), intp=number):
+            add_term(totals[0])
+    target = rows.address(order, first)
+    for i, (place, _) in enumerate(registers):
+        parts = [builder.load(each[i]) for each in totals]
+        while len(parts) > 1:
+            parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
+        write(builder, parts[0], rows.beside(target, place))
+
+
+@intrinsic(prefer_literal=True)
+def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes, at_once, sizes):
+    """Horner's scheme in ``s**2`` for even and for odd terms, on turns of ``at_once`` registers.
+
+    Each has ``lanes`` columns. Every step of the scheme waits for the one before: so there are half as many.
+    """
+    known = _as_known(first, width, lanes, at_once, sizes)
+    lanes, at_once, with_sizes = (each.literal_value for each in (lanes, at_once, sizes))
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, s, first, width, *_ = arguments
+        rows = matrix_of(context, builder, series, matrix)
+        number = order.type
+        factor = everywhere(builder, s, lanes)
+        square = everywhere(builder, builder.fmul(s, s), lanes)
+        places = [lanes * i for i in range(at_once)]
+        is_even = builder.icmp_signed("==", builder.and_(order, number(1)), number(0))
+        pairs = builder.ashr(builder.sub(order, number(1)), number(1))
+
+        def terms_of(row):
+            terms = [read(builder, rows.beside(row, place), lanes) for place in places]
+            sizes = [built_in(builder, "fabs", lanes, term) for term in terms] if with_sizes else []
+            return terms + sizes
+
+        def one_turn(column):
+            walker = rows.walker(order, column)
+            # The sums that begin with the last term, and those that begin with the one before it.
+            last, other = (
+                [cgutils.alloca_once_value(builder, term) for term in terms_of(rows.walk(walker, -1))]
+                for _ in range(2)
+            )
+
+            def add_terms(totals):
+                for total, term in zip(totals, terms_of(rows.walk(walker, -1)), strict=True):
+                    builder.store(multiply_add(builder, builder.load(total), square, term), total)
+
+            with cgutils.for_range(builder, pairs, intp=number):
+                add_terms(last)
+                add_terms(other)
+            with builder.if_then(is_even):
+                add_terms(last)
+            results = []
+            for one, two in zip(last, other, strict=True):
+                ends = builder.load(one), builder.load(two)
+                even, odd = builder.select(is_even, *ends), builder.select(is_even, *reversed(ends))
+                results.append(multiply_add(builder, odd, factor, even))
+            for i, result in enumerate(results):
+                below = builder.add(order, number(1 + i // at_once))
+                write(builder, result, rows.address(below, builder.add(column, number(places[i % at_once]))))
+
+        end = builder.add(first, width)
+        turn = number(lanes * at_once)
+        with cgutils.for_range_slice(builder, first, end, turn, number) as (column, _):
+            one_turn(column)
+        return context.get_dummy_value()
+
+    return types.void(series, types.intp, types.float64, *known), generate
+
+
+def _weighted_sum(builder, factors, terms):
+    total = builder.fmul(factors[0], terms[0])
+    for factor, term in zip(factors[1:], terms[1:], strict=True):
+        total = multiply_add(builder, factor, term, total)
+    return total
+
+
+def write_combination(builder, rows, order, table, width, numbers):
+    """The instructions of ``combine``."""
+    number = order.type
+    target, source = rows.walker(number(0), number(0)), rows.walker(number(0), table)
+    with cgutils.for_range(builder, builder.add(order, number(1)), intp=number):
+        here, there = rows.walk(target, 1), rows.walk(source, 1)
+        for place, lanes in _registers(width, WIDE):
+            factors = [everywhere(builder, each, lanes) for each in numbers]
+            blocks = [rows.beside(there, width * c + place) for c in range(len(numbers))]
+            terms = [read(builder, block, lanes) for block in blocks]
+            write(builder, _weighted_sum(builder, factors, terms), rows.beside(here, place))
+
+
+def write_combination_of_tangents(builder, rows, order, table, width, first, n):
+    """The instructions of ``combine_tangents``."""
+    number = order.type
+    start = rows.address(number(0), first)
+    vectors = [read(builder, rows.beside(start, NARROW * j), NARROW) for j in range(n)]
+    target, source = rows.walker(number(1), first), rows.walker(number(1), table)
+    with cgutils.for_range(builder, order, intp=number):
+        here, there = rows.walk(target, 1), rows.walk(source, 1)
+        for i in range(n):
+            entries = [builder.load(rows.beside(there, width * j + i)) for j in range(n)]
+            factors = [everywhere(builder, entry, NARROW) for entry in entries]
+            write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
+
+
+def write_spread(builder, y, length, n, rows, first, stride):
+    """The instructions of ``spread_tangents``: lanes without a vector are zero."""
+    number = first.type
+    count = builder.sub(builder.sdiv(length, number(n)), number(1))
+    groups = builder.sdiv(builder.add(count, number(NARROW - 1)), number(NARROW))
+    with cgutils.for_range(builder, groups, intp=number) as group:
+        for lane in range(NARROW):
+            vector = builder.add(builder.mul(group.index, number(NARROW)), number(lane))
+            is_one = builder.icmp_signed("<", vector, count)
+            column = builder.add(builder.add(first, builder.mul(group.index, stride)), number(lane))
+            source = builder.select(is_one, builder.mul(number(n), builder.add(vector, number(1))), number(0))
+            start, target = builder.gep(y, [source]), rows.address(number(0), column)
+            for i in range(n):
+                value = builder.load(builder.gep(start, [number(i)]))
+                value = builder.select(is_one, value, value.type(0.0))
+                builder.store(value, rows.beside(target, NARROW * i))

@@ -1,0 +1,68 @@
+"""Four numbers in two parts each, what is rounded and what it lacks: twice the digits of one number.
+
+What a product and a sum lose in rounding are numbers again (Dekker 1971, doi:10.1007/BF01397083; Ogita, Rump
+and Oishi 2005, doi:10.1137/030601818).
+"""
+
+import numpy as np
+
+from hybrid.kernels.arithmetic.lanes import built_in, everywhere, vector_of
+from hybrid.kernels.types.codes import NARROW
+
+# Times this, less the number itself, is a number with the upper half of its digits.
+UPPER_HALF = 2.0**27 + 1.0
+
+
+def divided_dot_product(factors, highs, lows, by):
+    """The sum of ``factors[i] (highs[i] + lows[i])`` over ``by`` in two parts, the first the whole, rounded.
+
+    The factors and ``by`` are numbers, all else is four numbers at once.
+    """
+    total, rest = np.zeros(NARROW), np.zeros(NARROW)
+    for factor, high, low in zip(factors, highs, lows, strict=True):
+        product = factor * high
+        longer = total + product
+        part = longer - total
+        rest += (total - (longer - part)) + (product - part)
+        rest += _lost(factor, high, product) + factor * low
+        total = longer
+    quotient = total / by
+    low = (rest - _lost(by, quotient, total)) / by
+    whole = quotient + low
+    return whole, low - (whole - quotient)
+
+
+def _lost(factor, lanes, product):
+    """What ``factor * lanes`` is beyond ``product``, to which it was rounded."""
+    (a, b), (c, d) = _halves(factor), _halves(lanes)
+    return (a * c - product) + a * d + b * c + b * d
+
+
+def _halves(number):
+    upper = UPPER_HALF * number - (UPPER_HALF * number - number)
+    return upper, number - upper
+
+
+def write_divided_dot_product(builder, factors, highs, lows, by):
+    """The instructions of ``divided_dot_product``; returns both parts."""
+    zero = vector_of(NARROW)([0.0] * NARROW)
+    add, subtract, divide = builder.fadd, builder.fsub, builder.fdiv
+
+    def lost(factor, lanes, product):
+        negative = subtract(vector_of(NARROW)([-0.0] * NARROW), product)
+        return built_in(builder, "fma", NARROW, factor, lanes, negative)
+
+    by = everywhere(builder, by, NARROW)
+    total, rest = zero, zero
+    for factor, high, low in zip(factors, highs, lows, strict=True):
+        factor = everywhere(builder, factor, NARROW)
+        product = builder.fmul(factor, high)
+        longer = add(total, product)
+        part = subtract(longer, total)
+        of_sum = add(subtract(total, subtract(longer, part)), subtract(product, part))
+        of_product = add(lost(factor, high, product), builder.fmul(factor, low))
+        total, rest = longer, add(rest, add(of_sum, of_product))
+    quotient = divide(total, by)
+    low = divide(subtract(rest, lost(by, quotient, total)), by)
+    whole = add(quotient, low)
+    return whole, subtract(low, subtract(whole, quotient))

@@ -1,0 +1,330 @@
+"""Four numbers in one vector register, as a type of the compiler: arithmetic on four tangent vectors at once.
+
+In plain Python ``Lanes`` are arrays ``(4,)``, so that what is written for one runs as the other.
+"""
+
+import operator
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, overload, register_jitable, register_model
+
+from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.kernels.types.options import PartCompiler
+
+FUSED = ("contract",)
+# Small and called at every order: the call would cost as much as the work.
+HERE = {"_nrt": False, "forceinline": True, "pipeline_class": PartCompiler}
+
+
+class LanesType(types.Type):
+    """The numba type of four numbers side by side."""
+
+    def __init__(self):
+        super().__init__("Lanes")
+
+
+LANES = LanesType()
+
+
+def vector_of(width):
+    """The type of a register of that many numbers."""
+    return ir.VectorType(ir.DoubleType(), width)
+
+
+@register_model(LanesType)
+class _Register(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, vector_of(NARROW))
+
+
+def everywhere(builder, number, width):
+    """One number in every lane."""
+    nothing = vector_of(width)(ir.Undefined)
+    vector = builder.insert_element(nothing, number, ir.IntType(32)(0))
+    lanes = ir.VectorType(ir.IntType(32), width)
+    return builder.shuffle_vector(vector, nothing, lanes([0] * width))
+
+
+def built_in(builder, name, width, *arguments):
+    """Call of a function that the compiler has for vectors, ``fabs`` for one."""
+    kind = vector_of(width)
+    function = ir.FunctionType(kind, [kind] * len(arguments))
+    return builder.call(
+        cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{width}f64"), arguments
+    )
+
+
+def multiply_add(builder, a, b, c):
+    """``a * b + c``."""
+    return builder.fadd(c, builder.fmul(a, b, flags=FUSED), flags=FUSED)
+
+
+class Matrix:
+    """Writes the instructions that find the entries of a matrix: where its data begin, and its columns."""
+
+    def __init__(self, builder, data, columns):
+        self.builder, self.data, self.columns = builder, data, columns
+
+    def address(self, row, column):
+        """Address of an entry."""
+        builder = self.builder
+        return builder.gep(self.data, [builder.add(builder.mul(row, self.columns), column)])
+
+    def walker(self, row, column):
+        """A variable that holds the address of an entry."""
+        return cgutils.alloca_once_value(self.builder, self.address(row, column))
+
+    def walk(self, walker, rows):
+        """Move on by a number of rows; returns where it was."""
+        builder = self.builder
+        here = builder.load(walker)
+        builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
+        return here
+
+    def beside(self, address, columns):
+        """Address of an entry that many columns further."""
+        return self.builder.gep(address, [self.columns.type(columns)])
+
+
+def matrix_of(context, builder, kind, matrix):
+    """A matrix of numba's."""
+    array = context.make_array(kind)(context, builder, matrix)
+    return Matrix(builder, array.data, cgutils.unpack_tuple(builder, array.shape)[1])
+
+
+def read(builder, address, width):
+    """The vector at an address."""
+    return builder.load(builder.bitcast(address, vector_of(width).as_pointer()), align=8)
+
+
+def write(builder, vector, address):
+    """Put a vector where it belongs."""
+    builder.store(vector, builder.bitcast(address, vector.type.as_pointer()), align=8)
+
+
+@register_jitable
+def whole_registers(width, register):
+    """The least number of columns, no less than ``width``, that fill vector registers."""
+    return (width + register - 1) // register * register
+
+
+def load(matrix, row, column):
+    """Four entries of a row."""
+    return matrix[row, column : column + NARROW].copy()
+
+
+def store(matrix, row, column, lanes):
+    """Write four entries of a row, from a register or all from one number."""
+    matrix[row, column : column + NARROW] = lanes
+
+
+def store_down(matrix, row, column, stride, lanes):
+    """Write four entries of a row that are ``stride`` columns apart."""
+    matrix[row, column : column + NARROW * stride : stride] = lanes
+
+
+def store_row(matrix, row, column, numbers):
+    """Write a tuple of numbers side by side, in registers that are filled up with zeros."""
+    filled = sum(_widths(len(numbers)))
+    matrix[row, column : column + filled] = [*numbers, *[0.0] * (filled - len(numbers))]
+
+
+def _widths(count):
+    """The registers that a row of that many numbers is written in."""
+    rest = count % WIDE
+    return [WIDE] * (count // WIDE) + ([] if rest == 0 else [NARROW if rest <= NARROW else WIDE])
+
+
+@overload(load, jit_options=HERE)
+def _overload_load(matrix, row, column):
+    return lambda matrix, row, column: _read_register(matrix, row, column)
+
+
+@overload(store, jit_options=HERE)
+def _overload_store(matrix, row, column, lanes):
+    return lambda matrix, row, column, lanes: _write_register(matrix, row, column, lanes)
+
+
+@intrinsic
+def _read_register(typing_context, matrix, row, column):
+    def generate(context, builder, signature, arguments):
+        return read(
+            builder, matrix_of(context, builder, matrix, arguments[0]).address(*arguments[1:]), NARROW
+        )
+
+    return LANES(matrix, types.intp, types.intp), generate
+
+
+@intrinsic
+def _write_register(typing_context, matrix, row, column, lanes):
+    kind = LANES if lanes == LANES else types.float64
+
+    def generate(context, builder, signature, arguments):
+        array, row, column, value = arguments
+        vector = value if kind == LANES else everywhere(builder, value, NARROW)
+        write(builder, vector, matrix_of(context, builder, matrix, array).address(row, column))
+        return context.get_dummy_value()
+
+    return types.void(matrix, types.intp, types.intp, kind), generate
+
+
+def write_down(builder, matrix, row, column, stride, lanes):
+    """The instructions of ``store_down``."""
+    address = matrix.address(row, column)
+    for lane in range(NARROW):
+        builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
+        address = builder.gep(address, [stride])
+
+
+def write_row(builder, matrix, row, column, numbers):
+    """The instructions of ``store_row``."""
+    address = matrix.address(row, column)
+    for i, width in enumerate(_widths(len(numbers))):
+        vector = vector_of(width)([0.0] * width)
+        for lane, value in enumerate(numbers[WIDE * i : WIDE * (i + 1)]):
+            vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
+        write(builder, vector, matrix.beside(address, WIDE * i))
+
+
+def square_root(lanes):
+    """Square root of each."""
+    return np.sqrt(lanes)
+
+
+def magnitude(lanes):
+    """Absolute value of each."""
+    return abs(lanes)
+
+
+def four_times(number):
+    """The same number in every lane."""
+    return np.full(NARROW, number)
+
+
+def larger(a, b):
+    """The larger of each two; ``b`` where they cannot be compared."""
+    return np.where(a > b, a, b)
+
+
+def largest(lanes):
+    """The largest of the four."""
+    return max(lanes)
+
+
+def _operation(instruction):
+    """An intrinsic for an operation on two registers, or on a register and a number."""
+
+    @intrinsic
+    def operate(typing_context, a, b):
+        kinds = [each if each == LANES else types.float64 for each in (a, b)]
+
+        def generate(context, builder, signature, arguments):
+            vectors = [
+                argument if kind == LANES else everywhere(builder, argument, NARROW)
+                for kind, argument in zip(kinds, arguments, strict=True)
+            ]
+            return getattr(builder, instruction)(*vectors, flags=FUSED)
+
+        return LANES(*kinds), generate
+
+    return operate
+
+
+def _function_of_each(name):
+    """An intrinsic for a function that the compiler has for vectors."""
+
+    @intrinsic
+    def call(typing_context, lanes):
+        def generate(context, builder, signature, arguments):
+            return built_in(builder, name, NARROW, *arguments)
+
+        return LANES(LANES), generate
+
+    return call
+
+
+def _larger_of(builder, a, b):
+    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
+
+
+@intrinsic
+def _fill(typing_context, number):
+    def generate(context, builder, signature, arguments):
+        return everywhere(builder, arguments[0], NARROW)
+
+    return LANES(types.float64), generate
+
+
+@intrinsic
+def _select_larger(typing_context, a, b):
+    def generate(context, builder, signature, arguments):
+        return _larger_of(builder, *arguments)
+
+    return LANES(LANES, LANES), generate
+
+
+@intrinsic
+def _reduce_to_largest(typing_context, lanes):
+    def generate(context, builder, signature, arguments):
+        parts = [builder.extract_element(arguments[0], ir.IntType(32)(i)) for i in range(NARROW)]
+        while len(parts) > 1:
+            parts = [_larger_of(builder, *parts[i : i + 2]) for i in range(0, len(parts), 2)]
+        return parts[0]
+
+    return types.float64(LANES), generate
+
+
+_add, _subtract, _multiply, _divide = (_operation(name) for name in ("fadd", "fsub", "fmul", "fdiv"))
+_square_root, _magnitude = _function_of_each("sqrt"), _function_of_each("fabs")
+
+
+def _overload_operator(operation, function):
+    @overload(operation, jit_options=HERE)
+    def choose(a, b):
+        if LANES in (a, b):
+            return lambda a, b: function(a, b)
+        return None
+
+
+for _operator, _intrinsic in (
+    (operator.add, _add),
+    (operator.sub, _subtract),
+    (operator.mul, _multiply),
+    (operator.truediv, _divide),
+):
+    _overload_operator(_operator, _intrinsic)
+
+
+@overload(operator.neg, jit_options=HERE)
+def _overload_negative(a):
+    if a == LANES:
+        return lambda a: _multiply(-1.0, a)
+    return None
+
+
+@overload(square_root, jit_options=HERE)
+def _overload_square_root(lanes):
+    return lambda lanes: _square_root(lanes)
+
+
+@overload(magnitude, jit_options=HERE)
+def _overload_magnitude(lanes):
+    return lambda lanes: _magnitude(lanes)
+
+
+@overload(four_times, jit_options=HERE)
+def _overload_four_times(number):
+    return lambda number: _fill(number)
+
+
+@overload(larger, jit_options=HERE)
+def _overload_larger(a, b):
+    return lambda a, b: _select_larger(a, b)
+
+
+@overload(largest, jit_options=HERE)
+def _overload_largest(lanes):
+    return lambda lanes: _reduce_to_largest(lanes)

@@ -1,0 +1,228 @@
+"""Orthonormalisation of tangent vectors, and determinants: the linear algebra of jumps and exponents."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.types.codes import (
+    DESINGULARISED,
+    EXACT,
+    INDISTINCT,
+    PHASE_OF_RUN,
+    READY,
+    RUNGE_KUTTA,
+    STALE,
+    STRAIN,
+    UNCHECKED,
+)
+from hybrid.kernels.types.layout import KERNEL
+
+# Below this length a unit vector's image is rounding: the map that produced it is singular.
+COLLAPSED = 1e-13
+# Strain of all jumps since the tangent vectors were last orthonormalised from which on it is done again: a
+# condition number of a thousand costs three digits of the vectors that grow less.
+STRAINED = math.log(1e3)
+# Tangent vectors are orthonormalised between steps as soon as the product of their sines (see
+# ``independence``) is below one of these, squared here. The solver's error is relative to a whole vector, and
+# what counts is the vector's part orthogonal to the vectors before it: that part loses as many digits as the
+# product has. An exact step has an error of rounding alone; the step of a Runge-Kutta method has to evaluate
+# the rates once more afterwards.
+CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-3**2, 1e-1**2, 1e-2**2
+# They are looked at after so many steps: an exact one brings them no closer than a factor of a few thousand.
+# A stiff contact stretches all of them along the speed, and shrinks them again before it ends, which is no
+# sign of exponents that are far apart.
+STEPS_IN_EXACT, STEPS_IN_CONTACT = 2, 16
+# Tangent vectors are also orthonormalised where a square of their length leaves this range.
+SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
+
+
+@njit(**KERNEL)
+def orthonormalise(y, n, k, growth, threshold):
+    """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``.
+
+    The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt, twice, which
+    is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold`` times the longest image
+    has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of vectors
+    of which only rounding is left, though none had to collapse.
+    """
+    indistinct = 0
+    longest = 0.0
+    for c in range(k):
+        start = n * (1 + c)
+        square = 0.0
+        for i in range(start, start + n):
+            square += y[i] * y[i]
+        whole = math.sqrt(square)
+        longest = max(longest, whole)
+        for _ in range(2):
+            for other in range(n, start, n):
+                dot = 0.0
+                for i in range(n):
+                    dot += y[other + i] * y[start + i]
+                for i in range(n):
+                    y[start + i] -= dot * y[other + i]
+        square = 0.0
+        for i in range(start, start + n):
+            square += y[i] * y[i]
+        length = math.sqrt(square)
+        if length > threshold * longest and length > 0.0:
+            growth[c] += math.log(length)
+            indistinct += 1 if length < COLLAPSED * whole else 0
+            for i in range(start, start + n):
+                y[i] /= length
+        else:
+            growth[c] = -math.inf
+            for i in range(start, start + n):
+                y[i] = 0.0
+    return indistinct
+
+
+@njit(**KERNEL)
+def independence(y, n, k, gram):
+    """Square of the product of the sines between each of ``k`` tangent vectors and the span of those before.
+
+    It is 1 if they are orthogonal, 0 if they are linearly dependent, and -1 if the length of one is near the
+    limits of floating-point numbers. Zero vectors count for nothing. ``gram``, at least ``(k, k)``, is
+    scratch for the Cholesky factorisation of the Gram matrix, without square roots: the quotients are below
+    its diagonal, the numerators above.
+    """
+    product = 1.0
+    for c in range(k):
+        start = n * (1 + c)
+        square = 0.0
+        for i in range(start, start + n):
+            square += y[i] * y[i]
+        if square != 0.0 and not SHORTEST_SQUARE < square < LONGEST_SQUARE:
+            return -1.0
+        rest = square
+        for d in range(c):
+            other = n * (1 + d) - start
+            numerator = 0.0
+            for i in range(start, start + n):
+                numerator += y[i] * y[other + i]
+            for e in range(d):
+                numerator -= gram[c, e] * gram[e, d]
+            quotient = numerator / gram[d, d] if gram[d, d] > 0.0 else 0.0
+            gram[c, d], gram[d, c] = quotient, numerator
+            rest -= quotient * numerator
+        gram[c, c] = rest
+        if square > 0.0:
+            product *= max(rest, 0.0) / square
+    return product
+
+
+@njit(**KERNEL)
+def keep_apart(model, run, mode, tangents, gram):
+    """After a step: orthonormalise the tangent vectors if they have come too close for its propagator."""
+    kind, closest, steps = model.propagator[mode], CLOSE_IN_TAYLOR, 1
+    if kind == EXACT:
+        closest, steps = CLOSE_IN_EXACT, STEPS_IN_EXACT
+    elif kind == RUNGE_KUTTA:
+        closest = CLOSE_IN_RUNGE_KUTTA
+    elif kind == DESINGULARISED:
+        steps = STEPS_IN_CONTACT
+    run.count[UNCHECKED] += 1
+    if run.count[UNCHECKED] < steps:
+        return
+    run.count[UNCHECKED] = 0
+    n = model.dimension
+    if independence(run.y, n, tangents, gram) > closest:
+        return
+    run.count[INDISTINCT] += orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    run.clock[STRAIN] = 0.0
+    if run.count[PHASE_OF_RUN] == READY:
+        run.count[PHASE_OF_RUN] = STALE
+
+
+@njit(**KERNEL)
+def multiply(matrix, y, n, tangents, image):
+    """Multiply the tangent vectors in ``y (n (1 + k),)`` by a matrix; ``image (n,)`` is scratch."""
+    for start in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            total = 0.0
+            for j in range(n):
+                total += matrix[i, j] * y[start + j]
+            image[i] = total
+        for i in range(n):
+            y[start + i] = image[i]
+
+
+@njit(**KERNEL)
+def strain(matrix, n, log_determinant):
+    """How far a matrix is from one that keeps all angles: 0 for those, infinite if it is singular.
+
+    ``n log(|Xi|_F / sqrt(n)) - log|det Xi|``: its condition number is at most 2 times the exponential of that
+    (Guggenheimer, Edelman and Johnson 1995, College Mathematics Journal 26, 2-5).
+    """
+    square = 0.0
+    for i in range(n):
+        for j in range(n):
+            square += matrix[i, j] * matrix[i, j]
+    return 0.5 * n * math.log(square / n) - log_determinant if square > 0.0 else math.inf
+
+
+@njit(**KERNEL)
+def solve(system, n, out):
+    """Solve the linear equations in the rows of ``system (n, n + 1)``, overwritten; the last column is known.
+
+    Where they are singular to rounding some unknowns are zero, and equations that contradict are left.
+    """
+    for column in range(n):
+        out[column] = 0.0
+        for i in range(n):
+            out[column] = max(out[column], abs(system[i, column]))
+    rank = 0
+    for column in range(n):
+        pivot = rank
+        for i in range(rank + 1, n):
+            if abs(system[i, column]) > abs(system[pivot, column]):
+                pivot = i
+        if rank == n or not abs(system[pivot, column]) > COLLAPSED * out[column]:
+            out[column] = -1.0
+            continue
+        for j in range(n + 1):
+            system[rank, j], system[pivot, j] = system[pivot, j], system[rank, j]
+        for i in range(n):
+            factor = system[i, column] / system[rank, column]
+            for j in range(column, n + 1 if i != rank else 0):
+                system[i, j] -= factor * system[rank, j]
+        rank += 1
+    rank = 0
+    for column in range(n):
+        if out[column] < 0.0:
+            out[column] = 0.0
+        else:
+            out[column] = system[rank, n] / system[rank, column]
+            rank += 1
+
+
+@njit(**KERNEL)
+def log_abs_determinant(matrix, magnitude, n):
+    """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if singular to rounding.
+
+    ``magnitude``, scratch of at least that shape, follows the size of the terms that each entry was made of:
+    a pivot that is only their rounding is a zero, while one that is merely small (as near a grazing) is not.
+    """
+    total = 0.0
+    for i in range(n):
+        for j in range(n):
+            magnitude[i, j] = abs(matrix[i, j])
+    for column in range(n):
+        pivot = column
+        for i in range(column + 1, n):
+            if abs(matrix[i, column]) > abs(matrix[pivot, column]):
+                pivot = i
+        size = abs(matrix[pivot, column])
+        if not size > 1e-14 * magnitude[pivot, column]:
+            return -math.inf
+        for j in range(n):
+            matrix[column, j], matrix[pivot, j] = matrix[pivot, j], matrix[column, j]
+            magnitude[column, j], magnitude[pivot, j] = magnitude[pivot, j], magnitude[column, j]
+        total += math.log(size)
+        for i in range(column + 1, n):
+            factor = matrix[i, column] / matrix[column, column]
+            for j in range(column, n):
+                term = factor * matrix[column, j]
+                matrix[i, j] -= term
+                magnitude[i, j] = max(magnitude[i, j], abs(factor) * magnitude[column, j])
+    return total

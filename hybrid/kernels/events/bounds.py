@@ -1,0 +1,347 @@
+"""Bounds for a guard and for its slope over a piece of a step, from the guard's own expression.
+
+A *program* is the expression of a guard as a list of operations, written by
+``hybrid.compiler.bounds.program``. It runs on intervals here, forwards: each row gives the range of a
+subexpression over the piece, the range of its derivative along the step, and an interval for its value in
+the middle of the piece. The mean value theorem makes the first from the other two where that is narrower.
+The state along the step is a *path*: a polynomial in the step's variable, one column per component.
+"""
+
+import math
+
+from numba import float64, int64, njit
+
+from hybrid.kernels.arithmetic import operations as op
+from hybrid.kernels.arithmetic.intervals import (
+    added,
+    angle,
+    comparison,
+    fixed_power,
+    hull,
+    product,
+    quotient,
+    range_of,
+    slope_of,
+    truth,
+    whole_power,
+)
+from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, MATRIX, PART, PROGRAMS, VECTOR
+
+# A radius over which no slope makes a range narrower.
+FAR = 1e300
+
+
+@njit(**INLINE)
+def _narrowed(row, radius):
+    """Intersect a row's range with what its value in the middle and its slope say of it."""
+    reach = radius * max(abs(row[LEAST_SLOPE]), abs(row[MOST_SLOPE])) if radius > 0.0 else 0.0
+    reach += 2.0 * EPSILON * reach
+    low, high = row[LOW_MIDDLE] - reach, row[HIGH_MIDDLE] + reach
+    if low > row[LOW]:
+        row[LOW] = low
+    if high < row[HIGH]:
+        row[HIGH] = high
+    # Rounding alone may cross the ends of two enclosures of one point.
+    if not row[LOW] <= row[HIGH]:
+        row[LOW], row[HIGH] = min(row[LOW_MIDDLE], row[HIGH]), max(row[HIGH_MIDDLE], row[LOW])
+    if math.isnan(row[LOW]) or math.isnan(row[HIGH]):
+        row[LOW], row[HIGH] = -math.inf, math.inf
+
+
+@njit(**INLINE)
+def _whole_line(row):
+    """A subexpression of which nothing is known."""
+    row[LOW], row[HIGH] = -math.inf, math.inf
+    row[LEAST_SLOPE], row[MOST_SLOPE] = -math.inf, math.inf
+
+
+@njit(**KERNEL)
+def _bound_state(path, column, order, middle, radius, row):
+    """A component of the path around ``middle``: a parabola, and bounds for what it leaves out.
+
+    The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``.
+    """
+    end = middle + radius
+    value, slope, bend = 0.0, 0.0, 0.0
+    size, third = 0.0, 0.0
+    for k in range(order, -1, -1):
+        coefficient = path[k, column]
+        bend = bend * middle + slope
+        slope = slope * middle + value
+        value = value * middle + coefficient
+        magnitude = abs(coefficient)
+        size = size * end + magnitude
+        if k > 2:
+            third = third * end + magnitude * (k * (k - 1.0) * (k - 2.0) / 6.0)
+    rounding = 4.0 * EPSILON * size
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = value - rounding, value + rounding
+    turn = 2.0 * abs(bend) * radius + 3.0 * third * radius * radius
+    turn += 4.0 * EPSILON * (abs(slope) + turn)
+    row[LEAST_SLOPE], row[MOST_SLOPE] = slope - turn, slope + turn
+    rest = third * radius * radius * radius + rounding
+    one, other = value + radius * (bend * radius - slope), value + radius * (bend * radius + slope)
+    low, high = min(one, other), max(one, other)
+    if abs(slope) < 2.0 * abs(bend) * radius:
+        vertex = value - 0.25 * slope * slope / bend
+        low, high = min(low, vertex), max(high, vertex)
+    row[LOW], row[HIGH] = low - rest, high + rest
+
+
+@njit(**KERNEL)
+def _bound_time(path, clock, order, start, pace, middle, radius, row):
+    """Time along the step: ``start`` plus ``pace`` times the variable, or plus the column of a clock."""
+    if clock >= 0:
+        _bound_state(path, clock, order, middle, radius, row)
+    else:
+        value = pace * middle
+        row[LOW], row[HIGH] = value - pace * radius, value + pace * radius
+        row[LEAST_SLOPE], row[MOST_SLOPE] = pace, pace
+        row[LOW_MIDDLE], row[HIGH_MIDDLE] = value, value
+    rounding = 2.0 * EPSILON * (abs(start) + abs(row[LOW]) + abs(row[HIGH]))
+    row[LOW] += start - rounding
+    row[HIGH] += start + rounding
+    row[LOW_MIDDLE] += start - rounding
+    row[HIGH_MIDDLE] += start + rounding
+
+
+@njit(**INLINE)
+def _bound_sum(row, a, b):
+    row[LOW], row[HIGH] = added(a[LOW], a[HIGH], b[LOW], b[HIGH])
+    row[LEAST_SLOPE], row[MOST_SLOPE] = added(a[LEAST_SLOPE], a[MOST_SLOPE], b[LEAST_SLOPE], b[MOST_SLOPE])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = added(a[LOW_MIDDLE], a[HIGH_MIDDLE], b[LOW_MIDDLE], b[HIGH_MIDDLE])
+
+
+@njit(**KERNEL)
+def _bound_product(row, a, b):
+    row[LOW], row[HIGH] = product(a[LOW], a[HIGH], b[LOW], b[HIGH])
+    one, other = product(a[LEAST_SLOPE], a[MOST_SLOPE], b[LOW], b[HIGH])
+    least, most = product(a[LOW], a[HIGH], b[LEAST_SLOPE], b[MOST_SLOPE])
+    row[LEAST_SLOPE], row[MOST_SLOPE] = added(one, other, least, most)
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = product(a[LOW_MIDDLE], a[HIGH_MIDDLE], b[LOW_MIDDLE], b[HIGH_MIDDLE])
+
+
+@njit(**KERNEL)
+def _bound_quotient(row, a, b):
+    row[LOW], row[HIGH] = quotient(a[LOW], a[HIGH], b[LOW], b[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = quotient(a[LOW_MIDDLE], a[HIGH_MIDDLE], b[LOW_MIDDLE], b[HIGH_MIDDLE])
+    # (a / b)' = (a' - (a / b) b') / b
+    low, high = product(row[LOW], row[HIGH], b[LEAST_SLOPE], b[MOST_SLOPE])
+    low, high = added(a[LEAST_SLOPE], a[MOST_SLOPE], -high, -low)
+    row[LEAST_SLOPE], row[MOST_SLOPE] = quotient(low, high, b[LOW], b[HIGH])
+    if b[LOW] <= 0.0 <= b[HIGH]:
+        row[LEAST_SLOPE], row[MOST_SLOPE] = -math.inf, math.inf
+
+
+@njit(**KERNEL)
+def _bound_whole_power(row, a, exponent):
+    row[LOW], row[HIGH] = whole_power(a[LOW], a[HIGH], exponent)
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = whole_power(a[LOW_MIDDLE], a[HIGH_MIDDLE], exponent)
+    low, high = whole_power(a[LOW], a[HIGH], exponent - 1)
+    low, high = product(low, high, float(exponent), float(exponent))
+    row[LEAST_SLOPE], row[MOST_SLOPE] = product(low, high, a[LEAST_SLOPE], a[MOST_SLOPE])
+    if exponent < 0 and a[LOW] <= 0.0 <= a[HIGH]:
+        _whole_line(row)
+
+
+@njit(**KERNEL)
+def _bound_fixed_power(row, a, exponent):
+    row[LOW], row[HIGH] = fixed_power(a[LOW], a[HIGH], exponent)
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = fixed_power(a[LOW_MIDDLE], a[HIGH_MIDDLE], exponent)
+    low, high = fixed_power(a[LOW], a[HIGH], exponent - 1.0)
+    low, high = product(low, high, exponent, exponent)
+    row[LEAST_SLOPE], row[MOST_SLOPE] = product(low, high, a[LEAST_SLOPE], a[MOST_SLOPE])
+
+
+@njit(**KERNEL)
+def _bound_larger(row, a, b):
+    """The larger of two; where neither wins throughout, its slope is that of one or the other."""
+    row[LOW], row[HIGH] = max(a[LOW], b[LOW]), max(a[HIGH], b[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = (
+        max(a[LOW_MIDDLE], b[LOW_MIDDLE]),
+        max(a[HIGH_MIDDLE], b[HIGH_MIDDLE]),
+    )
+    _slope_of_either(row, a, b, a[LOW] > b[HIGH], b[LOW] > a[HIGH])
+
+
+@njit(**KERNEL)
+def _bound_smaller(row, a, b):
+    row[LOW], row[HIGH] = min(a[LOW], b[LOW]), min(a[HIGH], b[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = (
+        min(a[LOW_MIDDLE], b[LOW_MIDDLE]),
+        min(a[HIGH_MIDDLE], b[HIGH_MIDDLE]),
+    )
+    _slope_of_either(row, a, b, a[HIGH] < b[LOW], b[HIGH] < a[LOW])
+
+
+@njit(**INLINE)
+def _slope_of_either(row, a, b, first, second):
+    if first:
+        row[LEAST_SLOPE], row[MOST_SLOPE] = a[LEAST_SLOPE], a[MOST_SLOPE]
+    elif second:
+        row[LEAST_SLOPE], row[MOST_SLOPE] = b[LEAST_SLOPE], b[MOST_SLOPE]
+    else:
+        row[LEAST_SLOPE], row[MOST_SLOPE] = hull(a[LEAST_SLOPE], a[MOST_SLOPE], b[LEAST_SLOPE], b[MOST_SLOPE])
+
+
+@njit(**KERNEL)
+def _bound_angle(row, y, x):
+    row[LOW], row[HIGH] = angle(y[LOW], y[HIGH], x[LOW], x[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = angle(y[LOW_MIDDLE], y[HIGH_MIDDLE], x[LOW_MIDDLE], x[HIGH_MIDDLE])
+    if y[LOW] <= 0.0 <= y[HIGH] and x[LOW] <= 0.0:
+        row[LEAST_SLOPE], row[MOST_SLOPE] = -math.inf, math.inf
+        return
+    # (x y' - y x') / (x^2 + y^2)
+    one, other = product(x[LOW], x[HIGH], y[LEAST_SLOPE], y[MOST_SLOPE])
+    low, high = product(y[LOW], y[HIGH], x[LEAST_SLOPE], x[MOST_SLOPE])
+    one, other = added(one, other, -high, -low)
+    low, high = whole_power(x[LOW], x[HIGH], 2)
+    below, above = whole_power(y[LOW], y[HIGH], 2)
+    low, high = added(low, high, below, above)
+    row[LEAST_SLOPE], row[MOST_SLOPE] = quotient(one, other, low, high)
+
+
+@njit(**KERNEL)
+def _bound_comparison(code, row, a, b):
+    row[LOW], row[HIGH] = comparison(code, a[LOW], a[HIGH], b[LOW], b[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = comparison(
+        code, a[LOW_MIDDLE], a[HIGH_MIDDLE], b[LOW_MIDDLE], b[HIGH_MIDDLE]
+    )
+    certain = row[LOW] == row[HIGH]
+    row[LEAST_SLOPE], row[MOST_SLOPE] = (0.0, 0.0) if certain else (-math.inf, math.inf)
+
+
+@njit(**KERNEL)
+def _bound_choice(row, condition, a, b):
+    holds = truth(condition[LOW], condition[HIGH])
+    if holds == 0.5:
+        row[LOW], row[HIGH] = hull(a[LOW], a[HIGH], b[LOW], b[HIGH])
+        row[LEAST_SLOPE], row[MOST_SLOPE] = -math.inf, math.inf
+    else:
+        chosen = a if holds == 1.0 else b
+        row[LOW], row[HIGH] = chosen[LOW], chosen[HIGH]
+        row[LEAST_SLOPE], row[MOST_SLOPE] = chosen[LEAST_SLOPE], chosen[MOST_SLOPE]
+    holds = truth(condition[LOW_MIDDLE], condition[HIGH_MIDDLE])
+    if holds == 0.5:
+        row[LOW_MIDDLE], row[HIGH_MIDDLE] = hull(a[LOW_MIDDLE], a[HIGH_MIDDLE], b[LOW_MIDDLE], b[HIGH_MIDDLE])
+    else:
+        chosen = a if holds == 1.0 else b
+        row[LOW_MIDDLE], row[HIGH_MIDDLE] = chosen[LOW_MIDDLE], chosen[HIGH_MIDDLE]
+
+
+@njit(**KERNEL)
+def _bound_function(code, row, a):
+    row[LOW], row[HIGH] = range_of(code, a[LOW], a[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = range_of(code, a[LOW_MIDDLE], a[HIGH_MIDDLE])
+    least, most = slope_of(code, a[LOW], a[HIGH], row[LOW], row[HIGH])
+    row[LEAST_SLOPE], row[MOST_SLOPE] = product(least, most, a[LEAST_SLOPE], a[MOST_SLOPE])
+
+
+@njit(**KERNEL)
+def _bound_binary(code, row, a, b):
+    if code == op.SUM:
+        _bound_sum(row, a, b)
+    elif code == op.PRODUCT:
+        _bound_product(row, a, b)
+    elif code == op.QUOTIENT:
+        _bound_quotient(row, a, b)
+    elif code == op.MAXIMUM:
+        _bound_larger(row, a, b)
+    elif code == op.MINIMUM:
+        _bound_smaller(row, a, b)
+    elif code == op.ANGLE:
+        _bound_angle(row, a, b)
+    else:
+        _bound_comparison(code, row, a, b)
+
+
+@njit(**KERNEL)
+def _run(programs, transition, registers, radius):
+    """Run the operations of a guard's program, whose leaves are in place; returns the index of the last."""
+    first, stop = programs.first[transition], programs.first[transition + 1]
+    for place in range(first, stop):
+        code = programs.rows[place, 0]
+        row = registers[place - first]
+        if code > op.TIME:
+            a = registers[programs.rows[place, 1]]
+            if code >= op.EXP:
+                _bound_function(code, row, a)
+            elif code == op.WHOLE_POWER:
+                _bound_whole_power(row, a, programs.rows[place, 2])
+            elif code == op.FIXED_POWER:
+                _bound_fixed_power(row, a, programs.numbers[programs.rows[place, 2]])
+            elif code == op.SELECT:
+                b, c = registers[programs.rows[place, 2]], registers[programs.rows[place, 3]]
+                _bound_choice(row, a, b, c)
+            else:
+                _bound_binary(code, row, a, registers[programs.rows[place, 2]])
+            _narrowed(row, radius)
+    return stop - 1 - first
+
+
+@njit(**INLINE)
+def _bound_constant(row, value):
+    row[LOW], row[HIGH] = value, value
+    row[LEAST_SLOPE], row[MOST_SLOPE] = 0.0, 0.0
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = value, value
+
+
+@njit(**INLINE)
+def _constant_leaf(programs, place, row):
+    """Put a number or a parameter into its row; says whether the leaf is one of these."""
+    code, a = programs.rows[place, 0], programs.rows[place, 1]
+    if code == op.NUMBER:
+        _bound_constant(row, programs.numbers[a])
+    elif code == op.PARAMETER:
+        _bound_constant(row, programs.parameters[a])
+    return code == op.NUMBER or code == op.PARAMETER
+
+
+@njit(
+    int64(PROGRAMS, int64, MATRIX, int64, int64, float64, float64, float64, float64, MATRIX),
+    **PART,
+)
+def bound_guard(programs, transition, path, order, clock, start, pace, middle, radius, registers):
+    """Bounds of a guard over ``middle +- radius`` on a path, in the row of ``registers`` that it returns.
+
+    ``path (>= order + 1, columns)`` holds the coefficients of the state's components as powers of the step's
+    variable. Time is ``start`` plus ``pace`` times the variable; or plus the column ``clock`` of the path,
+    unless that is negative. The slope is that in the variable.
+    """
+    first = programs.first[transition]
+    for place in range(first, programs.first[transition + 1]):
+        row = registers[place - first]
+        code = programs.rows[place, 0]
+        if code == op.STATE:
+            _bound_state(path, programs.rows[place, 1], order, middle, radius, row)
+        elif code == op.TIME:
+            _bound_time(path, clock, order, start, pace, middle, radius, row)
+        else:
+            _constant_leaf(programs, place, row)
+    return _run(programs, transition, registers, radius)
+
+
+@njit(float64(PROGRAMS, int64, float64, VECTOR, VECTOR, float64, MATRIX), **PART)
+def spread_by_rounding(programs, transition, t, x, scale, share, registers):
+    """How far a guard may be from its value at ``(t, x)`` when each argument is off by its rounding.
+
+    That is ``share`` of the sizes in ``scale (n,)`` for the state, and of the time for the time. The distance
+    has a minus sign where the guard may jump within that.
+    """
+    first = programs.first[transition]
+    for place in range(first, programs.first[transition + 1]):
+        row, a = registers[place - first], programs.rows[place, 1]
+        code = programs.rows[place, 0]
+        if code == op.STATE or code == op.TIME:
+            value = x[a] if code == op.STATE else t
+            spread = share * (scale[a] if code == op.STATE else abs(t))
+            _bound_constant(row, value)
+            row[LOW], row[HIGH] = value - spread, value + spread
+            row[LEAST_SLOPE], row[MOST_SLOPE] = -spread, spread
+        else:
+            _constant_leaf(programs, place, row)
+    last = registers[_run(programs, transition, registers, FAR)]
+    low, high = last[LOW] - last[HIGH_MIDDLE], last[HIGH] - last[LOW_MIDDLE]
+    jumps = not last[MOST_SLOPE] - last[LEAST_SLOPE] < math.inf
+    distance = max(abs(low), abs(high))
+    return -distance if jumps else distance

@@ -1,0 +1,262 @@
+"""Guards at a point: their value, their speed and acceleration, and what rounding can do to them."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import lowest
+from hybrid.kernels.types.codes import (
+    CYCLE,
+    GRAZING_GUARD,
+    GRAZING_PLACE,
+    GRAZING_VALUE,
+    GRAZINGS,
+    JUMPS,
+    MODE,
+)
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+
+# Share of a component's size, in units of rounding, that rounding may have changed it by.
+ROUNDING_OF_STATE = 16
+# A jump may leave a guard that far from zero, in units of what rounding alone makes of it.
+LEFT_BEHIND = 16.0
+
+
+@njit(**INLINE)
+def guard_value(model, transition, t, x, scalar):
+    """``g(t, x, p)``; ``scalar (1,)`` is scratch."""
+    model.guard(transition, t, x, model.parameters, scalar)
+    return scalar[0]
+
+
+@njit(**KERNEL)
+def allowed(model, transition, t, x, scalar):
+    """Whether the condition of a transition holds; one without a condition always does."""
+    scalar[0] = 1.0
+    return guard_value(model, transition + model.target.shape[0], t, x, scalar) > 0.0
+
+
+@njit(**INLINE)
+def guard_speed(model, transition, t, x, field, gradient):
+    """Transversality ``D_t g + D_x g f``; leaves ``(D_x g, D_t g)`` in ``gradient (n + 1,)``."""
+    model.guard_gradient(transition, t, x, model.parameters, gradient)
+    speed = gradient[model.dimension]
+    for i in range(model.dimension):
+        speed += gradient[i] * field[i]
+    return speed
+
+
+@njit(**INLINE)
+def has_program(model, transition):
+    """Whether a guard is bounded by its program: it is neither affine nor opaque."""
+    return model.programs.first[transition + 1] > model.programs.first[transition]
+
+
+@njit(**INLINE)
+def is_forced(model, mode):
+    """Whether the field of a mode has parts in time alone that are bounded over each step."""
+    return model.first_forcing[mode + 1] > model.first_forcing[mode]
+
+
+@njit(**KERNEL)
+def rounding_band(model, run, transition, t, x, work):
+    """How far from zero rounding alone can leave a guard at ``(t, x)``; ``work.gradient`` is current.
+
+    The state has the sizes in ``run.scale``. Near a flat root, a kink or a jump the gradient says nothing of
+    this: a guard that has a program is bounded over the states that rounding cannot tell from ``x``.
+    """
+    if has_program(model, transition):
+        share = ROUNDING_OF_STATE * EPSILON
+        band = abs(model.spread(model.programs, transition, t, x, run.scale, share, work.registers))
+        return band if band >= 0.0 else 0.0
+    return smooth_band(model, run, transition, t, x, work)
+
+
+@njit(**KERNEL)
+def may_jump(model, run, transition, t, x, work):
+    """Whether a guard that has a program may jump between states that rounding cannot tell from ``x``."""
+    if not has_program(model, transition):
+        return False
+    share = ROUNDING_OF_STATE * EPSILON
+    return model.spread(model.programs, transition, t, x, run.scale, share, work.registers) < 0.0
+
+
+@njit(**KERNEL)
+def was_left_behind(model, run, transition, t, x, speed, side, work):
+    """Whether the rounding of a jump has left a guard beyond zero that moves back to the known ``side``.
+
+    It has not been passed then. Rounding has not left a guard there that jumps.
+    """
+    if not speed * side > 0.0:
+        return False
+    value = guard_value(model, transition, t, x, work.scalar)
+    return abs(value) <= LEFT_BEHIND * rounding_band(model, run, transition, t, x, work)
+
+
+@njit(**INLINE)
+def smooth_band(model, run, transition, t, x, work):
+    """``rounding_band`` from the gradient, which is ``work.gradient``, and from terms that may cancel."""
+    n = model.dimension
+    size = abs(work.gradient[n] * t)
+    for i in range(n):
+        size += abs(work.gradient[i]) * run.scale[i]
+    program = transition + model.target.shape[0] + model.first_forcing[-1] + model.first_residue[-1]
+    return ROUNDING_OF_STATE * EPSILON * size + _spread_of_terms(model, run, program, t, x, work)
+
+
+@njit(**KERNEL)
+def _spread_of_terms(model, run, program, t, x, work):
+    """How far rounding can leave terms from their value; 0 if they have no program, or where they jump."""
+    if not has_program(model, program):
+        return 0.0
+    share = ROUNDING_OF_STATE * EPSILON
+    spread = model.spread(model.programs, program, t, x, run.scale, share, work.registers)
+    return spread if 0.0 < spread < math.inf else 0.0
+
+
+@njit(**KERNEL)
+def widen_scale(model, run, work):
+    """Judge rounding at the start and the end of a run alike, whatever steps lead there.
+
+    Each component is taken to be at least as large as it becomes while the state changes by its own size;
+    ``work.field`` is current. A run that ends on a guard and the run that starts there then agree on that.
+    """
+    size, pace = 0.0, 0.0
+    for i in range(model.dimension):
+        size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
+    for i in range(model.dimension if pace > 0.0 else 0):
+        run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
+
+
+@njit(**KERNEL)
+def sides_at(model, run, t, work):
+    """Bring the sides of the mode's guards to the state of the run, which it has at the time ``t``.
+
+    A guard that is zero there has not been crossed yet: it keeps the side it had before, and has none if the
+    next step has to show it.
+    """
+    mode = run.count[MODE]
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        direction = model.direction[transition]
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        if abs(value) > rounding_band(model, run, transition, t, run.y, work):
+            run.side[transition] = 1 if value > 0.0 else -1
+        elif direction != 0 and run.side[transition] != 0:
+            run.side[transition] = -direction
+
+
+@njit(**KERNEL)
+def speed_rounding(model, run, mode, t, work):
+    """How far from zero rounding of state and time can leave the speed of the guard in ``work.gradient``."""
+    n = model.dimension
+    model.flow_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    size = abs(work.gradient[n])
+    for i in range(n):
+        spread = abs(work.field[i]) + abs(work.jacobian[i, n] * t)
+        for j in range(n):
+            spread += abs(work.jacobian[i, j]) * run.scale[j]
+        size += abs(work.gradient[i]) * spread
+    return ROUNDING_OF_STATE * EPSILON * size + _rounding_of_residues(model, run, mode, t, work)
+
+
+@njit(**KERNEL)
+def _rounding_of_residues(model, run, mode, t, work):
+    """What rounding of terms in time and parameters alone does to the speed of the guard."""
+    size = 0.0
+    first = model.target.shape[0] + model.first_forcing[-1]
+    for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
+        slope = abs(work.gradient[model.residue_component[residue]])
+        if slope > 0.0:
+            size += slope * _spread_of_terms(model, run, first + residue, t, run.y, work)
+    return size
+
+
+@njit(**KERNEL)
+def acceleration_rounding(model, run, t, work):
+    """How far from zero rounding of state and time alone can leave the acceleration of the same guard.
+
+    Its Jacobian and field are current: ``guard_acceleration`` has just been called.
+    """
+    n = model.dimension
+    size = 0.0
+    for i in range(n):
+        bend = abs(work.jacobian[i, n])
+        for j in range(n):
+            spread = abs(work.field[j]) + abs(work.jacobian[j, n] * t)
+            for k in range(n):
+                spread += abs(work.jacobian[j, k]) * run.scale[k]
+            bend += abs(work.jacobian[i, j]) * spread
+        size += abs(work.gradient[i]) * bend
+    return 16 * EPSILON * size
+
+
+@njit(**INLINE)
+def error_band(method, run, gradient, n):
+    """How far the tolerances can move a guard with this gradient: closer to zero than that is a grazing."""
+    size = 0.0
+    for i in range(n):
+        size += abs(gradient[i]) * (method.atol + method.rtol * run.scale[i])
+    return size
+
+
+@njit(**KERNEL)
+def note_grazing(run, transition, degree, side, band, work):
+    """Keep the earliest place of the step where a guard comes within ``band`` of zero and turns back.
+
+    ``work.polynomial`` is the guard on the step.
+    """
+    theta, value = lowest(work.polynomial, degree, side, work.stack)
+    if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.clock[GRAZING_PLACE]:
+        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, value
+        run.count[GRAZING_GUARD] = transition
+
+
+@njit(**KERNEL)
+def guard_acceleration(model, run, transition, mode, t, x, work):
+    """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
+
+    ``D_x g (D_x f f + D_t f)`` is exact; the curvature of the guard itself is a difference of its gradient
+    along the flow.
+    """
+    n = model.dimension
+    model.flow_jacobian(mode, t, x, model.parameters, work.jacobian)
+    total = 0.0
+    for i in range(n):
+        bend = work.jacobian[i, n]
+        for j in range(n):
+            bend += work.jacobian[i, j] * work.field[j]
+        total += work.gradient[i] * bend
+    if model.affine_guard[transition] == 1:
+        return total
+    size, speed = 0.0, 0.0
+    for i in range(n):
+        size = max(size, abs(x[i]), run.scale[i])
+        speed = max(speed, abs(work.field[i]))
+    epsilon = 1e-7 * (size if size > 0.0 else 1.0) / (speed if speed > 0.0 else 1.0)
+    for i in range(n):
+        work.state[i] = x[i] + epsilon * work.field[i]
+    before = guard_speed(model, transition, t, x, work.field, work.gradient)
+    after = guard_speed(model, transition, t + epsilon, work.state, work.field, work.gradient)
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    return total + (after - before) / epsilon
+
+
+@njit(**KERNEL)
+def keep_grazing(model, run, record, transition, t, x, value, work):
+    """Count a touch of a guard at the state ``x (n,)``, and write it into the record if that keeps any."""
+    run.count[GRAZINGS] += 1
+    slot, mode = record.used[2], run.count[MODE]
+    if slot == record.grazing_time.shape[0]:
+        return
+    for i in range(model.dimension):
+        record.grazing_state[slot, i] = x[i]
+    place = record.grazing_state[slot]
+    model.flow(mode, t, place, model.parameters, work.field)
+    guard_speed(model, transition, t, place, work.field, work.gradient)
+    record.grazing_time[slot, 0], record.grazing_time[slot, 1] = t, value
+    record.grazing_time[slot, 2] = guard_acceleration(model, run, transition, mode, t, place, work)
+    record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
+    record.grazing_place[slot, 2] = run.count[JUMPS]
+    record.used[2] = slot + 1

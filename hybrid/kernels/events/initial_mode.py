@@ -1,0 +1,35 @@
+"""What the guards of modes say of the start of a run."""
+
+import math
+
+from numba import int64, njit
+
+from hybrid.kernels.events.guards import allowed, guard_value
+from hybrid.kernels.types.codes import BEYOND, LEAVES, MODE, NO_OBJECTION, NO_TRANSITION, PHASE
+from hybrid.kernels.types.layout import ENTRY, INDICES, MODEL, PARTS, RUN, WORK
+
+
+@njit(int64(PARTS, MODEL, RUN, WORK, int64, int64, INDICES), **ENTRY)
+def try_modes(parts, model, run, work, first, stop, verdicts):
+    """Enter the modes from ``first`` to before ``stop`` at the start of a run, one after the other.
+
+    What each of their guards says of it goes to ``verdicts (transitions,)``, which is zero before. Returns
+    the first transition whose guard is not finite, its value in ``work.scalar``, or NO_TRANSITION.
+    """
+    t = run.clock[PHASE]
+    for mode in range(first, stop):
+        run.count[MODE] = mode
+        fires = parts.enter(model, run, work)
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            transition = model.outgoing[slot]
+            if not abs(guard_value(model, transition, t, run.y, work.scalar)) < math.inf:
+                return transition
+            beyond = model.direction[transition] == run.side[transition] and run.on_guard[transition] == 0
+            beyond = beyond and model.marker[transition] == 0 and model.paired[transition] == 0
+            if run.due[transition] == 0 and not beyond:
+                continue
+            if allowed(model, transition, t, run.y, work.scalar):
+                verdicts[transition] = LEAVES if run.due[transition] == 1 else BEYOND
+        if fires >= 0 and verdicts[fires] == NO_OBJECTION:
+            verdicts[fires] = BEYOND
+    return NO_TRANSITION

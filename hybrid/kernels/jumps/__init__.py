@@ -1,0 +1,1 @@
+"""What happens at an instant: resets, saltation, chatter, rest, several transitions at once."""

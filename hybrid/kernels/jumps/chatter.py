@@ -1,0 +1,376 @@
+"""Chatter: jumps of one transition that accumulate, their limit, and what it does to tangent vectors."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
+from hybrid.kernels.jumps.rounds import fired_before
+from hybrid.kernels.types.codes import (
+    CHATTER_JUMPS,
+    CHATTERING,
+    JUMPS,
+    LAST_FIRED,
+    LAST_TRANSVERSALITY,
+    MODE,
+    PHASE,
+    RESTITUTION,
+)
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+
+# Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
+BEFORE = 0
+LIMIT = 1
+IMPULSE = 2
+# No limit is taken before this many jumps, so that the visible ones are there to be seen.
+FEWEST_JUMPS = 16
+# Unless a flight is no higher than this times rounding: what rounding does to its duration goes like the
+# reciprocal of its speed, and would spoil the limit.
+SHALLOW = 1e6
+# Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
+SHORT = 1e-5
+LONG = 1.0
+# The same where the drift is that of the mean field, which is followed to second order.
+BRIEF = 1e-4
+# Largest relative change of the limit that rounding may be blamed for.
+ROUGH = 1e-6
+# Where its time still changes by more than this share, the limit is not looked for.
+FAR = 1e3 * ROUGH
+# Share by which a flight that drowns in rounding, and the speed after it, may differ from a steady series.
+STEADY = 0.5
+
+
+@njit(**KERNEL)
+def far_side(model, run, transition):
+    """The side of its guard on which the transition that has just fired found the state."""
+    if model.direction[transition] != 0:
+        return model.direction[transition]
+    return 1 if run.clock[LAST_TRANSVERSALITY] > 0.0 else -1
+
+
+@njit(**KERNEL)
+def remaining_chatter(model, run, transition, speed, work):
+    """Time ``2 v / (a (1 - r))`` that infinitely many flights with speeds ``v, r v, r^2 v, ...`` still take.
+
+    The acceleration ``a`` towards the guard is taken here, ``r`` is the restitution of the jump just made.
+    Zero if the flights do not shrink or nothing pulls the state back.
+    """
+    ratio = run.clock[RESTITUTION]
+    pull = far_side(model, run, transition) * guard_acceleration(
+        model, run, transition, run.count[MODE], run.clock[PHASE], run.y, work
+    )
+    if not (0.0 < ratio < 1.0 and pull > 0.0):
+        return 0.0
+    return 2.0 * speed / (pull * (1.0 - ratio))
+
+
+@njit(**KERNEL)
+def mean_field(model, run, transition, t, x, out, work):
+    """Field of a chatter averaged over its flights, ``f - a p`` into ``out (n,)``; returns ``a``.
+
+    ``a`` is the guard's acceleration and ``p`` the impulse per unit of the guard's speed: the impulses give
+    back the speed that the pull takes.
+    """
+    mode = run.count[MODE]
+    model.flow(mode, t, x, model.parameters, work.field)
+    guard_speed(model, transition, t, x, work.field, work.gradient)
+    acceleration = guard_acceleration(model, run, transition, mode, t, x, work)
+    for i in range(model.dimension):
+        out[i] = work.field[i] - acceleration * run.trail[IMPULSE, i]
+    return acceleration
+
+
+@njit(**KERNEL)
+def follow_mean(model, run, transition, speed, span, work):
+    """Limit of the state into ``work.settled (n,)``: its speed taken out, then along the mean field until it.
+
+    ``speed`` is the guard's, with its sign. The error is of third order in it where pull and impulse are
+    constant, and one step of the classical Runge-Kutta method follows the mean field.
+    """
+    n, t = model.dimension, run.clock[PHASE]
+    start, place, slope = work.trial, work.error, work.new
+    for i in range(n):
+        start[i] = run.y[i] - speed * run.trail[IMPULSE, i]
+        work.settled[i], slope[i] = start[i], 0.0
+    for stage in range(4):
+        part = 0.5 * span * ((stage + 1) // 2)
+        weight = span / (6.0 if stage in (0, 3) else 3.0)
+        for i in range(n):
+            place[i] = start[i] + part * slope[i]
+        mean_field(model, run, transition, t + part, place, slope, work)
+        for i in range(n):
+            work.settled[i] += weight * slope[i]
+
+
+@njit(**INLINE)
+def change_of_limit_time(model, method, run, gain, shift, span):
+    """What later jumps will still change of the time to the limit, in units of the tolerances.
+
+    Judged from the change since the jump before, by ``shift``, of which they will still make ``gain`` times.
+    """
+    rounding = 8.0 * EPSILON * measured_time(model, run, run.count[MODE])
+    return gain * abs(shift) / (method.rtol * span + rounding)
+
+
+@njit(**KERNEL)
+def change_of_limit(model, method, run, gain, misfit, work):
+    """The same of the limit in ``work.settled``; ``misfit`` is that of its time."""
+    for i in range(model.dimension):
+        limit = work.settled[i]
+        scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
+        misfit = max(misfit, gain * abs(limit - run.trail[LIMIT, i]) / scale)
+        run.trail[LIMIT, i] = limit
+    return misfit
+
+
+@njit(**KERNEL)
+def accumulation(model, method, run, transition, since_last, work):
+    """Follow the jumps of one transition; once their limit is known, return the time to it, else 0.
+
+    To be called right after a jump, ``since_last`` after the one before. The state is followed along the mean
+    field for the time that is left, whose error is of second order in the remaining speed; two successive
+    limits tell how large it is. (They could take it away too, but would amplify rounding.) The limit state
+    goes to ``work.settled``.
+    """
+    n = model.dimension
+    model.flow(run.count[MODE], run.clock[PHASE], run.y, model.parameters, work.field)
+    speed = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
+    side = -far_side(model, run, transition)
+    speed *= side
+    value = guard_value(model, transition, run.clock[PHASE], run.y, work.scalar)
+    band = rounding_band(model, run, transition, run.clock[PHASE], run.y, work)
+    span, found = 0.0, False
+    # A reset that leaves the guard begins no chatter.
+    if abs(value) <= band:
+        span = remaining_chatter(model, run, transition, speed, work)
+    if not span > 0.0:
+        run.count[CHATTERING] = 0
+        return 0.0
+    consecutive = run.count[CHATTER_JUMPS] + 1 == run.count[JUMPS] and run.count[CHATTERING] > 0
+    if consecutive and fired_before(run, 1) == transition:
+        ratio = run.clock[RESTITUTION]
+        # The flight that has ended, and the speed after it, in the series with the ratio of this impact.
+        flight, slower = run.trail[LIMIT, n] * (1.0 - ratio), ratio * run.trail[BEFORE, n]
+        steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.clock[PHASE])
+        steady = steady and abs(speed - slower) <= STEADY * slower
+        # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
+        height = 0.25 * speed * span * (1.0 - ratio)
+        drowned = steady and height <= band
+        shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
+        shift = span - (run.trail[LIMIT, n] - since_last)
+        # The change is of second order in the speed, which each jump multiplies by the ratio.
+        gain = ratio * ratio / (1.0 - ratio * ratio)
+        misfit = change_of_limit_time(model, method, run, gain, shift, span)
+        if drowned or not misfit * method.rtol > FAR:
+            follow_mean(model, run, transition, side * speed, span, work)
+            misfit = change_of_limit(model, method, run, gain, misfit, work)
+        else:
+            # Jumps that are driven, and no chatter yet: there is no limit to compare the next one with.
+            run.trail[LIMIT, 0] = math.inf
+        # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
+        # takes over.
+        floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
+        found = drowned or (shallow and (misfit <= 1.0 or floor))
+        run.trail[IMPULSE, n] = misfit
+        run.count[CHATTERING] += 1
+    else:
+        run.count[CHATTERING] = 1
+        run.trail[LIMIT, 0], run.trail[IMPULSE, n] = math.inf, math.inf
+    run.trail[LIMIT, n], run.trail[BEFORE, n] = span, speed
+    run.count[CHATTER_JUMPS] = run.count[JUMPS]
+    return span if found else 0.0
+
+
+@njit(**KERNEL)
+def remember_impulse(model, run, transition, transversality, work):
+    """Keep the restitution of the jump to ``work.new``, and its direction per unit of speed."""
+    n = model.dimension
+    after = guard_speed(model, transition, run.clock[PHASE], work.new, work.field_after, work.gradient)
+    run.clock[RESTITUTION] = -after / transversality
+    for i in range(n):
+        change = work.new[i] - run.y[i]
+        # A reset that puts the state back on the guard only takes away the rounding of the landing.
+        rounding = abs(change) <= 16.0 * EPSILON * run.scale[i]
+        run.trail[IMPULSE, i] = 0.0 if rounding else change / (after - transversality)
+
+
+@njit(**KERNEL)
+def speed_gradient(model, run, transition, mode, t, x, out, work):
+    """Derivative of the guard's speed along the flow in the state, ``(n,)``.
+
+    ``D_x g D_x f`` is exact; the curvature of a guard that is not affine is a central difference of its
+    gradient.
+    """
+    n = model.dimension
+    model.flow(mode, t, x, model.parameters, work.field)
+    model.flow_jacobian(mode, t, x, model.parameters, work.jacobian)
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    for j in range(n):
+        total = 0.0
+        for i in range(n):
+            total += work.gradient[i] * work.jacobian[i, j]
+        out[j] = total
+    if model.affine_guard[transition] == 1:
+        return
+    for j in range(n):
+        size = max(abs(x[j]), run.scale[j])
+        step = 6e-6 * (size if size > 0.0 else 1.0)
+        for i in range(n):
+            work.state[i] = x[i]
+        work.state[j] = x[j] + step
+        up = guard_speed(model, transition, t, work.state, work.field, work.gradient)
+        work.state[j] = x[j] - step
+        down = guard_speed(model, transition, t, work.state, work.field, work.gradient)
+        out[j] += (up - down) / (2.0 * step)
+
+
+@njit(**KERNEL)
+def chatter_matrix(model, run, transition, work):
+    """Tangent map of a complete chatter at its beginning, into ``work.saltation (n, n)``.
+
+    It projects on the states that rest on the guard: the speed is taken out along the impulse ``p`` and the
+    height along ``D_x f p``, the motion it brings, ``Xi = I - p (D_x v - (D_x v D_x f p) D_x g) - (D_x f p)
+    D_x g`` with ``v`` the guard's speed. The drift during the chatter is that of the resting mode (compare
+    Nordmark and Piiroinen 2009, doi:10.1007/s11071-009-9463-y).
+    """
+    n = model.dimension
+    slope, carried = work.error, work.second_error
+    impulse = run.trail[IMPULSE]
+    speed_gradient(model, run, transition, run.count[MODE], run.clock[PHASE], run.y, slope, work)
+    model.guard_gradient(transition, run.clock[PHASE], run.y, model.parameters, work.gradient)
+    coupling = 0.0
+    for i in range(n):
+        carried[i] = 0.0
+        for j in range(n):
+            carried[i] += work.jacobian[i, j] * impulse[j]
+        coupling += slope[i] * carried[i]
+    for i in range(n):
+        for j in range(n):
+            removed = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
+            entry = (1.0 if i == j else 0.0) - removed
+            # What the projection takes out is taken out exactly: its rounding would pass for a direction.
+            work.saltation[i, j] = entry if abs(entry) > 1e-13 * (1.0 + abs(removed)) else 0.0
+
+
+@njit(**KERNEL)
+def along_mean(model, run, transition, t, x, direction, out, work):
+    """Derivative of the mean field at ``x (n,)`` in a direction, into ``out (n,)``, by a difference."""
+    n, place, below = model.dimension, work.reset_jacobian[0], work.new
+    size, length = 1e-3, 0.0
+    for i in range(n):
+        size, length = max(size, abs(x[i])), max(length, abs(direction[i]))
+    step = 6e-6 * size / length if length > 0.0 else 1.0
+    for i in range(n):
+        place[i] = x[i] + step * direction[i]
+    mean_field(model, run, transition, t, place, out, work)
+    for i in range(n):
+        place[i] = x[i] - step * direction[i]
+    mean_field(model, run, transition, t, place, below, work)
+    for i in range(n):
+        out[i] = (out[i] - below[i]) / (2.0 * step)
+
+
+@njit(**KERNEL)
+def drift_with_mean(model, run, transition, span, work):
+    """Carry the columns of ``work.saltation`` along the mean field for a short time, to its second order."""
+    n, t = model.dimension, run.clock[PHASE] + 0.5 * span
+    middle, column, image = work.trial, work.error, work.second_error
+    for i in range(n):
+        middle[i] = 0.5 * (run.y[i] + work.settled[i])
+    for j in range(n):
+        for i in range(n):
+            column[i] = work.saltation[i, j]
+        for order in range(1, 3):
+            along_mean(model, run, transition, t, middle, column, image, work)
+            for i in range(n):
+                column[i] = image[i] * span / order
+                work.saltation[i, j] += column[i]
+
+
+@njit(**KERNEL)
+def add_change_of_duration(model, method, run, target, span, work):
+    """Add to ``work.saltation`` what a change of the chatter's duration does; says whether that is anything.
+
+    A state that chatters longer drifts longer with the mean field of the chatter, and shorter with that of
+    the limit mode; where the two agree, up to what the error of the limit makes of them, nothing is added.
+    Where they do not, the matrix is made that of the whole chatter, from its beginning to its end.
+    The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the height
+    through its energy; its derivative, that of the instant of the limit, goes to ``run.instant``. To be
+    called after ``chatter_matrix``, whose slope and gradient it uses.
+    """
+    n, transition = model.dimension, run.count[LAST_FIRED]
+    ratio, speed = run.clock[RESTITUTION], run.trail[BEFORE, n]
+    limit, side = run.clock[PHASE] + span, -far_side(model, run, transition)
+    mean = work.trial
+    pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
+    model.flow(target, limit, work.settled, model.parameters, work.field_after)
+    model.flow_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
+    by_speed = 2.0 * side / (pull * (1.0 - ratio))
+    by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
+    for j in range(n):
+        run.instant[j] = by_speed * work.error[j] + by_height * work.gradient[j]
+    apart, excess = False, work.field_after
+    for i in range(n):
+        # Rounding of the fields and of the impulse, a quotient by the speed, and the error of the limit.
+        blurred = abs(work.field[i]) + abs(work.field_after[i]) + pull * run.scale[i] / speed
+        blurred *= 16.0 * EPSILON
+        for j in range(n):
+            steepness = abs(work.jacobian[i, j]) + abs(work.reset_jacobian[i, j])
+            blurred += steepness * (method.atol + method.rtol * run.scale[j])
+        excess[i] = mean[i] - excess[i]
+        if abs(excess[i]) > blurred:
+            apart = True
+        else:
+            excess[i] = 0.0
+    if apart:
+        drift_with_mean(model, run, transition, span, work)
+        for i in range(n):
+            for j in range(n):
+                work.saltation[i, j] += excess[i] * run.instant[j]
+    return apart
+
+
+@njit(**KERNEL)
+def size_of(matrix, n):
+    """Largest row sum of the first ``n`` columns."""
+    largest = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += abs(matrix[i, j])
+        largest = max(largest, total)
+    return largest
+
+
+@njit(**KERNEL)
+def drift_is_known(model, run, target, span, work):
+    """Whether the tangents' drift in what is left is an exponential of the resting mode's Jacobian.
+
+    It is where that Jacobian does not change until the limit in ``work.settled``, or changes too little to
+    matter. The Jacobian at the limit is left in ``work.jacobian``.
+    """
+    n, t = model.dimension, run.clock[PHASE]
+    model.flow_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
+    model.flow_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
+    constant = True
+    for i in range(n):
+        for j in range(n):
+            constant = constant and work.jacobian[i, j] == work.reset_jacobian[i, j]
+    return size_of(work.jacobian, n) * span <= (LONG if constant else SHORT)
+
+
+@njit(**KERNEL)
+def drift(y, n, tangents, matrix, span, term, image):
+    """Multiply the tangent vectors in ``y`` by ``exp(matrix span)``, by its series; scratch ``(n,)``."""
+    for start in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            term[i] = y[start + i]
+        for order in range(1, 25):
+            for i in range(n):
+                image[i] = 0.0
+                for j in range(n):
+                    image[i] += matrix[i, j] * term[j]
+            for i in range(n):
+                term[i] = image[i] * span / order
+                y[start + i] += term[i]

@@ -1,0 +1,178 @@
+"""One instant: which transition fires next, and whether the order of those reached together matters."""
+
+from numba import int64, njit
+
+from hybrid.kernels.events.guards import (
+    acceleration_rounding,
+    allowed,
+    guard_acceleration,
+    guard_speed,
+    guard_value,
+    has_program,
+    keep_grazing,
+    speed_rounding,
+    widen_scale,
+)
+from hybrid.kernels.events.onset import BY_SPEED, JUMPING
+from hybrid.kernels.events.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
+from hybrid.kernels.types.codes import (
+    JUMPS,
+    LAST_FIRED,
+    LAST_STEP,
+    LOCKED,
+    MODE,
+    NO_MODE,
+    NO_TRANSITION,
+    ORDER_MATTERED,
+    PHASE,
+    PHASE_OF_RUN,
+    PREVIOUS_MODE,
+    SIMULTANEOUS,
+    STALE,
+    STEPS,
+)
+from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
+
+MOST_JUMPS = 50
+# States that differ by less than this, relative to their sizes, came out the same.
+SAME = 1e-9
+
+
+@njit(int64(MODEL, RUN, WORK), **ENTRY)
+def enter(model, run, work):
+    """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
+
+    One whose guard a reset has taken the state beyond is locked to this instant, not to its guard.
+    Transitions that only the start of a run fires come before all others.
+    """
+    mode, t, left = run.count[MODE], run.clock[PHASE], run.count[PREVIOUS_MODE]
+    if run.count[STEPS] == 0:
+        model.flow(mode, t, run.y, model.parameters, work.field)
+        widen_scale(model, run, work)
+    came = STARTED if left == NO_MODE else LANDED
+    fired = run.count[LAST_FIRED] if run.count[JUMPS] > 0 else NO_TRANSITION
+    fires = take_sides(model, run, mode, t, run.y, came, left, fired, run.side, run.due, run.on_guard, work)
+    excluded = beyond_at_start(model, run, mode, t, work) if came == STARTED else NO_TRANSITION
+    if excluded != NO_TRANSITION:
+        run.count[LOCKED] = 1
+        return excluded
+    run.count[LOCKED] = 0
+    if fires >= 0:
+        run.count[LOCKED] = 1 if run.on_guard[fires] == 0 else 0
+    else:
+        end_instant(model, mode, run.due)
+    return fires
+
+
+@njit(**KERNEL)
+def settle(model, run, first, out, work):
+    """State ``(n,)`` after ``first`` and all that it sets off at the same instant; returns the mode."""
+    n, t = model.dimension, run.clock[PHASE]
+    mode, fired = run.count[MODE], first
+    side, due, zero = run.rehearsal[0], run.rehearsal[1], run.rehearsal[2]
+    for i in range(side.shape[0]):
+        side[i], due[i], zero[i] = run.side[i], run.due[i], run.on_guard[i]
+    for i in range(n):
+        out[i], work.trial[i] = run.y[i], run.scale[i]
+    for _ in range(MOST_JUMPS):
+        due[fired] = 0
+        model.reset(fired, t, out, model.parameters, work.state)
+        for i in range(n):
+            out[i] = work.state[i]
+            run.scale[i] = max(run.scale[i], abs(out[i]))
+        left, mode = mode, model.target[fired]
+        if mode == NO_MODE:
+            break
+        fired = take_sides(model, run, mode, t, out, LANDED, left, fired, side, due, zero, work)
+        if fired < 0:
+            break
+    for i in range(n):
+        run.scale[i] = work.trial[i]
+    return mode
+
+
+@njit(**KERNEL)
+def order_matters(model, run, one, other, work):
+    """Whether firing ``one`` or ``other`` first leads to different states or modes."""
+    mode_one = settle(model, run, one, work.error, work)
+    mode_other = settle(model, run, other, work.second_error, work)
+    if mode_one != mode_other:
+        return True
+    for i in range(model.dimension):
+        scale = max(run.scale[i], abs(work.error[i]))
+        if abs(work.error[i] - work.second_error[i]) > SAME * scale:
+            return True
+    return False
+
+
+@njit(**KERNEL)
+def turns_back(model, run, transition, before, work):
+    """Whether a guard only touches zero here: it moves to the side ``before`` again, or turns there at rest.
+
+    At the bottom of a dip that is no deeper than rounding either end may be found first. A guard that is at
+    rest and turns no faster than rounding would have it has been crossed, by its third derivative. The sides
+    have just been taken: most guards are known to move on.
+    """
+    if run.on_guard[transition] == BY_SPEED and run.side[transition] != before:
+        return False
+    mode, t = run.count[MODE], run.clock[PHASE]
+    model.flow(mode, t, run.y, model.parameters, work.field)
+    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+    if abs(speed) > speed_rounding(model, run, mode, t, work):
+        return speed * before > 0.0
+    acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
+    return acceleration * before > acceleration_rounding(model, run, t, work)
+
+
+@njit(int64(MODEL, RUN, RECORD, int64, WORK), **PART)
+def first_in_order(model, run, record, fired, work):
+    """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
+
+    Notes whether order matters. None if ``fired`` may not fire or has only touched, and no other is due: the
+    run then goes on from this point. What comes before the guard there, and what after it, may differ by
+    rounding alone, so its side is left to the next step: the crossing is behind, and cannot be found where it
+    was refused.
+    """
+    mode, t, before = run.count[MODE], run.clock[PHASE], run.side[fired]
+    take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
+    direction = model.direction[fired]
+    # A guard that is not affine has been proved to change its sign here.
+    touched = (
+        model.affine_guard[fired] == 1
+        and turns_back(model, run, fired, -direction if direction != 0 else before, work)
+        and allowed(model, fired, t, run.y, work.scalar)
+    )
+    run.side[fired] = direction if direction != 0 else -before
+    if run.on_guard[fired] == 0:
+        # A guard that is not small although it has just crossed zero has jumped.
+        by_bounds = has_program(model, fired) and model.guard_in_series[fired] == 0
+        run.on_guard[fired] = JUMPING if by_bounds else BY_SPEED
+    run.due[fired] = 0 if touched else 1
+    if touched:
+        value = guard_value(model, fired, t, run.y, work.scalar)
+        keep_grazing(model, run, record, fired, t, run.y, value, work)
+    chosen, first, together, matters = NO_TRANSITION, NO_TRANSITION, 0, False
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if run.due[other] == 0 or not allowed(model, other, t, run.y, work.scalar):
+            continue
+        if chosen == NO_TRANSITION:
+            chosen = other
+        if model.marker[other] == 1:
+            continue
+        together += 1
+        if together == 1:
+            first = other
+        elif not matters:
+            matters = order_matters(model, run, first, other, work)
+    run.count[SIMULTANEOUS] += 1 if together > 1 else 0
+    run.count[ORDER_MATTERED] += 1 if matters else 0
+    if touched or chosen == NO_TRANSITION:
+        run.side[fired] = 0
+    if chosen == NO_TRANSITION:
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            other = model.outgoing[slot]
+            if run.due[other] == 1:
+                run.side[other], run.due[other] = 0, 0
+        run.count[PHASE_OF_RUN], run.clock[LAST_STEP] = STALE, 0.0
+    return chosen

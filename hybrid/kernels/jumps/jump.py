@@ -1,0 +1,414 @@
+"""The jump: reset, saltation matrix, tangent vectors."""
+
+import math
+
+from numba import boolean, float64, int64, njit, void
+
+from hybrid.kernels.arithmetic.clock import forward
+from hybrid.kernels.arithmetic.tangent import (
+    COLLAPSED,
+    STRAINED,
+    log_abs_determinant,
+    multiply,
+    orthonormalise,
+    strain,
+)
+from hybrid.kernels.events.guards import (
+    error_band,
+    guard_acceleration,
+    guard_speed,
+)
+from hybrid.kernels.events.record import start_record
+from hybrid.kernels.jumps.chatter import (
+    BRIEF,
+    accumulation,
+    add_change_of_duration,
+    chatter_matrix,
+    drift,
+    drift_is_known,
+    remember_impulse,
+    size_of,
+)
+from hybrid.kernels.jumps.locked import (
+    begin_at_start,
+    begin_instant,
+    change_of_instant,
+    follow,
+    keep_map,
+    map_of_instant,
+    postpone_map,
+    restore_tangents,
+)
+from hybrid.kernels.jumps.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
+from hybrid.kernels.types.codes import (
+    CHATTERING,
+    CYCLE,
+    ENTERING,
+    GRAZING,
+    ILL_CONDITIONED,
+    ILL_CONDITIONED_GROWTH,
+    JUMPS,
+    JUMPS_HERE,
+    LARGEST_SALTATION,
+    LAST_FIRED,
+    LAST_JUMP_CYCLE,
+    LAST_JUMP_PHASE,
+    LAST_KIND,
+    LAST_TRANSVERSALITY,
+    LIMIT_OF_CHATTER,
+    LOCKED,
+    LOG_DETERMINANT,
+    MAP_IS_KNOWN,
+    MODE,
+    NO_MODE,
+    NO_TRANSITION,
+    PHASE,
+    PHASE_OF_RUN,
+    PREVIOUS_MODE,
+    RESTITUTION,
+    ROUND,
+    SINCE_ENTRY,
+    SINGULAR_JUMPS,
+    STRAIN,
+    TRANSVERSE,
+)
+from hybrid.kernels.types.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+
+
+@njit(**KERNEL)
+def cross(model, transition, mode, t, x_minus, x_plus, work):
+    """The state after the jump into ``x_plus (n,)``, and all that its saltation matrix is made of.
+
+    ``D_x R`` and ``D_t R`` into ``work.reset_jacobian``, ``f_plus - D_x R f_minus - D_t R`` into
+    ``work.settled``; returns the transversality. After a transition that ends the run the state stays where
+    it is, ``f_plus = 0``.
+    """
+    n = model.dimension
+    model.flow(mode, t, x_minus, model.parameters, work.field)
+    transversality = guard_speed(model, transition, t, x_minus, work.field, work.gradient)
+    model.reset(transition, t, x_minus, model.parameters, x_plus)
+    model.reset_jacobian(transition, t, x_minus, model.parameters, work.reset_jacobian)
+    for i in range(n):
+        work.field_after[i] = 0.0
+    if model.target[transition] != NO_MODE:
+        model.flow(model.target[transition], t, x_plus, model.parameters, work.field_after)
+    for i in range(n):
+        difference = work.field_after[i] - work.reset_jacobian[i, n]
+        for j in range(n):
+            difference -= work.reset_jacobian[i, j] * work.field[j]
+        work.settled[i] = difference
+    return transversality
+
+
+@njit(float64(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **ENTRY)
+def saltation(model, transition, mode, t, x_minus, x_plus, work):
+    """Saltation matrix into ``work.saltation (n, n)`` and the state after the jump into ``x_plus (n,)``.
+
+    ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
+    (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
+    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities.
+    """
+    n = model.dimension
+    transversality = cross(model, transition, mode, t, x_minus, x_plus, work)
+    for i in range(n):
+        for j in range(n):
+            work.saltation[i, j] = work.reset_jacobian[i, j]
+            term = work.settled[i] * work.gradient[j]
+            if term != 0.0:
+                work.saltation[i, j] += term / transversality
+    return transversality
+
+
+@njit(**KERNEL)
+def remember_jump(model, run, record, transition, transversality, kind, known, x_plus, work):
+    """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any.
+
+    Its matrix is ``work.saltation``, unless that is not ``known``: it follows from the rest.
+    """
+    n, slot = model.dimension, record.used[1]
+    if slot == record.jump_time.shape[0]:
+        return
+    record.jump_time[slot, 0], record.jump_time[slot, 1] = run.clock[PHASE], transversality
+    record.jump_place[slot, 0], record.jump_place[slot, 1] = run.count[CYCLE], transition
+    record.jump_place[slot, 2], record.jump_place[slot, 3] = kind, 1 if known else 0
+    for i in range(n):
+        record.jump_states[slot, 0, i] = run.y[i]
+        record.jump_states[slot, 1, i] = x_plus[i]
+    record.used[1] = slot + 1
+    if known:
+        matrix = record.jump_saltation[record.used[3]]
+        for i in range(n):
+            for j in range(n):
+                matrix[i, j] = work.saltation[i, j]
+        record.used[3] += 1
+
+
+@njit(**KERNEL)
+def carry_tangents(model, run, tangents, orthonormal, apart, work):
+    """Multiply the tangent vectors by ``work.saltation``, and add its log-determinant to the run's.
+
+    With ``orthonormal`` they are orthonormalised before and after where the matrices since the last time
+    strain them, so that a direction that one annihilates is told from one that is merely short; with
+    ``apart`` too, and then what the jump alone added to the growth of the first is returned, else 0.
+    """
+    n = model.dimension
+    for i in range(n):
+        for j in range(n):
+            work.jacobian[i, j] = work.saltation[i, j]
+    log_determinant = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
+    run.clock[LOG_DETERMINANT] += log_determinant
+    run.clock[STRAIN] += strain(work.saltation, n, log_determinant)
+    anew = orthonormal and (apart or not run.clock[STRAIN] < STRAINED)
+    if anew:
+        orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    before = run.growth[0]
+    multiply(work.saltation, run.y, n, tangents, work.state)
+    if not anew:
+        return 0.0
+    orthonormalise(run.y, n, tangents, run.growth, COLLAPSED)
+    run.clock[STRAIN] = 0.0
+    return run.growth[0] - before
+
+
+@njit(**KERNEL)
+def is_grazing(model, method, run, transition, transversality, work):
+    """Whether the guard dips to the other side of zero by less than the tolerances can tell.
+
+    The depth of the dip is ``speed^2 / (2 acceleration)``; it lies ahead if the guard turns back, and behind
+    if it comes from there. The saltation matrix is then an extrapolation of a square root from beside its
+    branch point.
+    """
+    acceleration = guard_acceleration(model, run, transition, run.count[MODE], run.clock[PHASE], run.y, work)
+    band = error_band(method, run, work.gradient, model.dimension)
+    if transversality * transversality <= 2.0 * abs(acceleration) * band:
+        return True
+    # Inside such a dip the steps, and with them the sizes that the tolerances refer to, are those of the dip.
+    way_in = run.clock[LAST_TRANSVERSALITY]
+    grazed = run.count[LAST_KIND] == GRAZING and run.count[LAST_FIRED] == transition
+    return grazed and way_in * transversality < 0.0 and abs(transversality) <= 2.0 * abs(way_in)
+
+
+@njit(**KERNEL)
+def judge(run, n, work):
+    """Keep the largest entry of any saltation matrix so far, and count those that are not finite."""
+    largest = 0.0
+    for i in range(n):
+        for j in range(n):
+            largest = max(largest, abs(work.saltation[i, j]))
+    run.clock[LARGEST_SALTATION] = max(run.clock[LARGEST_SALTATION], largest)
+    if not largest < math.inf:
+        run.count[SINGULAR_JUMPS] += 1
+
+
+@njit(**KERNEL)
+def move(model, run, transition, target, x_plus):
+    """Put the run behind a jump: state, mode and counters."""
+    for i in range(model.dimension):
+        run.y[i] = x_plus[i]
+        run.scale[i] = max(run.scale[i], abs(x_plus[i]))
+    here = run.clock[LAST_JUMP_PHASE] == run.clock[PHASE] and run.clock[LAST_JUMP_CYCLE] == run.count[CYCLE]
+    run.count[JUMPS_HERE] = run.count[JUMPS_HERE] + 1 if here else 1
+    run.clock[LAST_JUMP_PHASE] = run.clock[PHASE]
+    run.clock[LAST_JUMP_CYCLE] = run.count[CYCLE]
+    run.recent[slot_of(run, run.count[JUMPS])] = transition
+    run.count[JUMPS] += 1
+    run.count[LAST_FIRED] = transition
+    run.stay[run.count[MODE]], run.clock[SINCE_ENTRY] = run.clock[SINCE_ENTRY], 0.0
+    run.count[PREVIOUS_MODE] = run.count[MODE]
+    run.count[MODE] = target
+    run.count[PHASE_OF_RUN] = ENTERING
+    remember_visit(model, run)
+
+
+@njit(**KERNEL)
+def leave(model, run, transition, transversality, work):
+    """Put the run behind a jump to ``work.new``."""
+    mode, target = run.count[MODE], model.target[transition]
+    if mode == target and model.marker[transition] == 0:
+        remember_impulse(model, run, transition, transversality, work)
+    move(model, run, transition, mode if target == NO_MODE else target, work.new)
+
+
+@njit(**KERNEL)
+def cross_without_map(model, run, transition, mode, work):
+    """``cross`` where nobody asks for a saltation matrix: the state after the jump, and no derivatives."""
+    t, target = run.clock[PHASE], model.target[transition]
+    model.flow(mode, t, run.y, model.parameters, work.field)
+    transversality = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+    model.reset(transition, t, run.y, model.parameters, work.new)
+    if mode == target and model.marker[transition] == 0:
+        model.flow(mode, t, work.new, model.parameters, work.field_after)
+    postpone_map(run, model.dimension)
+    return transversality
+
+
+@njit(**KERNEL)
+def cross_with_map(model, run, transition, mode, tangents, work):
+    """Cross a guard that says when, and begin an instant; returns the transversality."""
+    n = model.dimension
+    transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+    change_of_instant(run, n, transversality, work)
+    begin_instant(run, n, tangents, work)
+    return transversality
+
+
+@njit(**KERNEL)
+def recall_map(model, run, tangents, work):
+    """Make up for the tangent map of the jump that began this instant, if nobody has asked for it."""
+    n = model.dimension
+    if run.count[LAST_FIRED] == NO_TRANSITION:
+        begin_at_start(run, n, tangents)
+    if run.count[MAP_IS_KNOWN] == 1:
+        return
+    fired, mode, x_minus = run.count[LAST_FIRED], run.count[PREVIOUS_MODE], run.instant[:n]
+    transversality = saltation(model, fired, mode, run.clock[PHASE], x_minus, work.new, work)
+    change_of_instant(run, n, transversality, work)
+    keep_map(run, n, work)
+
+
+@njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **PART)
+def jump(model, method, run, record, transition, tangents, orthonormal, work):
+    """Make a jump at the current point of the run: state, tangent vectors, counters, record.
+
+    Without tangent vectors a saltation matrix is only made where it does not follow from the states at the
+    jump, of those that are locked to another.
+    """
+    n, mode = model.dimension, run.count[MODE]
+    asked = tangents > 0 or record.jump_time.shape[0] > 0
+    locked = run.count[LOCKED] == 1 and asked
+    known = tangents > 0 or locked
+    run.count[LOCKED] = 0
+    # A locked jump inherits the grazing flag of the jump that triggered it.
+    kind = run.count[LAST_KIND] if locked else TRANSVERSE
+    if locked:
+        recall_map(model, run, tangents, work)
+        transversality = cross(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+        follow(run, n, work)
+    elif known:
+        transversality = cross_with_map(model, run, transition, mode, tangents, work)
+    else:
+        transversality = cross_without_map(model, run, transition, mode, work)
+    judged = asked and not locked and model.marker[transition] == 0
+    if judged and is_grazing(model, method, run, transition, transversality, work):
+        kind = GRAZING
+    if kind == GRAZING:
+        run.count[ILL_CONDITIONED] += 1
+    run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
+    run.due[transition] = 0
+    remember_jump(model, run, record, transition, transversality, kind, known, work.new, work)
+    if locked:
+        map_of_instant(run, n, work.saltation)
+    if tangents > 0:
+        judge(run, n, work)
+        if locked:
+            restore_tangents(run, n, tangents)
+        grown = carry_tangents(model, run, tangents, orthonormal, kind == GRAZING, work)
+        if kind == GRAZING:
+            run.clock[ILL_CONDITIONED_GROWTH] += grown
+    leave(model, run, transition, transversality, work)
+
+
+@njit(**KERNEL)
+def remember_flight(run, record, n, span, x_limit):
+    """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
+    if record.used[0] == record.step_time.shape[0]:
+        return
+    rows = record.step_coefficients[start_record(run, record, run.clock[PHASE], span)]
+    for k in range(rows.shape[0]):
+        for i in range(n):
+            rows[k, i] = run.y[i] if k == 0 else (x_limit[i] - run.y[i] if k == 1 else 0.0)
+        rows[k, n] = span if k == 1 else 0.0
+
+
+@njit(**KERNEL)
+def follow_impacts(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+    """``finish_chatter`` for impacts of one transition on one guard, with the tangent map."""
+    if run.count[MODE] != run.count[PREVIOUS_MODE] or model.marker[transition] == 1:
+        return False
+    if not 0.0 < run.clock[RESTITUTION] < 1.0:
+        run.count[CHATTERING] = 0
+        return False
+    span = accumulation(model, method, run, transition, run.stay[run.count[MODE]], work)
+    if not 0.0 < span <= remaining:
+        return False
+    limit_mode = model.accumulates_to[transition]
+    target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
+    steep = 0.0
+    if tangents > 0:
+        if not drift_is_known(model, run, target, span, work):
+            return False
+        steep = span * size_of(work.jacobian, model.dimension)
+    x_limit = work.settled
+    chatter_matrix(model, run, transition, work)
+    apart = add_change_of_duration(model, method, run, target, span, work)
+    if apart and steep > BRIEF:
+        return False
+    remember_flight(run, record, model.dimension, span, x_limit)
+    begin_instant(run, model.dimension, tangents, work)
+    forward(run, model.period, span)
+    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
+    if tangents > 0:
+        n = model.dimension
+        carry_tangents(model, run, tangents, orthonormal, False, work)
+        if not apart:
+            model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
+            drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
+            drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
+    run.count[ROUND] = 1
+    move(model, run, transition, target, x_limit)
+    return True
+
+
+@njit(**KERNEL)
+def follow_rounds(model, method, run, record, remaining, tangents, work):
+    """``finish_chatter`` for transitions that fire in turn; the tangent map of their limit is not known."""
+    n = model.dimension
+    left, turn = limit_of_rounds(model, method, run, work)
+    if not 0.0 < left <= remaining:
+        return False
+    transition = next_in_turn(model, run, turn)
+    if transition == NO_TRANSITION:
+        return False
+    limit_mode = model.accumulates_to[transition]
+    target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
+    remember_flight(run, record, n, left, work.settled)
+    for i in range(n):
+        for j in range(n):
+            work.saltation[i, j] = math.nan
+    forward(run, model.period, left)
+    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
+    if tangents > 0:
+        run.count[SINGULAR_JUMPS] += 1
+        run.clock[LOG_DETERMINANT] = math.nan
+        for i in range(n, n * (1 + tangents)):
+            run.y[i] = math.nan
+    begin_instant(run, n, tangents, work)
+    for j in range(n):
+        run.instant[j] = math.nan
+    run.count[ROUND] = turn
+    move(model, run, transition, target, work.settled)
+    return True
+
+
+@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)
+def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+    """After a jump: if its like accumulate before the end of the run, go to their limit; says whether it did.
+
+    The limit is a jump of its own, into the mode that the transition names for it, if it names one.
+    """
+    if follow_impacts(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+        return True
+    return follow_rounds(model, method, run, record, remaining, tangents, work)
+
+
+@njit(void(MODEL, RUN, int64, int64, boolean, WORK), **PART)
+def rest(model, run, limit_mode, tangents, orthonormal, work):
+    """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
+    transition = run.count[LAST_FIRED]
+    recall_map(model, run, tangents, work)
+    chatter_matrix(model, run, transition, work)
+    multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
+    if tangents > 0:
+        carry_tangents(model, run, tangents, orthonormal, False, work)
+    run.count[PREVIOUS_MODE] = run.count[MODE]
+    run.count[MODE] = limit_mode

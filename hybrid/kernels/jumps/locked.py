@@ -1,0 +1,123 @@
+"""Jumps that a jump sets off at once: the guard of the first says when all of them happen.
+
+A reset that lands beyond a guard of its mode fires that transition too, on neighbouring orbits as on this
+one. Their instant changes with a tangent vector ``v`` before the first jump by ``tau = a v``, the saltation
+matrix of the first is ``P``, and after a jump with the reset ``R``, from the field ``f`` to ``f_plus``, the
+tangent vector is
+
+    (D_x R P + (D_x R f + D_t R - f_plus) a) v,
+
+the next ``P``, whatever the guard of that jump does: its saltation matrix would let it fire at its own time.
+"""
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.tangent import multiply, solve
+from hybrid.kernels.types.codes import (
+    ILL_CONDITIONED_GROWTH,
+    ILL_CONDITIONED_GROWTH_BEFORE,
+    LOG_DETERMINANT,
+    LOG_DETERMINANT_BEFORE,
+    MAP_IS_KNOWN,
+)
+from hybrid.kernels.types.layout import KERNEL
+
+
+@njit(**KERNEL)
+def keep_tangents(run, n, tangents):
+    """Keep the tangent vectors and what is summed along with them, as they are before a jump."""
+    for i in range(n * tangents):
+        run.before[i] = run.y[n + i]
+    for c in range(tangents):
+        run.growth_before[c] = run.growth[c]
+    run.clock[LOG_DETERMINANT_BEFORE] = run.clock[LOG_DETERMINANT]
+    run.clock[ILL_CONDITIONED_GROWTH_BEFORE] = run.clock[ILL_CONDITIONED_GROWTH]
+
+
+@njit(**KERNEL)
+def restore_tangents(run, n, tangents):
+    """Put the tangent vectors back to where they were before the first jump of this instant."""
+    for i in range(n * tangents):
+        run.y[n + i] = run.before[i]
+    for c in range(tangents):
+        run.growth[c] = run.growth_before[c]
+    run.clock[LOG_DETERMINANT] = run.clock[LOG_DETERMINANT_BEFORE]
+    run.clock[ILL_CONDITIONED_GROWTH] = run.clock[ILL_CONDITIONED_GROWTH_BEFORE]
+
+
+@njit(**KERNEL)
+def change_of_instant(run, n, transversality, work):
+    """Keep the derivative of the time at which a guard is crossed, whose gradient is ``work.gradient``."""
+    for j in range(n):
+        run.instant[j] = -work.gradient[j] / transversality if work.gradient[j] != 0.0 else 0.0
+
+
+@njit(**KERNEL)
+def begin_instant(run, n, tangents, work):
+    """Keep what is there before a jump whose tangent map is ``work.saltation``.
+
+    ``change_of_instant`` has been called.
+    """
+    keep_tangents(run, n, tangents)
+    keep_map(run, n, work)
+
+
+@njit(**KERNEL)
+def keep_map(run, n, work):
+    """Keep ``work.saltation`` as the tangent map of this instant so far."""
+    for j in range(n):
+        for i in range(n):
+            run.instant[n + n * j + i] = work.saltation[i, j]
+    run.count[MAP_IS_KNOWN] = 1
+
+
+@njit(**KERNEL)
+def postpone_map(run, n):
+    """Keep the state before a jump instead, for the case that another jump is locked to it."""
+    for i in range(n):
+        run.instant[i] = run.y[i]
+    run.count[MAP_IS_KNOWN] = 0
+
+
+@njit(**KERNEL)
+def begin_at_start(run, n, tangents):
+    """As ``begin_instant`` where a run starts beyond a guard."""
+    keep_tangents(run, n, tangents)
+    for i in range(n * (1 + n)):
+        run.instant[i] = 0.0
+    for i in range(n):
+        run.instant[n + n * i + i] = 1.0
+    run.count[MAP_IS_KNOWN] = 1
+
+
+@njit(**KERNEL)
+def follow(run, n, work):
+    """Take a jump set off at once into the tangent map of its instant.
+
+    ``work.reset_jacobian`` and ``work.settled`` hold its ``D_x R`` and ``f_plus - D_x R f - D_t R``. Its own
+    matrix goes to ``work.saltation``: the derivative of the instant refers to the state after the jumps
+    before, ``a = c P``, so that the product of the matrices of an instant is its tangent map. Where ``P`` is
+    singular there may be no such ``c``.
+    """
+    instant, system, later = run.instant, work.jacobian, work.error
+    for j in range(n):
+        for i in range(n):
+            system[j, i] = instant[n + n * j + i]
+        system[j, n] = instant[j]
+    solve(system, n, later)
+    multiply(work.reset_jacobian, instant, n, n, work.state)
+    for i in range(n):
+        kick = work.settled[i]
+        for j in range(n):
+            work.saltation[i, j] = work.reset_jacobian[i, j]
+            if kick != 0.0:
+                work.saltation[i, j] -= kick * later[j]
+                instant[n + n * j + i] -= kick * instant[j]
+
+
+@njit(**KERNEL)
+def map_of_instant(run, n, out):
+    """The tangent map of this instant so far, into ``out (n, n)``."""
+    for j in range(n):
+        for i in range(n):
+            out[i, j] = run.instant[n + n * j + i]

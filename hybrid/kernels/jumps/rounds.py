@@ -1,0 +1,198 @@
+"""Chatter of several transitions in turn: the limit of their jumps, from the series that they make.
+
+Transitions that fire in the same order again and again, each round shorter than the last by the same ratio
+``r``, accumulate. The states and times right after the jumps of one transition are then smooth functions of
+the time that is left, and both are extrapolated to where none is left.
+"""
+
+from numba import njit
+
+from hybrid.kernels.events.guards import guard_value
+from hybrid.kernels.types.codes import CHATTERING, CYCLE, JUMPS, NO_MODE, NO_TRANSITION, PHASE
+from hybrid.kernels.types.layout import INLINE, KERNEL
+
+# Transitions in a round at most, and rounds that must have been seen.
+MOST_IN_TURN = 8
+FEWEST_ROUNDS = 5
+# No limit is taken before this many jumps.
+FEWEST_JUMPS = 16
+# Largest change of the ratio from round to round, as a share of how far the ratio is from 1.
+STEADY = 0.1
+# Share that is left of a time where it has become shorter. Ratios closer to 1 are not told from it.
+SHORTER = 0.999
+# A share of the time since the chatter began that is too short for the limit to change any more.
+NOTHING_LEFT = 1e-7
+# How far, in sizes of the state, guards may be from zero and resets from the identity at a limit.
+ROUGH = 1e-6
+
+
+@njit(**INLINE)
+def slot_of(run, jumps):
+    """Where the visit after so many jumps, and the transition of the next one, are kept."""
+    return jumps & (run.visits.shape[0] - 1)
+
+
+@njit(**KERNEL)
+def remember_visit(model, run):
+    """Keep the time and the state right after a jump."""
+    row, n = run.visits[slot_of(run, run.count[JUMPS])], model.dimension
+    for i in range(n):
+        row[i] = run.y[i]
+    row[n], row[n + 1] = run.clock[PHASE], run.count[CYCLE]
+
+
+@njit(**KERNEL)
+def time_before(model, run, back, further):
+    """Time from the jump ``further`` before the last one to the one ``back`` before it."""
+    n, jumps = model.dimension, run.count[JUMPS]
+    later, earlier = run.visits[slot_of(run, jumps - back)], run.visits[slot_of(run, jumps - further)]
+    return later[n] - earlier[n] + model.period * (later[n + 1] - earlier[n + 1])
+
+
+@njit(**KERNEL)
+def fired_before(run, back):
+    """Transition of the jump ``back`` before the last one."""
+    return run.recent[slot_of(run, run.count[JUMPS] - 1 - back)]
+
+
+@njit(**KERNEL)
+def time_left_of_rounds(model, run, turn, back):
+    """Time that infinitely many more rounds take after the jump ``back`` before the last one, and the ratio.
+
+    The rounds are a geometric series up to a term of second order, which the series that began a round
+    before tells. Zero if the rounds do not shorten by a steady ratio.
+    """
+    d0 = time_before(model, run, back, back + turn)
+    d1 = time_before(model, run, back + turn, back + 2 * turn)
+    d2 = time_before(model, run, back + 2 * turn, back + 3 * turn)
+    if not (0.0 < d0 < d1 < d2):
+        return 0.0, 1.0
+    ratio, before = d0 / d1, d1 / d2
+    if abs(ratio - before) > STEADY * (1.0 - ratio):
+        return 0.0, 1.0
+    left = d0 * ratio / (1.0 - ratio)
+    expected = d1 * before / (1.0 - before) - d0
+    return left + (left - expected) * ratio * ratio / (1.0 - ratio * ratio), ratio
+
+
+@njit(**KERNEL)
+def transitions_in_turn(model, run):
+    """How many transitions have fired in turn, in the same order round after round; 0 if none have.
+
+    One that brings the state back onto its guard, with a steady ratio, is followed by its own impacts.
+    """
+    for turn in range(1, MOST_IN_TURN + 1):
+        seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
+        if run.count[JUMPS] <= seen:
+            return 0
+        left, _ = time_left_of_rounds(model, run, turn, 0)
+        same = left > 0.0
+        for back in range(seen - turn):
+            same = same and fired_before(run, back) == fired_before(run, back + turn)
+            if not same:
+                break
+        if same:
+            return 0 if turn == 1 and run.count[CHATTERING] > 0 else turn
+    return 0
+
+
+@njit(**KERNEL)
+def extrapolate(model, run, turn, back, left, out):
+    """The state at the limit into ``out (n,)``, from three jumps of one transition, ``back`` the last."""
+    jumps, visits = run.count[JUMPS], run.visits
+    a = left
+    b = a + time_before(model, run, back, back + turn)
+    c = b + time_before(model, run, back + turn, back + 2 * turn)
+    first = b * c / ((b - a) * (c - a))
+    second = a * c / ((a - b) * (c - b))
+    third = a * b / ((a - c) * (b - c))
+    for i in range(model.dimension):
+        out[i] = (
+            first * visits[slot_of(run, jumps - back), i]
+            + second * visits[slot_of(run, jumps - back - turn), i]
+            + third * visits[slot_of(run, jumps - back - 2 * turn), i]
+        )
+
+
+@njit(**KERNEL)
+def is_limit(model, run, turn, t, work):
+    """Whether a round of jumps from ``work.settled`` finds the state on each guard, and leads back to it.
+
+    ``work.trial (n,)`` holds the sizes of the components.
+    """
+    n, place = model.dimension, work.error
+    for i in range(n):
+        place[i] = work.settled[i]
+    for back in range(turn - 1, -1, -1):
+        transition = fired_before(run, back)
+        value = guard_value(model, transition, t, place, work.scalar)
+        model.guard_gradient(transition, t, place, model.parameters, work.gradient)
+        size = abs(work.gradient[n] * t)
+        for i in range(n):
+            size += abs(work.gradient[i]) * work.trial[i]
+        if not abs(value) <= ROUGH * size:
+            return False
+        model.reset(transition, t, place, model.parameters, work.state)
+        for i in range(n):
+            place[i] = work.state[i]
+    for i in range(n):  # noqa: SIM110 (no generators in kernels)
+        if not abs(place[i] - work.settled[i]) <= ROUGH * work.trial[i]:
+            return False
+    return True
+
+
+@njit(**KERNEL)
+def size_of_visits(model, run, seen, out):
+    """Largest size of each component right after the last jumps, into ``out (n,)``."""
+    for i in range(model.dimension):
+        out[i] = run.scale[i]
+        for back in range(seen):
+            out[i] = max(out[i], abs(run.visits[slot_of(run, run.count[JUMPS] - back), i]))
+
+
+@njit(**KERNEL)
+def limit_of_rounds(model, method, run, work):
+    """Time to the limit of the jumps that fire in turn, and how many these are; zero if there is none yet.
+
+    To be called after each jump. The limit is known once two estimates, a round apart, agree up to the
+    tolerances, or once there is next to nothing left. The limit state goes to ``work.settled``.
+    """
+    if run.count[JUMPS] <= FEWEST_JUMPS:
+        return 0.0, 0
+    half = FEWEST_JUMPS // 2
+    if not time_before(model, run, 0, half) < SHORTER * time_before(model, run, half, FEWEST_JUMPS):
+        return 0.0, 0
+    turn = transitions_in_turn(model, run)
+    if turn == 0:
+        return 0.0, 0
+    left, _ = time_left_of_rounds(model, run, turn, 0)
+    earlier, _ = time_left_of_rounds(model, run, turn, turn)
+    if not earlier > 0.0:
+        return 0.0, 0
+    seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
+    lasted = time_before(model, run, 0, seen) + left
+    size_of_visits(model, run, seen, work.trial)
+    shift = abs(left + time_before(model, run, 0, turn) - earlier)
+    extrapolate(model, run, turn, 0, left, work.settled)
+    extrapolate(model, run, turn, turn, earlier, work.error)
+    agreed = shift <= method.rtol * lasted
+    for i in range(model.dimension):
+        tolerance = method.atol + method.rtol * work.trial[i]
+        agreed = agreed and abs(work.settled[i] - work.error[i]) <= tolerance
+    if not (agreed or left <= NOTHING_LEFT * lasted):
+        return 0.0, 0
+    if not is_limit(model, run, turn, run.clock[PHASE] + left, work):
+        return 0.0, 0
+    return left, turn
+
+
+@njit(**KERNEL)
+def next_in_turn(model, run, turn):
+    """The transition that would fire next; none if another one names the mode of the limit."""
+    following = fired_before(run, turn - 1)
+    if model.accumulates_to[following] != NO_MODE:
+        return following
+    for back in range(turn):
+        if model.accumulates_to[fired_before(run, back)] != NO_MODE:
+            return NO_TRANSITION
+    return following

@@ -1,0 +1,1 @@
+"""One step of each method, its step control and its dense output."""

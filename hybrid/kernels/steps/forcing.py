@@ -1,0 +1,395 @@
+"""The longest step on which no pulse of the forcing is hidden from the method.
+
+A method knows a step by samples: the field at its stages, or the series at its start. Error control cannot
+see a pulse between them. So each part of the field that depends on time alone is bounded over the step by
+interval arithmetic. A step is *explained* if between two samples the forcing stays in the range of these
+two, give or take a share of what the samples differ by. All subexpressions that could hide a pulse
+are held to this: two switches may each be explained, and their difference be a pulse.
+
+Where the forcing is monotone, its ends explain it: one evaluation on intervals is all a step costs. Where
+it is so over many steps to come, they cost nothing.
+"""
+
+import math
+
+from numba import float64, int64, njit
+
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.events.guards import has_program
+from hybrid.kernels.steps.step import rates_by_jacobian
+from hybrid.kernels.types.codes import (
+    CALM_CYCLE,
+    CALM_MODE,
+    CALM_UNTIL,
+    CALM_WAIT,
+    COARSE,
+    CYCLE,
+    HIGH,
+    HIGH_MIDDLE,
+    LEAST_SLOPE,
+    LOW,
+    LOW_MIDDLE,
+    MODE,
+    MOST_SLOPE,
+    NARROW,
+    PHASE,
+    UNRESOLVED,
+)
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RUN, WORK
+
+# What a piece of a step may be found to be.
+EXPLAINED, UNKNOWN, HIDDEN = range(3)
+# A range differs from that at one point by rounding if it is no wider than so many times that.
+FLAT = 4.0
+# A place of the step like any other.
+ELSEWHERE = 0.3819
+# Share of the largest difference of samples by which the forcing may leave the range of its neighbours:
+# a resolved maximum lies a little above them, and error control sees what the samples differ by.
+BETWEEN = 0.25
+# Shares of the tolerance that may stay unseen, over the step and on one piece.
+SHARE = 0.1
+SHARE_OF_PIECE = 0.01
+# A piece as short as the rounding of time is taken as it is: what it may hide is as large as what this
+# rounding does to a jump. More than so many tolerances of it are reported.
+COARSE_PIECE = 10.0
+# How many steps ahead the forcing is asked whether it is monotone, and after how many steps once more.
+AHEAD = 16.0
+WAIT = 8
+# Most pieces that a step is divided into, and most times that it is shortened.
+MOST_PIECES = 400
+MOST_CUTS = 200
+# No step is made shorter than so many times the rounding of time.
+FINEST = 64.0 * EPSILON
+# After so many such steps the forcing is no longer held to this.
+MOST_UNRESOLVED = 100
+# Tolerances by which a series may differ from its field over a step.
+MARGIN = 2.0
+# Rounding of a state, in units in its last place, by which the noise of its field is measured.
+ROUNDING = 8.0 * EPSILON
+
+
+@njit(**INLINE)
+def _is_monotone(row):
+    return row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
+
+
+@njit(**KERNEL)
+def _is_steady(model, program, path, order, clock, start, h, negligible, work):
+    """Whether no row that is checked turns round on a step of length ``h``, or the forcing is negligible."""
+    programs, registers = model.programs, work.registers
+    first = programs.first[program]
+    last = model.bound(programs, program, path, order, clock, start, 1.0, 0.5 * h, 0.5 * h, registers)
+    row = registers[last]
+    if row[HIGH] - row[LOW] <= negligible:
+        return True
+    if not row[HIGH] - row[LOW] < math.inf:
+        return False
+    doubtful, widths = False, work.samples[0]
+    for place in range(last + 1):
+        row, widths[place] = registers[place], 0.0
+        if programs.checked[first + place] == 1 and not _is_monotone(row):
+            doubtful, widths[place] = True, row[HIGH] - row[LOW]
+            if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
+                return False
+    if doubtful:
+        # The middle may lie within rounding of a jump, another place will not.
+        model.bound(programs, program, path, order, clock, start, 1.0, ELSEWHERE * h, 0.0, registers)
+        for place in range(last + 1):
+            row = registers[place]
+            if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
+                return False
+    return True
+
+
+@njit(**KERNEL)
+def _take_samples(model, program, path, order, clock, start, nodes, h, work):
+    """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
+
+    The last row takes the largest low end and the smallest high end of each.
+    """
+    samples = work.samples
+    common = samples[samples.shape[0] - 1]
+    for j in range(len(nodes)):
+        last = model.bound(
+            model.programs, program, path, order, clock, start, 1.0, nodes[j] * h, 0.0, work.registers
+        )
+        for place in range(last + 1):
+            low, high = work.registers[place, LOW_MIDDLE], work.registers[place, HIGH_MIDDLE]
+            samples[j, 2 * place], samples[j, 2 * place + 1] = low, high
+            common[2 * place] = low if j == 0 else max(common[2 * place], low)
+            common[2 * place + 1] = high if j == 0 else min(common[2 * place + 1], high)
+
+
+@njit(**INLINE)
+def _sampled_range(a, b, c, d):
+    """What is certainly between the samples ``[a, b]`` and ``[c, d]``; all between if both are uncertain."""
+    one, other = min(b, d), max(a, c)
+    return min(one, other), max(one, other)
+
+
+@njit(**INLINE)
+def _beyond(row, j, place, work):
+    """How far a row may leave the range of the samples ``j`` and ``j + 1``."""
+    one, other = work.samples[j], work.samples[j + 1]
+    i = 2 * place
+    low, high = _sampled_range(one[i], one[i + 1], other[i], other[i + 1])
+    return max(low - row[LOW], row[HIGH] - high)
+
+
+@njit(**KERNEL)
+def _judged(programs, first, last, j, whole, length, negligible, tolerance, work):
+    """Whether a piece between the samples ``j`` and ``j + 1``, which has just been bounded, is explained.
+
+    HIDDEN if its middle is certain to lie beyond what they explain.
+    """
+    samples, common = work.samples, work.samples[work.samples.shape[0] - 1]
+    verdict = EXPLAINED
+    # The last row is the forcing itself: if that is negligible, so are its parts.
+    for place in range(last, -1, -1):
+        if programs.checked[first + place] == 0:
+            continue
+        row, i = work.registers[place], 2 * place
+        # Of a sample within rounding of a jump nobody knows which side the method has seen.
+        low, high = _sampled_range(samples[j, i], samples[j, i + 1], samples[j + 1, i], samples[j + 1, i + 1])
+        if place == last:
+            beyond = _beyond(row, j, last, work)
+            if beyond <= negligible or beyond * length <= tolerance:
+                return EXPLAINED
+        elif not row[HIGH] - row[LOW] < math.inf:
+            # A part that may not even be in use, such as the other branch of a choice.
+            continue
+        if whole and _is_monotone(row) and row[HIGH] - row[LOW] < math.inf:
+            continue
+        slack = BETWEEN * max(common[i] - common[i + 1], 0.0)
+        one, other = samples[j, i + 1] - samples[j, i], samples[j + 1, i + 1] - samples[j + 1, i]
+        rounding = min(row[HIGH_MIDDLE] - row[LOW_MIDDLE], max(one, other))
+        if rounding < math.inf:
+            slack += FLAT * rounding
+        if row[LOW] < low - slack or row[HIGH] > high + slack:
+            if row[HIGH_MIDDLE] < low - slack or row[LOW_MIDDLE] > high + slack:
+                return HIDDEN
+            verdict = UNKNOWN
+    return verdict
+
+
+@njit(**KERNEL)
+def _first_hidden(model, program, path, order, clock, start, nodes, h, tolerance, finest, work):
+    """How far a forcing is explained on a step of length ``h``, and the first place beyond where it is not.
+
+    Both are ``h`` if all of it is explained. ``tolerance`` is that of the forcing's integral. Returned third
+    is the most that a piece as short as the rounding of time adds to that, as far as bounds can tell.
+    """
+    programs = model.programs
+    first, negligible = programs.first[program], SHARE * tolerance / h
+    if _is_steady(model, program, path, order, clock, start, h, negligible, work):
+        return h, h, 0.0
+    last = programs.first[program + 1] - 1 - first
+    _take_samples(model, program, path, order, clock, start, nodes, h, work)
+    stack, pieces, coarse = work.intervals, 0, 0.0
+    for j in range(len(nodes) - 1):
+        top, whole = 0, True
+        stack[0, 0], stack[0, 1] = nodes[j] * h, nodes[j + 1] * h
+        while top >= 0:
+            low, high = stack[top, 0], stack[top, 1]
+            middle = 0.5 * (low + high)
+            radius = max(high - middle, middle - low)
+            last = model.bound(
+                programs, program, path, order, clock, start, 1.0, middle, radius, work.registers
+            )
+            pieces += 1
+            verdict = _judged(
+                programs,
+                first,
+                last,
+                j,
+                whole,
+                high - low,
+                negligible,
+                SHARE_OF_PIECE * tolerance,
+                work,
+            )
+            whole = False
+            if verdict == UNKNOWN and pieces < MOST_PIECES:
+                if not (low < middle < high and high - low > finest and top < stack.shape[0] - 1):
+                    coarse = max(coarse, _beyond(work.registers[last], j, last, work) * (high - low))
+                    top -= 1
+                    continue
+                stack[top, 0], stack[top + 1, 0], stack[top + 1, 1] = middle, low, middle
+                top += 1
+            elif verdict != EXPLAINED:
+                return low, middle, coarse
+            else:
+                top -= 1
+    return h, h, coarse
+
+
+@njit(**KERNEL)
+def _is_calm(model, run, mode, path, h, work):
+    """Whether all forcing is monotone on the step and known to be so for longer."""
+    start = run.clock[PHASE]
+    known = run.count[CALM_MODE] == mode + 1 and run.count[CALM_CYCLE] == run.count[CYCLE]
+    if known and start + h <= run.clock[CALM_UNTIL]:
+        return True
+    run.count[CALM_WAIT] -= 1
+    if run.count[CALM_WAIT] > 0:
+        return False
+    for forcing in range(model.first_forcing[mode], model.first_forcing[mode + 1]):
+        program = model.target.shape[0] + forcing
+        if has_program(model, program) and not _is_steady(
+            model, program, path, 0, -1, start, AHEAD * h, 0.0, work
+        ):
+            run.count[CALM_WAIT] = WAIT
+            return False
+    run.count[CALM_MODE], run.count[CALM_CYCLE] = mode + 1, run.count[CYCLE]
+    run.clock[CALM_UNTIL] = start + AHEAD * h
+    return True
+
+
+@njit(**KERNEL)
+def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
+    """The longest step up to ``h`` that is explained; one as short as rounding allows is taken as it is.
+
+    A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
+    as its first place that is not explained has the length of the pulse.
+    """
+    mode, start = run.count[MODE], run.clock[PHASE]
+    if clock < 0 and _is_calm(model, run, mode, path, h, work):
+        return h
+    rounding = 0.0 if clock >= 0 else measured_time(model, run, mode)
+    longest, shortest = h, FINEST * rounding + EPSILON * h
+    for _ in range(MOST_CUTS):
+        finest = 2.0 * EPSILON * (rounding + h)
+        explained, beyond, coarse = h, h, False
+        for forcing in range(model.first_forcing[mode], model.first_forcing[mode + 1]):
+            program = model.target.shape[0] + forcing
+            if not has_program(model, program):
+                continue
+            component, tolerance = model.forcing_component[forcing], 0.0
+            if component >= 0:
+                tolerance = method.atol + method.rtol * abs(run.y[component])
+            place, other, rest = _first_hidden(
+                model, program, path, order, clock, start, nodes, explained, tolerance, finest, work
+            )
+            # What multiplies other forcings is not known, and neither is what they add to the state.
+            coarse = coarse or (component >= 0 and rest > COARSE_PIECE * tolerance)
+            if place < explained:
+                explained, beyond = place, other
+        if explained >= h:
+            run.count[COARSE] += 1 if coarse else 0
+            return h
+        h = explained if 2.0 * explained >= beyond else beyond
+        if not h > shortest:
+            break
+    return _unresolved(run, longest, max(h, shortest))
+
+
+@njit(**KERNEL)
+def _unresolved(run, longest, shortest):
+    """The step where none is explained: the shortest, but after many of them what had been proposed."""
+    run.count[UNRESOLVED] += 1
+    return min(longest, shortest) if run.count[UNRESOLVED] <= MOST_UNRESOLVED else longest
+
+
+@njit(float64(MODEL, METHOD, RUN, float64, WORK), **PART)
+def explained_step(model, method, run, h, work):
+    """The length up to ``h`` of a step whose stages explain the forcing."""
+    return _longest_explained(model, method, run, work.path, 0, -1, method.nodes, h, work)
+
+
+@njit(**INLINE)
+def _value_and_slope(series, column, order, s):
+    """One column and its derivative."""
+    value, slope = series[order, column], 0.0
+    for o in range(order - 1, -1, -1):
+        slope = slope * s + value
+        value = value * s + series[o, column]
+    return value, slope
+
+
+@njit(**KERNEL)
+def _along_series(model, mode, tangents, order, s, work):
+    """State and tangent vectors of a series into ``work.trial``, their derivatives into ``work.new``."""
+    n, series = model.dimension, work.series
+    for i in range(n):
+        work.trial[i], work.new[i] = _value_and_slope(series, i, order, s)
+    for vector in range(tangents):
+        column = model.tangent_start + vector // NARROW * model.tangent_columns[mode] + vector % NARROW
+        for i in range(n):
+            place = n * (1 + vector) + i
+            work.trial[place], work.new[place] = _value_and_slope(series, column + NARROW * i, order, s)
+
+
+@njit(**KERNEL)
+def _is_finite(model, mode, tangents, order, work):
+    """Whether all terms of the series are finite, of the state and of the tangent vectors."""
+    n, total = model.dimension, 0.0
+    for o in range(order + 1):
+        for i in range(n):
+            total += abs(work.series[o, i])
+        for vector in range(tangents):
+            column = model.tangent_start + vector // NARROW * model.tangent_columns[mode] + vector % NARROW
+            for i in range(n):
+                total += abs(work.series[o, column + NARROW * i])
+    return total < math.inf
+
+
+@njit(**KERNEL)
+def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
+    """Whether the series has the field as its derivative at the nodes: its order may not know a pulse yet.
+
+    Over the step both may differ by some tolerances, and with ``noisy`` by what rounding of the state makes
+    of the field besides.
+    """
+    n, mode, start = model.dimension, run.count[MODE], run.clock[PHASE]
+    length, series = n * (1 + tangents), work.series
+    field, other, missing = work.stages[0], work.stages[1], work.error
+    for i in range(length):
+        missing[i] = 0.0
+    for j in range(1, len(method.series_nodes)):
+        s, weight = method.series_nodes[j] * h, method.series_weights[j] * h
+        _along_series(model, mode, tangents, order, s, work)
+        t, pace = start + s, 1.0
+        if clock >= 0:
+            t, pace = _value_and_slope(series, clock, order, s)
+            t += start
+        rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, field)
+        for i in range(length):
+            other[i] = field[i]
+        if noisy:
+            for i in range(length):
+                work.trial[i] *= 1.0 + (ROUNDING if (i + 1) // 2 % 2 == 0 else -ROUNDING)
+            rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, other)
+        for i in range(length):
+            gap, noise = abs(pace * field[i] - work.new[i]), abs(pace * (other[i] - field[i]))
+            if not gap <= noise:
+                missing[i] += weight * (gap - noise)
+    for first in range(0, length, n):
+        floor = method.atol
+        if first > 0:
+            square = 0.0
+            for i in range(first, first + n):
+                square += run.y[i] * run.y[i]
+            floor = method.rtol * math.sqrt(square / n) + 1e-300
+        for i in range(first, first + n):
+            size = max(abs(run.y[i]), abs(work.trial[i]))
+            if not missing[i] <= MARGIN * (floor + (method.rtol + ROUNDING) * size):
+                return False
+    return True
+
+
+@njit(float64(MODEL, METHOD, RUN, int64, int64, int64, float64, WORK), **PART)
+def explained_series(model, method, run, tangents, order, clock, h, work):
+    """The length up to ``h`` of a step on which the series follows the forcing; nan if it is not finite."""
+    if not _is_finite(model, run.count[MODE], tangents, order, work):
+        return math.nan
+    nodes, longest = method.series_nodes, h
+    rounding = 0.0 if clock >= 0 else measured_time(model, run, run.count[MODE])
+    for _ in range(MOST_CUTS):
+        h = _longest_explained(model, method, run, work.series, order, clock, nodes, h, work)
+        for noisy in (False, True):
+            if _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
+                return h
+        h *= 0.5
+        if not h > FINEST * rounding + EPSILON * longest:
+            break
+    return _unresolved(run, longest, h)

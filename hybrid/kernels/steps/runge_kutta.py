@@ -1,0 +1,253 @@
+"""One step of a Runge-Kutta method: attempt, error control, first event, and landing on that."""
+
+import math
+
+from numba import boolean, float64, int64, njit, types
+
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.arithmetic.tangent import independence
+from hybrid.kernels.events.guards import is_forced, sides_at
+from hybrid.kernels.events.path import state_at
+from hybrid.kernels.events.record import remember_grazing, start_record
+from hybrid.kernels.steps.runge_kutta_guards import NOT_THERE, earliest_crossing, land
+from hybrid.kernels.steps.step import (
+    attempt,
+    attempt_again,
+    interpolant_path,
+    interpolation_stages,
+    rates,
+    starting_step,
+)
+from hybrid.kernels.types.codes import (
+    DIVERGENCE,
+    GO_ON,
+    GRAZING_GUARD,
+    GRAZING_PLACE,
+    GRAZING_VALUE,
+    LAST_RATIO,
+    LAST_STEP,
+    MODE,
+    NEXT_STEP,
+    NO_TRANSITION,
+    NON_FINITE,
+    PENDING,
+    PHASE,
+    PHASE_OF_RUN,
+    READY,
+    REJECTED,
+    STALE,
+    STEP_TOO_SMALL,
+    STEPS,
+)
+from hybrid.kernels.types.layout import (
+    ATTEMPTS,
+    EPSILON,
+    INLINE,
+    KERNEL,
+    METHOD,
+    MODEL,
+    PART,
+    RECORD,
+    RUN,
+    WORK,
+)
+
+SAFETY = 0.9
+SHRINK = 0.2
+GROW = 6.0
+# An event resets the pace: a flight that is a polynomial has no error to hold its steps back, and one step
+# across many bounces, each much shorter than it, would drown them in its rounding.
+LONGEST_AFTER_EVENT = 100.0
+# Logarithm of how close together the tangent vectors may be at the end of a step. An implicit step can be as
+# long as it likes where they shrink fast: what it makes of them is then no exponential.
+CLOSEST = math.log(1e3)
+
+
+@njit(**INLINE)
+def all_affine(model, mode):
+    """Whether every guard of the mode is affine, so that following them needs no interpolant of the state."""
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        if model.affine_guard[model.outgoing[slot]] == 0:
+            return False
+    return True
+
+
+@njit(**KERNEL)
+def remember_step(model, method, run, record, t, h, work):
+    """Write the step just taken from ``run.y`` into the record; its stages are those of ``work``."""
+    n, count = model.dimension, method.a.shape[0]
+    interpolation_stages(model, method, run.count[MODE], t, h, run.y, work)
+    slot = start_record(run, record, t, h)
+    rows = record.step_coefficients[slot]
+    # Element by element: an array assignment brings its error message along, seconds of compilation.
+    for i in range(n):
+        rows[0, i] = run.y[i]
+    rows[0, n] = 0.0
+    for k in range(1, rows.shape[0]):
+        for i in range(n + 1):
+            rows[k, i] = 0.0
+        for j in range(count if k < method.powers.shape[0] else 0):
+            weight = h * method.powers[k, j]
+            for i in range(n):
+                rows[k, i] += weight * work.stages[j, i]
+    rows[1, n] = h
+
+
+@njit(**KERNEL)
+def remember_touch(model, method, run, record, t, h, work):
+    """Remember the grazing at ``GRAZING_PLACE`` on the attempted step."""
+    theta = run.clock[GRAZING_PLACE]
+    interpolant_path(method, h, run.y, model.dimension, work)
+    state_at(work.path, method.powers.shape[0] - 1, model.dimension, theta, work.state)
+    remember_grazing(model, run, record, t + theta * h, work)
+
+
+@njit(**INLINE)
+def accept(model, method, run, tangents, h, correction, work):
+    """Move the run to the end of the attempted step in ``work.new``."""
+    n = model.dimension
+    mode = run.count[MODE]
+    on_guard = 0
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        on_guard += run.on_guard[model.outgoing[slot]]
+    for i in range(n):
+        before = run.scale[i] if on_guard > 0 else 0.0
+        run.scale[i] = max(before, abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
+    for i in range(n * (1 + tangents)):
+        run.y[i] = work.new[i]
+    if tangents > 0:
+        s, place = method.b.shape[0], n * (1 + tangents)
+        total = 0.0
+        for j in range(s + 1):
+            total += method.quadrature[j] * work.stages[j, place]
+        run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
+
+
+@njit(**INLINE)
+def find_event(parts, model, method, run, record, tangents, h, work):
+    """Shorten the attempted step to its first event, if there is one.
+
+    Returns its length, the Euler step that completes it, and the transition. A step whose guards
+    are proved on a part only is cut to that. A crossing that the interpolant has and the solution has not is
+    a grazing; the step is then searched again without that guard.
+    """
+    mode, t = run.count[MODE], run.clock[PHASE]
+    ignored = NO_TRANSITION
+    for _ in range(2):
+        interpolation_stages(model, method, mode, t, h, run.y, work)
+        if not all_affine(model, mode):
+            interpolant_path(method, h, run.y, model.dimension, work)
+        theta, fired, proved = earliest_crossing(model, method, run, t, h, ignored, work)
+        if run.clock[GRAZING_PLACE] < min(theta, proved):
+            remember_touch(model, method, run, record, t, h, work)
+        if proved < min(theta, 1.0):
+            attempt_again(parts, model, method, mode, t, proved * h, run.y, tangents, work)
+            return proved * h, 0.0, NO_TRANSITION
+        if fired == NO_TRANSITION:
+            break
+        direction = model.direction[fired]
+        side = run.side[fired] if direction == 0 else -direction
+        shortened, correction = land(
+            parts, model, method, fired, side, mode, t, h, theta, run.y, tangents, work
+        )
+        if shortened != NOT_THERE:
+            return shortened, correction, fired
+        ignored = fired
+        attempt_again(parts, model, method, mode, t, h, run.y, tangents, work)
+        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, 0.0
+        run.count[GRAZING_GUARD] = fired
+        remember_touch(model, method, run, record, t, h, work)
+    return h, 0.0, NO_TRANSITION
+
+
+@njit(**INLINE)
+def carry_rates(method, length, work):
+    """The rates at the end of a step are those at the start of the next."""
+    s = method.b.shape[0]
+    for i in range(length + 1):
+        work.stages[0, i] = work.stages[s, i]
+
+
+@njit(**INLINE)
+def growth_factor(method, run, h, ratio):
+    """Factor to the next step from this error ratio, and from its trend over the last two steps.
+
+    The trend (Gustafsson 1994, doi:10.1145/198429.198437) foresees the shrinking steps towards a singularity,
+    such as the end of a Hertz contact, where each step would otherwise be tried too long.
+    """
+    factor = ratio ** (-method.exponent)
+    if run.clock[LAST_STEP] > 0.0:
+        trend = h / run.clock[LAST_STEP] * (run.clock[LAST_RATIO] / ratio) ** method.exponent
+        factor = min(factor, factor * trend)
+    return min(GROW, max(SHRINK, SAFETY * factor))
+
+
+@njit(**INLINE)
+def alignment_ratio(method, n, tangents, work):
+    """Error ratio that stands for the tangent vectors at the end of the attempted step.
+
+    It makes the logarithm of the product of their sines a limit of the step's length. Above 1 they are too
+    close together for the solver's error, which is relative to whole vectors.
+    """
+    product = independence(work.new, n, tangents, work.jacobian)
+    if product < 0.0 or product >= 1.0:
+        return 0.0
+    if product == 0.0:
+        return math.inf
+    return (-0.5 * math.log(product) / CLOSEST) ** (1.0 / method.exponent)
+
+
+@njit(
+    types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK),
+    **PART,
+)
+def runge_kutta_step(parts, model, method, run, record, tangents, orthonormal, remaining, work):
+    """One step, to the first event on it or to the end of the run; returns a code and the step in time.
+
+    An event is left in ``PENDING``. A step that the error control rejects has the length zero.
+    """
+    length = model.dimension * (1 + tangents)
+    mode, t = run.count[MODE], run.clock[PHASE]
+    if run.count[PHASE_OF_RUN] == STALE:
+        rates(model, mode, t, run.y, tangents, work.stages[0])
+        if run.clock[NEXT_STEP] <= 0.0:
+            run.clock[NEXT_STEP] = starting_step(model, method, mode, t, run.y, tangents, remaining, work)
+        if not run.clock[NEXT_STEP] > 0.0:
+            return NON_FINITE, 0.0
+        run.count[PHASE_OF_RUN] = READY
+    proposed = min(run.clock[NEXT_STEP], method.max_step)
+    last = proposed >= remaining
+    h = remaining if last else proposed
+    if is_forced(model, mode):
+        h = parts.explained_step(model, method, run, h, work)
+        last = last and h == remaining
+    ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
+    if orthonormal and method.implicit != 0 and ratio <= 1.0:
+        ratio = max(ratio, alignment_ratio(method, model.dimension, tangents, work))
+    run.count[STEPS] += 1
+    if not ratio <= 1.0:
+        run.count[REJECTED] += 1
+        shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
+        run.clock[NEXT_STEP] = h * shrink
+        if h * shrink <= 4.0 * EPSILON * measured_time(model, run, mode) or h * shrink < 1e-200:
+            return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
+        return GO_ON, 0.0
+    grow = growth_factor(method, run, h, max(ratio, 1e-16))
+    run.clock[NEXT_STEP] = max(proposed, h * grow) if last else h * grow
+    run.clock[LAST_STEP], run.clock[LAST_RATIO] = h, max(ratio, 1e-16)
+    fired, correction, whole = NO_TRANSITION, 0.0, h
+    if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
+        h, correction, fired = find_event(parts, model, method, run, record, tangents, h, work)
+    if fired != NO_TRANSITION:
+        run.clock[NEXT_STEP] = min(run.clock[NEXT_STEP], LONGEST_AFTER_EVENT * h)
+    if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:
+        run.first_step[mode] = h
+    if record.step_time.shape[0] > 0 and h > 0.0:
+        remember_step(model, method, run, record, t, h, work)
+    accept(model, method, run, tangents, h, correction, work)
+    run.count[PENDING] = fired
+    if fired == NO_TRANSITION:
+        if h < whole:
+            sides_at(model, run, t + h, work)
+        carry_rates(method, length, work)
+    return GO_ON, h + correction

@@ -1,0 +1,208 @@
+"""Guards along a Runge-Kutta step: the earliest crossing, and landing on it."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
+from hybrid.kernels.events.crossings import crossing_on_path, rests
+from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
+    error_band,
+    guard_speed,
+    guard_value,
+    note_grazing,
+    rounding_band,
+)
+from hybrid.kernels.events.onset import BY_STEP, has_just_fired
+from hybrid.kernels.steps.step import attempt_again
+from hybrid.kernels.types.codes import GRAZING_PLACE, MODE, NO_TRANSITION
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+
+# A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
+EULER_IS_ENOUGH = 1e-8
+# Farthest Newton step, as a share of the step, for a guard that may have kinks and jumps.
+FARTHEST = 1e-3
+# First distance, as a share of the step, at which the other side of a guard is looked for.
+FIRST_REACH = 1e-10
+MOST_LANDINGS = 200
+NOT_THERE = -1.0
+
+
+@njit(**INLINE)
+def affine_polynomial(model, method, transition, t, h, x, value, work):
+    """Bernstein coefficients of an affine guard on the interpolant, exactly; returns their degree."""
+    n = model.dimension
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    degree, count = method.interpolant.shape[0] - 1, method.a.shape[0]
+    for j in range(count):
+        speed = 0.0
+        for i in range(n):
+            speed += work.gradient[i] * work.stages[j, i]
+        work.speeds[j] = h * speed
+    for i in range(degree + 1):
+        total = value + h * work.gradient[n] * i / degree
+        for j in range(count):
+            total += method.interpolant[i, j] * work.speeds[j]
+        work.polynomial[i] = total
+    return degree
+
+
+@njit(**KERNEL)
+def rounding_on_step(model, run, transition, t, h, work):
+    """How far from zero rounding can leave a guard that is at rest on a step; ``work.gradient`` is current.
+
+    A state and a time that are zero where the step starts have no size there, only further on.
+    """
+    n = model.dimension
+    moved = abs(work.gradient[n])
+    for i in range(n):
+        moved += abs(work.gradient[i] * work.stages[0, i])
+    band = rounding_band(model, run, transition, t, run.y, work)
+    return band + ROUNDING_OF_STATE * EPSILON * h * moved
+
+
+@njit(**KERNEL)
+def leave_guard(model, run, transition, t, work):
+    """Put a guard on the side it has at the end of the attempted step, ``work.new``, whatever came before."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    if abs(value) > rounding_band(model, run, transition, t, work.new, work):
+        run.side[transition] = 1 if value > 0.0 else -1
+        run.on_guard[transition] = 0
+
+
+@njit(**INLINE)
+def earliest_crossing(model, method, run, t, h, ignored, work):
+    """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
+
+    Returns ``(theta, transition, proved)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses before the
+    share ``proved`` of the step, to which the step is to be cut. The sides of guards without a crossing are
+    brought up to date, to the end of the step, and guards that were left are no longer held to be zero at its
+    start. ``work.path`` must hold the interpolant if any guard of the mode is not affine.
+    """
+    mode, degree_of_path = run.count[MODE], method.powers.shape[0] - 1
+    earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
+    run.clock[GRAZING_PLACE] = NO_ROOT
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        if transition == ignored:
+            leave_guard(model, run, transition, t + h, work)
+            continue
+        on_guard = run.on_guard[transition]
+        side = run.side[transition]
+        if model.affine_guard[transition] == 1:
+            start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
+            degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
+            if on_guard > 0:
+                band, farthest = rounding_on_step(model, run, transition, t, h, work), 0.0
+                for i in range(degree + 1):
+                    farthest = max(farthest, abs(work.polynomial[i]))
+                if farthest <= band:
+                    continue
+                run.on_guard[transition] = 0
+                if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
+                    side = 0
+            for _ in range(on_guard):
+                degree = divide_by_theta(work.polynomial, degree)
+            band = error_band(method, run, work.gradient, model.dimension)
+            if stays(work.polynomial, degree, side, band):
+                continue
+            theta, side = first_crossing(
+                work.polynomial, degree, side, model.direction[transition], work.stack
+            )
+            if theta > 1.0 and side == run.side[transition] and on_guard == 0:
+                note_grazing(run, transition, degree, side, band, work)
+        else:
+            if rests(model, run, transition, work.path, degree_of_path, -1, t, h, 1.0, work):
+                continue
+            theta, side, share = crossing_on_path(
+                model,
+                method,
+                run,
+                transition,
+                work.path,
+                degree_of_path,
+                -1,
+                t,
+                h,
+                1.0,
+                False,
+                work,
+            )
+            run.on_guard[transition] = 0
+            proved = min(proved, share)
+        if theta == NO_ROOT:
+            run.side[transition] = side
+        elif theta < earliest:
+            earliest, fired = theta, transition
+    return earliest, fired, proved
+
+
+@njit(**KERNEL)
+def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents, work):
+    """Shorten the step so that it ends on the guard, with the end in ``work.new``.
+
+    The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
+    so that the state and the tangents at the event carry the error of the method, not that of its
+    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
+    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
+    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
+    """
+    s = method.b.shape[0]
+    low, high = 0.0, h
+    begins = guard_value(model, transition, t, y, work.scalar) * side > 0.0
+    # Along the step an affine guard is as smooth as the state. Another one may have kinks, jumps, flat roots.
+    # It may cross more than once on the step, whose ends are no ends of a bracket then.
+    smooth = model.affine_guard[transition] == 1
+    before = smooth and begins
+    after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
+    length, last, reach = theta * h, math.inf, FIRST_REACH * h
+    for trial in range(MOST_LANDINGS):
+        attempt_again(parts, model, method, mode, t, length, y, tangents, work)
+        if length == 0.0:
+            return 0.0, 0.0
+        value = guard_value(model, transition, t + length, work.new, work.scalar)
+        speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
+        correction = -value / speed
+        # The next correction is foreseen from the last two, since Newton's method converges quadratically.
+        next_one = abs(correction) ** 3
+        converges = smooth or (trial > 0 and next_one <= EPSILON * length * last * last)
+        if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
+            for i in range(model.dimension * (1 + tangents)):
+                work.new[i] += correction * work.stages[s, i]
+            return length, correction
+        if value * side > 0.0:
+            low, before = length, True
+        else:
+            high, after = length, True
+        finest = 2.0 * EPSILON * (max(high, abs(t)) if smooth else high)
+        if before and after and high - low <= finest:
+            if length != high:
+                attempt_again(parts, model, method, mode, t, high, y, tangents, work)
+            return high, 0.0
+        newton = length + correction
+        slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
+        # A place that Newton's method has not led to says nothing of how fast that converges.
+        last = 0.0
+        # Beyond the error of an interpolant Newton's step follows something else, the slope beside a jump.
+        trusted = smooth or abs(correction) <= FARTHEST * h
+        if low < newton < high and trusted and not slow:
+            length, last = newton, abs(correction)
+        elif before and after:
+            length = 0.5 * (low + high)
+        elif smooth:
+            break
+        else:
+            # Only one side has been seen: look for the other one, farther and farther from there.
+            length = low + reach if before else high - reach
+            reach *= 8.0
+            if before and low < h <= length:
+                # The end of the step is the farthest place there is.
+                length = h
+            elif begins and after and length <= low:
+                # So is its start.
+                before, length = True, 0.5 * high
+            elif not low < length < high:
+                break
+    return NOT_THERE, 0.0

@@ -1,0 +1,345 @@
+"""One step by the Taylor series of the solution, whose guards are isolated on the series themselves.
+
+A series ``(order + 1, columns)`` holds normalised Taylor coefficients: the state, then the guards of the
+mode, the time since the start of the step, the integral of div f, what the recurrences need, and the tangent
+vectors, four at a time. Its variable is time, or the clock of a desingularised mode. Two rows below it take
+the values at the end of the step, and what these are sums of.
+"""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import first_crossing
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
+from hybrid.kernels.arithmetic.lanes import (
+    four_times,
+    larger,
+    largest,
+    load,
+    magnitude,
+    square_root,
+    store,
+    whole_registers,
+)
+from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
+from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
+from hybrid.kernels.events.path import state_at, time_at, value_at
+from hybrid.kernels.events.record import remember_grazing, start_record
+from hybrid.kernels.steps.series_guards import (
+    earliest_on_series,
+    powers_on_step,
+    time_of,
+    to_bernstein,
+)
+from hybrid.kernels.steps.step import rates_by_jacobian
+from hybrid.kernels.types.codes import (
+    CRAWLING,
+    DESINGULARISED,
+    DIVERGENCE,
+    EXACT,
+    GO_ON,
+    GRAZING_PLACE,
+    HIGHEST_ORDER,
+    MODE,
+    NARROW,
+    NEXT_STEP,
+    NO_TRANSITION,
+    NON_FINITE,
+    PENDING,
+    PHASE,
+    ROOTED,
+    SINCE_ENTRY,
+    STEP_TOO_SMALL,
+    STEPS,
+    WIDE,
+)
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+
+# Series that can be trusted to the last digit are cut off below rounding.
+EXACT_TOLERANCE = 1e-17
+# Share of the largest component that is an absolute tolerance for the others.
+SHARE = 1e-3
+SAFETY = 0.9
+# Share of the tolerance that a tangent vector gets: stiff contacts stretch it a thousandfold and shrink it
+# again, and what was an error of the long vector is one of the short vector then.
+TANGENT_SHARE = 0.1
+# Below this their error is rounding.
+FINEST = 1e-14
+# What stands for an absolute tolerance where there is none.
+TINY = 1e-300
+# Terms at the end of a series that have to be small.
+TAIL = 8
+TAIL_OF_EXACT = 3
+# How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
+FALL_OF_EXACT = 4.0
+# Share of a step by which a landing may still be corrected.
+CLOSE = 1e-8
+# A flight without end is followed for this many times the time in which the state changes by its size.
+LONG = 100.0
+# Share of the last stay in a mode by which a step goes beyond it.
+AHEAD = 0.25
+# The clock of a guard's root stands still where guard and speed vanish together. Steps shorter than this
+# share of the stay in the mode do not lead away from there, if so many of them follow one another.
+CRAWL = 1e-4
+MOST_CRAWLING = 100
+# Share of time below which that is no step.
+NEXT_TO_NOTHING = 1e-10
+
+
+@njit(**INLINE)
+def weigh_state(series, n, rtol, atol, exact, weights):
+    """One over the tolerance of every component of the state into ``weights``; the rest weighs nothing."""
+    largest = 0.0
+    for i in range(n if exact else 0):
+        largest = max(largest, abs(series[0, i]))
+    if exact and largest == 0.0:
+        # From rest at the origin, the first terms tell the size.
+        for i in range(n):
+            largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
+    floor = SHARE * rtol * largest + TINY if exact else atol + TINY
+    for i in range(0, n, NARROW):
+        store(weights, 0, i, 1.0 / (floor + rtol * magnitude(load(series, 0, i))))
+    for i in range(n, whole_registers(n, NARROW)):
+        weights[0, i] = 0.0
+
+
+@njit(**INLINE)
+def weigh_tangents(series, n, first, rtol, exact, weights):
+    """One over the tolerance of every component of four tangent vectors, each measured against itself."""
+    square = four_times(0.0)
+    for i in range(n):
+        component = load(series, 0, first + NARROW * i)
+        square = component * component + square
+    if not exact:
+        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST))
+    floor = (SHARE * rtol if exact else rtol) * square_root(square / n) + TINY
+    for i in range(n):
+        component = load(series, 0, first + NARROW * i)
+        store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
+
+
+@njit(**KERNEL)
+def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights):
+    """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
+
+    The tolerances are those of the Runge-Kutta methods, each tangent vector a block by itself. The last
+    term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth may be
+    there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
+    exact modes fall faster than any power, what is behind their last term is next to nothing, and three of
+    their terms are enough. ``weights (1, columns)`` is scratch.
+    """
+    weigh_state(series, n, rtol, atol, exact, weights)
+    for g in range(groups):
+        weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
+    fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
+    decisive = four_times(-math.inf)
+    for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
+        # What is not a number is left out here, and met with when the series is summed.
+        worst = four_times(0.0)
+        for i in range(0, n, NARROW):
+            worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
+        for g in range(groups):
+            for i in range(first + g * stride, first + g * stride + NARROW * n, NARROW):
+                worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
+        decisive = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), decisive)
+    return (1.0 if exact else SAFETY) * power_of_two(-largest(decisive))
+
+
+@njit(**KERNEL)
+def step_until(series, clock, order, h, remaining, work):
+    """Shorten a step on the clock of a desingularised mode so that it does not pass the end of the run.
+
+    Beyond a zero of the root, where the mode ends, that clock would run backwards.
+    """
+    degree = powers_on_step(series, whole_registers(clock + 2, WIDE), order, h, 0, work.polynomial)
+    to_bernstein(work.polynomial, degree)
+    theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
+    longest = min(theta, 1.0) * h
+    if value_at(series, clock, order, longest) < remaining:
+        return h
+    return time_of(series, clock, order, longest, remaining)
+
+
+@njit(**INLINE)
+def accept_series(model, run, tangents, order, h, work):
+    """Move the state and the tangent vectors to ``h`` on the series, and the divergence's integral.
+
+    The values of the state at ``h``, and what they are sums of, have been left behind the series.
+    """
+    n, series = model.dimension, work.series
+    mode = run.count[MODE]
+    first, last = model.first_outgoing[mode], model.first_outgoing[mode + 1]
+    on_guard = 0
+    for slot in range(first, last):
+        on_guard += run.on_guard[model.outgoing[slot]]
+    # What the state is a sum of is what its rounding is judged by.
+    for i in range(n):
+        run.scale[i] = max(run.scale[i] if on_guard > 0 else 0.0, series[order + 2, i])
+        run.y[i] = series[order + 1, i]
+    if tangents > 0:
+        run.clock[DIVERGENCE] += series[order + 1, n + last - first + 1]
+        start, stride = model.tangent_start, model.tangent_columns[mode]
+        for g in range(whole_registers(tangents, NARROW) // NARROW):
+            evaluate(series, order, h, start + g * stride, NARROW * n)
+        gather_tangents(series, order + 1, n, start, stride, run.y[: n * (1 + tangents)])
+
+
+@njit(**KERNEL)
+def remember_series(model, run, record, order, t, h, span, clock, work):
+    """Write a step along the series into the record: the state and time as polynomials in a share of it."""
+    slot, n = start_record(run, record, t, span), model.dimension
+    rows, series = record.step_coefficients[slot], work.series
+    power = 1.0
+    for o in range(order + 1):
+        for i in range(n):
+            rows[o, i] = series[o, i] * power
+        rows[o, n] = series[o, clock] * power if clock >= 0 else 0.0
+        power *= h
+    if clock < 0:
+        rows[1, n] = span
+    for o in range(order + 1, rows.shape[0]):
+        for i in range(n + 1):
+            rows[o, i] = 0.0
+
+
+@njit(**KERNEL)
+def reach_guard(model, run, tangents, transition, t, longest, work):
+    """Bring the state onto the guard by an Euler step in time, whose length is returned.
+
+    A contact ends where the root of its guard vanishes, and the guard differs from the square of the root by
+    the error of the step. A guard that is not affine has a series with terms, and rounding, of its own. Left
+    beyond its rounding it would count as not yet, or once more, crossed. Nothing is done, and 0 returned,
+    where more than ``longest`` would be needed.
+    """
+    field = work.stages[0]
+    rates_by_jacobian(model, run.count[MODE], t, run.y, tangents, work.jacobian, field)
+    speed = guard_speed(model, transition, t, run.y, field, work.gradient)
+    if speed == 0.0:
+        return 0.0
+    correction = -guard_value(model, transition, t, run.y, work.scalar) / speed
+    if not abs(correction) <= longest:
+        return 0.0
+    for i in range(model.dimension * (1 + tangents)):
+        run.y[i] += correction * field[i]
+    return correction
+
+
+@njit(**KERNEL)
+def project_on_guard(model, run, transition, t, work):
+    """Bring the state onto the guard by the shortest way: its speed may be zero where its root vanishes."""
+    value = guard_value(model, transition, t, run.y, work.scalar)
+    model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+    square = 0.0
+    for i in range(model.dimension):
+        square += work.gradient[i] * work.gradient[i]
+    for i in range(model.dimension if square > 0.0 else 0):
+        run.y[i] -= value * work.gradient[i] / square
+
+
+@njit(**KERNEL)
+def series_step(parts, model, method, run, record, tangents, remaining, work):
+    """One step, to the first event on it or to the end of the run; returns a code and the step in time.
+
+    An event is left in ``PENDING``.
+    """
+    n = model.dimension
+    mode, t, series = run.count[MODE], run.clock[PHASE], work.series
+    kind, degree = model.propagator[mode], model.degree[mode]
+    exact = kind == EXACT
+    order = HIGHEST_ORDER if exact else method.order
+    if degree > 0:
+        order = degree
+    guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
+    clock = n + guards if kind == DESINGULARISED else -1
+    # State, guards, clock and divergence are evaluated together, in whole vectors.
+    front = whole_registers(n + guards + 2, NARROW)
+    # A run may be taken on without its tangent vectors: the columns are those of what is passed.
+    model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
+    run.count[STEPS] += 1
+    rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
+    h = math.inf
+    if degree == 0:
+        start, stride = model.tangent_start, model.tangent_columns[mode]
+        groups = whole_registers(tangents, NARROW) // NARROW
+        h = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
+    if not h > 0.0:
+        return NON_FINITE, 0.0
+    if clock < 0:
+        h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))
+        if not h < 1e100:
+            h = unhurried(series, n, run)
+    else:
+        h = min(h, 1e100)
+    if is_forced(model, mode):
+        h = parts.explained_series(model, method, run, tangents, order, clock, h, work)
+        if not h > 0.0:
+            return NON_FINITE, 0.0
+    evaluate_with_sizes(series, order, h, 0, front)
+    total = 0.0
+    for i in range(n):
+        total += series[order + 2, i]
+    if not total < math.inf:
+        return NON_FINITE, 0.0
+    if clock >= 0 and not series[order + 2, clock] < remaining:
+        h = step_until(series, clock, order, h, remaining, work)
+        evaluate_with_sizes(series, order, h, 0, front)
+    fired, cut = NO_TRANSITION, False
+    if guards > 0:
+        theta, fired, proved = earliest_on_series(model, method, run, order, t, h, clock, work)
+        if run.clock[GRAZING_PLACE] < min(theta, proved):
+            s = run.clock[GRAZING_PLACE] * h
+            state_at(series, order, n, s, work.state)
+            remember_grazing(model, run, record, time_at(series, order, clock, t, 1.0, s), work)
+        cut = proved < min(theta, 1.0)
+        if cut:
+            theta, fired = proved, NO_TRANSITION
+        if cut or fired != NO_TRANSITION:
+            h *= theta
+            evaluate_with_sizes(series, order, h, 0, front)
+            run.count[PENDING] = fired
+    span = h if clock < 0 else min(series[order + 1, clock], remaining)
+    if clock >= 0:
+        crawls = fired == NO_TRANSITION and span <= CRAWL * run.clock[SINCE_ENTRY] and span < remaining
+        run.count[CRAWLING] = run.count[CRAWLING] + 1 if crawls else 0
+        if run.count[CRAWLING] > MOST_CRAWLING:
+            return STEP_TOO_SMALL, 0.0
+    finest = 4.0 * EPSILON * measured_time(model, run, mode)
+    if fired == NO_TRANSITION and not span > finest and span < remaining:
+        return STEP_TOO_SMALL, 0.0
+    if record.step_time.shape[0] > 0 and span > 0.0:
+        remember_series(model, run, record, order, t, h, span, clock, work)
+    accept_series(model, run, tangents, order, h, work)
+    if cut:
+        sides_at(model, run, t + span, work)
+    if fired != NO_TRANSITION and kind == ROOTED:
+        project_on_guard(model, run, fired, t + span, work)
+    elif fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
+        longest = math.inf if clock >= 0 else CLOSE * span
+        span += reach_guard(model, run, tangents, fired, t + span, longest, work)
+    return GO_ON, span
+
+
+@njit(**INLINE)
+def as_far_as_last_time(model, run, mode):
+    """A little more than is left of a stay as long as the last one; anything if it is longer already.
+
+    The event that ends it is found on the way; a longer step would only make it harder to find. A stay that
+    was next to nothing says nothing of this one.
+    """
+    left, beyond = run.stay[mode] - run.clock[SINCE_ENTRY], AHEAD * run.stay[mode]
+    if left > 0.0 and beyond > NEXT_TO_NOTHING * measured_time(model, run, mode):
+        return left + beyond
+    return math.inf
+
+
+@njit(**KERNEL)
+def unhurried(series, n, run):
+    """A step for a solution that is a polynomial, in a run without an end."""
+    size, pace = 0.0, 0.0
+    for i in range(n):
+        size, pace = max(size, abs(series[0, i])), max(pace, abs(series[1, i]))
+    h = max(run.clock[NEXT_STEP], LONG * size / pace if pace * size > 0.0 else 1.0)
+    run.clock[NEXT_STEP] = min(2.0 * h, 1e50)
+    return h

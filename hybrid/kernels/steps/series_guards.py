@@ -1,0 +1,384 @@
+"""Guards along a series: their polynomials, the proofs that they keep clear, the earliest crossing."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import (
+    NO_ROOT,
+    SETTLED,
+    bracket_crossing,
+    crosses_towards,
+    halve,
+    stays,
+)
+from hybrid.kernels.arithmetic.lanes import four_times, load, store
+from hybrid.kernels.events.crossings import crossing_on_path, rests
+from hybrid.kernels.events.guards import error_band, note_grazing, rounding_band
+from hybrid.kernels.events.onset import BY_STEP, has_just_fired
+from hybrid.kernels.events.path import value_at
+from hybrid.kernels.types.codes import (
+    DESINGULARISED,
+    EXACT,
+    GRAZING_PLACE,
+    HIGHEST_ORDER,
+    MODE,
+    NARROW,
+    NO_TRANSITION,
+    ROOTED,
+)
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+
+# The error of the last step towards a root is taken to be this many times its estimate.
+UNSEEN = 64.0
+# Share of a guard's size that the high powers of its series may reach together to be left out of a proof.
+NEGLIGIBLE = 0.003
+
+
+# What a power of the variable is divided by in Bernstein form: ``C(degree, k)``.
+SHARES = np.array(
+    [[1.0 / max(math.comb(n, k), 1) for k in range(HIGHEST_ORDER + 1)] for n in range(HIGHEST_ORDER + 1)]
+)
+# What a power of the variable adds to each Bernstein coefficient: ``C(i, k) / C(degree, k)`` in the row
+# ``DEGREES * degree + k``.
+DEGREES = 4 * NARROW
+POWERS = np.array(
+    [
+        [math.comb(i, k) / max(math.comb(n, k), 1) for i in range(DEGREES)]
+        for n in range(DEGREES)
+        for k in range(DEGREES)
+    ]
+)
+# Verdicts on a guard.
+CLEAR, CROSSES, UNKNOWN = range(3)
+# What is not decided on a part this short is left to the whole polynomial.
+SHORTEST_PART = 0.2
+
+
+@njit(**INLINE)
+def to_bernstein(coefficients, degree):
+    """Turn power coefficients on ``[0, 1]`` into Bernstein coefficients, in place."""
+    for k in range(1, degree + 1):
+        coefficients[k] *= SHARES[degree, k]
+    for level in range(degree):
+        # A view of what changes: its indices are plainly not negative, and need no check in the inner loop.
+        row = coefficients[level : degree + 1]
+        before = row[0]
+        for j in range(1, degree + 1 - level):
+            entry = row[j]
+            row[j] = entry + before
+            before = entry
+
+
+@njit(**KERNEL)
+def leading_to_bernstein(coefficients, degree, stack):
+    """As ``to_bernstein``, from ``coefficients`` into the first row of a stack, a column a register."""
+    if degree >= DEGREES:
+        for k in range(degree + 1):
+            stack[0, 2 + k] = coefficients[k]
+        to_bernstein(stack[0, 2:], degree)
+        return
+    a, b, c, d = four_times(0.0), four_times(0.0), four_times(0.0), four_times(0.0)
+    row = DEGREES * degree
+    for k in range(degree + 1):
+        power = coefficients[k]
+        a = load(POWERS, row + k, 0) * power + a
+        b = load(POWERS, row + k, NARROW) * power + b
+        c = load(POWERS, row + k, 2 * NARROW) * power + c
+        d = load(POWERS, row + k, 3 * NARROW) * power + d
+    store(stack, 0, 2, a)
+    store(stack, 0, 2 + NARROW, b)
+    store(stack, 0, 2 + 2 * NARROW, c)
+    store(stack, 0, 2 + 3 * NARROW, d)
+
+
+@njit(**INLINE)
+def powers_on_step(series, column, order, h, known_roots, coefficients):
+    """Power coefficients on ``[0, 1]`` of a series, divided by its variable for each known root at 0.
+
+    Returns the degree.
+    """
+    degree = order
+    while degree > known_roots and series[degree, column] == 0.0:
+        degree -= 1
+    power = h**known_roots
+    for k in range(known_roots, degree + 1):
+        coefficients[k - known_roots] = series[k, column] * power
+        power *= h
+    return degree - known_roots
+
+
+@njit(**INLINE)
+def beyond_known_roots(series, column, h, known_roots, size):
+    """The sum of the magnitudes of all terms without the known ones, and the power of ``h`` in the next."""
+    power = 1.0
+    for k in range(known_roots):
+        size -= abs(series[k, column]) * power
+        power *= h
+    return size, power
+
+
+@njit(**INLINE)
+def keeps_half(first, value, size):
+    """The cheap proof that a polynomial on ``[0, 1]`` keeps half of its ``first`` value, from that at 1.
+
+    With ``size`` the sum of the magnitudes of its terms, those that take it down on the way come to
+    ``(size - value) / 2``.
+    """
+    return first > size - value + 64.0 * EPSILON * size
+
+
+@njit(**INLINE)
+def leading_powers(series, column, order, power, known_roots, size, coefficients, h):
+    """The first power coefficients on ``[0, 1]`` of a series, divided by its variable for each root at 0.
+
+    ``size`` is the sum of the magnitudes of its terms from there on, ``power`` the power of ``h`` in the
+    first. Returns the degree from which on the others are a small part of the sum, and a bound for them.
+    """
+    rest, degree = size, 0
+    for k in range(known_roots, order + 1):
+        term = series[k, column] * power
+        degree = k - known_roots
+        coefficients[degree] = term
+        rest -= abs(term)
+        if rest <= NEGLIGIBLE * size:
+            break
+        power *= h
+    # Its own rounding included.
+    return degree, max(rest, 0.0) + 64.0 * EPSILON * size
+
+
+@njit(**INLINE)
+def falls_throughout(coefficients, degree, slope_of_rest, side):
+    """Whether ``side`` times a polynomial in Bernstein form falls everywhere, with what has been left out."""
+    least = slope_of_rest / max(degree, 1)
+    for i in range(degree):
+        if not (coefficients[i] - coefficients[i + 1]) * side > least:
+            return False
+    return degree > 0
+
+
+@njit(**KERNEL)
+def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
+    """What the leading powers of a guard prove of it, part by part from the start of the step on.
+
+    ``stack[0, 2:]`` are their Bernstein coefficients; all the others add no more than ``rest``, and no more
+    than ``slope_of_rest`` to the slope; ``last`` is the value at the end of the step, with them. Returns
+    ``CLEAR`` if the guard keeps beyond ``band`` on its side; ``CROSSES`` and a part with signs that differ at
+    its ends if it falls throughout that part, and is clear before; else ``UNKNOWN``. The row of ``stack``
+    that holds the part comes last.
+    """
+    top = 0
+    stack[0, 0], stack[0, 1] = 0.0, 1.0
+    while top >= 0:
+        row = stack[top]
+        start, end = row[0], row[1]
+        if stays(row[2:], degree, side, band + rest):
+            top -= 1
+            continue
+        # At the ends of the step the values are known as they are.
+        left = row[2] * side - (rest + band if start > 0.0 else 0.0)
+        right = last * side if end == 1.0 else row[2 + degree] * side + rest
+        if (
+            left > 0.0
+            and right < 0.0
+            and falls_throughout(row[2:], degree, slope_of_rest * (end - start), side)
+        ):
+            return CROSSES, start, end, top
+        if end - start < SHORTEST_PART:
+            return UNKNOWN, start, end, top
+        halve(stack, top, degree)
+        top += 1
+    return CLEAR, 0.0, 1.0, 0
+
+
+@njit(**INLINE)
+def expanded_at(series, column, first, order, s):
+    """Value, derivative and half the second one of a series divided by its variable to the power ``first``.
+
+    Horner's scheme in ``s**2`` for even and for odd terms, which do not wait for each other.
+    """
+    square = s * s
+    even, even_slope, even_bend = 0.0, 0.0, 0.0
+    odd, odd_slope, odd_bend = 0.0, 0.0, 0.0
+    top = order
+    if (order - first) % 2 == 0:
+        even = series[order, column]
+        top = order - 1
+    for o in range(top, first, -2):
+        odd_bend = odd_bend * square + odd_slope
+        odd_slope = odd_slope * square + odd
+        odd = odd * square + series[o, column]
+        even_bend = even_bend * square + even_slope
+        even_slope = even_slope * square + even
+        even = even * square + series[o - 1, column]
+    value = even + s * odd
+    slope = odd + 2.0 * (s * even_slope + square * odd_slope)
+    bend = even_slope + s * (3.0 * odd_slope + 4.0 * (s * even_bend + square * odd_bend))
+    return value, slope, bend
+
+
+@njit(**KERNEL)
+def time_of(series, clock, order, h, span):
+    """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
+    low, high = 0.0, h
+    # It may start without speed: the place grows like the root of the time then.
+    s = h * math.sqrt(min(max(span / value_at(series, clock, order, h), 0.0), 1.0))
+    if s == 0.0:
+        return s
+    for _ in range(100):
+        value, slope, _ = expanded_at(series, clock, 0, order, s)
+        misfit = value - span
+        if misfit > 0.0:
+            high = s
+        else:
+            low = s
+        newton = s - misfit / slope
+        if not low < newton < high:
+            newton = 0.5 * (low + high)
+        if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
+            return newton
+        s = newton
+    return s
+
+
+@njit(**KERNEL)
+def root_between(series, column, order, known_roots, h, low, high, left, right):
+    """The one root of a series in an open interval of the step ``h``.
+
+    ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
+    variable for each known root at 0; in the end it is taken as it is, which at 0 is zero up to rounding
+    only; but not to a root at 0, where the step begins.
+    """
+    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right)
+    for _ in range(3 if known_roots > 0 else 0):
+        value, slope, _ = expanded_at(series, column, 0, order, s)
+        shift = -value / slope if slope != 0.0 else 0.0
+        if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
+            break
+        s += shift
+        if abs(shift) <= EPSILON * s:
+            break
+    return s
+
+
+@njit(**INLINE)
+def simple_root_of(series, column, order, known_roots, h, low, high, left, right):
+    """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
+
+    The error after a step of Halley's is about the cube of the step, over the square of the length on which
+    the guard bends: where that is rounding, it need not be looked at.
+    """
+    s, last = low + (high - low) * (left / (left - right)), high - low
+    if not low < s < high:
+        s = 0.5 * (low + high)
+    for _ in range(100):
+        value, slope, bend = expanded_at(series, column, known_roots, order, s)
+        if value == 0.0:
+            return s
+        if (value > 0.0) == (left > 0.0):
+            low = s
+        else:
+            high = s
+        shift = -value / slope if slope != 0.0 else math.inf
+        curve = bend / slope if slope != 0.0 else math.inf
+        # Far from the root, next to a turning point, Halley's steps would be as short as the slope is small.
+        if abs(shift * curve) < 0.5:
+            shift /= 1.0 + shift * curve
+        closer, change = s + shift, abs(shift)
+        # Its steps shrink here; one that does not is the rounding of the value.
+        if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
+            return s
+        if low < closer < high:
+            if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
+                return closer
+        else:
+            closer = 0.5 * (low + high)
+            change = high - low
+        if high - low <= EPSILON * high:
+            return closer
+        s, last = closer, change
+    return s
+
+
+@njit(**KERNEL)
+def earliest_on_series(model, method, run, order, t, h, clock, work):
+    """Earliest crossing on a step over the guards of the mode, and its transition.
+
+    Returns ``(theta, transition, proved)``, and brings sides up to date, as
+    ``runge_kutta_guards.earliest_crossing`` does. A guard that is a series itself is a polynomial, up to the
+    remainder of the series; what it is a sum of stands behind the series. For any other guard its own
+    expression is bounded on the series of the state.
+    """
+    mode, series = run.count[MODE], work.series
+    kind = model.propagator[mode]
+    earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
+    run.clock[GRAZING_PLACE] = NO_ROOT
+    first = model.first_outgoing[mode]
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        on_guard, side = run.on_guard[transition], run.side[transition]
+        if model.guard_in_series[transition] == 0:
+            if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
+                continue
+            theta, side, share = crossing_on_path(
+                model, method, run, transition, series, order, clock, t, 1.0, h, kind == EXACT, work
+            )
+            run.on_guard[transition] = 0
+            proved = min(proved, share)
+            if theta == NO_ROOT:
+                run.side[transition] = side
+            elif theta < earliest:
+                earliest, fired = theta, transition
+            continue
+        column = model.dimension + slot - first
+        value, size = series[order + 1, column] * side, series[order + 2, column]
+        if on_guard == 0 and keeps_half(series[0, column] * side, value, size):
+            continue
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        rounding = rounding_band(model, run, transition, t, run.y, work)
+        band = rounding
+        if kind != EXACT:
+            band = error_band(method, run, work.gradient, model.dimension)
+        # Along the root of a guard, what is small for the guard is not as small.
+        if kind in (DESINGULARISED, ROOTED):
+            rounding, band = math.sqrt(rounding), math.sqrt(band)
+        size, power = beyond_known_roots(series, column, h, on_guard, size)
+        if on_guard > 0:
+            if size <= rounding:
+                continue
+            run.on_guard[transition] = 0
+            if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
+                side = 0
+        # The second cheap proof: the leading powers keep to their side, even if the others are against it.
+        degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
+        leading_to_bernstein(work.polynomial, degree, work.stack)
+        verdict, start, end, row = judge_leading(
+            degree, rest, order * rest, side, band, series[order + 1, column], work.stack
+        )
+        if verdict == CLEAR:
+            continue
+        if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
+            ends = work.stack[row, 2], work.stack[row, 2 + degree]
+            theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
+            if theta < earliest:
+                earliest, fired = theta, transition
+            continue
+        degree = powers_on_step(series, column, order, h, on_guard, work.polynomial)
+        to_bernstein(work.polynomial, degree)
+        if stays(work.polynomial, degree, side, band):
+            continue
+        theta, end, row, side = bracket_crossing(
+            work.polynomial, degree, side, model.direction[transition], work.stack
+        )
+        if theta < end:
+            ends = work.stack[row, 2], work.stack[row, 2 + degree]
+            theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
+        if theta > 1.0 and side == run.side[transition] and on_guard == 0:
+            note_grazing(run, transition, degree, side, band, work)
+        if theta == NO_ROOT:
+            run.side[transition] = side
+        elif theta < earliest:
+            earliest, fired = theta, transition
+    return earliest, fired, proved

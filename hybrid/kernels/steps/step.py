@@ -1,0 +1,229 @@
+"""One step of an explicit Runge-Kutta pair, and what all methods share: rates, error ratio, interpolant."""
+
+import math
+
+from numba import boolean, float64, int64, njit, types, void
+
+from hybrid.kernels.types.layout import (
+    ATTEMPTS,
+    ENTRY,
+    INLINE,
+    KERNEL,
+    MATRIX,
+    METHOD,
+    MODEL,
+    PART,
+    RECORD,
+    RUN,
+    VECTOR,
+    WORK,
+)
+
+# A state that is smaller than this many tolerances is taken to be of this size as a run starts.
+MANY_TOLERANCES = 1e4
+# Share of a run, or of a forcing period, that is the unit of time of a state at rest.
+AT_REST = 1e-4
+
+
+@njit(**INLINE)
+def rates(model, mode, t, y, tangents, out):
+    """Time derivative of ``y (n (1 + k),)`` into ``out``; with tangents, div f in the place after it."""
+    if tangents == 0:
+        model.flow(mode, t, y, model.parameters, out)
+    else:
+        model.variational_flow(mode, t, y, model.parameters, out)
+
+
+@njit(**KERNEL)
+def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
+    """The same, without the divergence, by the Jacobian ``(n, n + 1)``, which is left in ``jacobian``.
+
+    Runs by series have no variational flow: it is compiled for explicit and implicit methods alone.
+    """
+    n = model.dimension
+    model.flow(mode, t, y, model.parameters, out)
+    if tangents > 0:
+        model.flow_jacobian(mode, t, y, model.parameters, jacobian)
+    for first in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            rate = 0.0
+            for j in range(n):
+                rate += jacobian[i, j] * y[first + j]
+            out[first + i] = rate
+
+
+@njit(void(MODEL, int64, float64, VECTOR, VECTOR), **ENTRY)
+def field(model, mode, t, x, out):
+    """``f`` into ``out (n,)``."""
+    model.flow(mode, t, x, model.parameters, out)
+
+
+@njit(void(MODEL, int64, float64, VECTOR, MATRIX), **ENTRY)
+def flow_jacobian(model, mode, t, x, out):
+    """``(D_x f, D_t f)`` into ``out (n, n + 1)``."""
+    model.flow_jacobian(mode, t, x, model.parameters, out)
+
+
+@njit(**INLINE)
+def combine(y, h, weights, stages, count, length, out):
+    """``out = y + h * weights @ stages`` over the first ``count`` stages and ``length`` components."""
+    for i in range(length):
+        out[i] = y[i]
+    for j in range(count):
+        weight = h * weights[j]
+        if weight != 0.0:
+            stage = stages[j]
+            for i in range(length):
+                out[i] += weight * stage[i]
+
+
+@njit(**INLINE)
+def estimate_error(method, length, work):
+    """The two embedded error estimates over the step's length, from its stages."""
+    error, second_error = work.error, work.second_error
+    for i in range(length):
+        error[i] = 0.0
+        second_error[i] = 0.0
+    for j in range(method.error.shape[0]):
+        weight, second_weight = method.error[j], method.second_error[j]
+        stage = work.stages[j]
+        if weight != 0.0 or second_weight != 0.0:
+            for i in range(length):
+                error[i] += weight * stage[i]
+                second_error[i] += second_weight * stage[i]
+
+
+@njit(**INLINE)
+def error_ratio(method, h, y, dimension, tangents, work):
+    """Largest ratio of estimated error to tolerance over the state and each tangent vector.
+
+    A tangent vector has no absolute size, so its components are weighed against themselves and against the
+    vector's root mean square. The two estimates are combined as in Hairer, Norsett and Wanner 1993, section
+    II.10.
+    """
+    n = dimension
+    length = n * (1 + tangents)
+    error, second_error, new = work.error, work.second_error, work.new
+    worst = 0.0
+    for start in range(0, length, n):
+        floor = method.atol
+        if start > 0:
+            square = 0.0
+            for i in range(start, start + n):
+                square += new[i] * new[i]
+            floor = method.rtol * math.sqrt(square / n) + 1e-300
+        first, second = 0.0, 0.0
+        for i in range(start, start + n):
+            scale = floor + method.rtol * max(abs(y[i]), abs(new[i]))
+            first += (error[i] / scale) ** 2
+            second += (second_error[i] / scale) ** 2
+        if first > 0.0:
+            worst = max(worst, h * first / math.sqrt((first + 0.01 * second) * n))
+        elif first != 0.0:
+            return math.nan
+    return worst
+
+
+@njit(**INLINE)
+def attempt_explicit(model, method, mode, t, h, y, tangents, work):
+    """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
+
+    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in
+    ``work.stages[s]``.
+    """
+    length = model.dimension * (1 + tangents)
+    s = method.b.shape[0]
+    for i in range(1, s):
+        combine(y, h, method.a[i], work.stages, i, length, work.trial)
+        rates(model, mode, t + method.c[i] * h, work.trial, tangents, work.stages[i])
+    combine(y, h, method.b, work.stages, s, length, work.new)
+    rates(model, mode, t + h, work.new, tangents, work.stages[s])
+    estimate_error(method, length, work)
+    return error_ratio(method, h, y, model.dimension, tangents, work)
+
+
+@njit(**INLINE)
+def interpolation_stages(model, method, mode, t, h, y, work):
+    """Evaluate the stages that only the interpolant of the last attempted step needs, for the state alone."""
+    n = model.dimension
+    for i in range(method.b.shape[0] + 1, method.a.shape[0]):
+        combine(y, h, method.a[i], work.stages, i, n, work.trial)
+        model.flow(mode, t + method.c[i] * h, work.trial, model.parameters, work.stages[i])
+
+
+@njit(**KERNEL)
+def interpolant_path(method, h, y, dimension, work):
+    """The state over the last step as powers of a place on [0, 1], into ``work.path (d + 1, n)``."""
+    count = method.a.shape[0]
+    for i in range(dimension):
+        work.path[0, i] = y[i]
+    for k in range(1, method.powers.shape[0]):
+        for i in range(dimension):
+            total = 0.0
+            for j in range(count):
+                total += method.powers[k, j] * work.stages[j, i]
+            work.path[k, i] = h * total
+
+
+@njit(**KERNEL)
+def starting_step(model, method, mode, t, y, tangents, remaining, work):
+    """A first step length from the sizes of ``y``, ``y'`` and ``y''`` (Hairer, Norsett, Wanner 1993, II.4).
+
+    The unit of time is that in which the state changes by its size, or by many tolerances where it is zero:
+    no unit of the model matters. A state at rest has none, and the end of the run or the forcing period
+    stands in. ``work.stages[0]`` holds the rates at ``(t, y)``; uses ``work.stages[1]`` as scratch.
+    """
+    n = model.dimension
+    length = n * (1 + tangents)
+    size, speed = 0.0, 0.0
+    for i in range(length):
+        scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
+        size += (y[i] / scale) ** 2
+        speed += (work.stages[0, i] / scale) ** 2
+    size, speed = math.sqrt(size / length), math.sqrt(speed / length)
+    horizon = min(model.period, remaining) if model.period > 0.0 else remaining
+    unit = max(size, MANY_TOLERANCES) / speed if speed > 0.0 else math.inf
+    unit = min(unit, (1.0 if speed > 0.0 else AT_REST) * horizon)
+    h = min(0.01 * unit, method.max_step)
+    for i in range(length):
+        work.trial[i] = y[i] + h * work.stages[0, i]
+    rates(model, mode, t + h, work.trial, tangents, work.stages[1])
+    bend = 0.0
+    for i in range(length):
+        scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
+        bend += ((work.stages[1, i] - work.stages[0, i]) / scale) ** 2
+    bend = math.sqrt(bend / length) / h
+    steepest = max(speed * unit, bend * unit * unit)
+    if not steepest > 1e-15:
+        return h
+    return min(100.0 * h, unit * (0.01 / steepest) ** method.exponent, method.max_step)
+
+
+@njit(**INLINE)
+def attempt(parts, model, method, mode, t, h, y, tangents, work):
+    """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
+
+    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in
+    ``work.stages[s]``. A ratio above 1, or nan, rejects the step.
+    """
+    if method.implicit != 0:
+        return parts.attempt_implicit(model, method, mode, t, h, y, tangents, work)
+    return attempt_explicit(model, method, mode, t, h, y, tangents, work)
+
+
+@njit(**KERNEL)
+def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
+    """``attempt``, for the places where a step is taken again: compiled once, not into each of them."""
+    return attempt(parts, model, method, mode, t, h, y, tangents, work)
+
+
+@njit(types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK), **PART)
+def no_step(parts, model, method, run, record, tangents, orthonormal, remaining, work):
+    """Stands in for the step of a Runge-Kutta method where every mode has a series."""
+    return math.nan, 0.0
+
+
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
+def no_attempt(model, method, mode, t, h, y, tangents, work):
+    """Stands in for the implicit step where the method is explicit."""
+    return math.nan

@@ -1,0 +1,482 @@
+"""Periodic orbits by Newton shooting, with the saltated fundamental matrix as the Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.compiler.compiled import compile_system
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types import codes
+from hybrid.orbits.factors import fundamental_factors
+from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.plan import check_solver
+from hybrid.simulation.simulate import simulate
+from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.solvers import DOP853, RungeKutta
+from hybrid.status import SUCCESS, Status, StatusCode
+from hybrid.system.graph import HybridSystem, as_system
+
+# Newton steps are halved down to this part before they are taken as they are.
+SHORTEST_STEP = 1 / 64
+# A shorter period, as a share of the guess, is no orbit.
+SHORTEST_PERIOD = 1e-3
+# Jumps of a guess that are looked at in the search for a point away from them.
+MOST_JUMPS_LOOKED_AT = 10_000
+# Points at which an orbit is looked at to see how far it moves, besides the solver's own.
+SAMPLES = 65
+EPSILON = float(np.finfo(float).eps)
+# Rounding of the end of an orbit, in units in the last place of its largest states: what Newton's method can
+# hope for, and what is accepted where it can do no better.
+FINEST_GAP, ROUNDING_OF_GAP = 4, 100
+# An autonomous orbit moves by more than this many times what is accepted as rounding.
+LEAST_MOTION = 1e3
+# Share of its states by which a point that hardly moves may still be wrong.
+POINT_ERROR = 1e-8
+# Where Newton's method cannot tell which of many orbits it is at, that is one only if it closes up to this
+# share of its motion, and is at most so many times larger than the solution through the guess.
+DRIFT = 1e-3
+FARTHEST = 1e3
+
+
+@attrs.frozen(eq=False, repr=False)
+class PeriodicOrbit:
+    """A periodic orbit, or the best that Newton's method came to.
+
+    Attributes
+    ----------
+    system, parameters
+        The model, and the overriding parameter values.
+    x0, mode, t0
+        A point of the orbit ``(n,)``, its mode, and the time there.
+    period
+        Time until the orbit closes: for a forced system ``periods`` forcing periods.
+    multipliers
+        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1. Each has its own
+        relative accuracy, however small: they come from the factors of the fundamental matrix along the
+        orbit.
+    log_moduli
+        Natural logarithms of the moduli of the multipliers ``(n,)``, also of those out of the range of
+        floating-point numbers; minus infinity for a multiplier of zero.
+    fundamental
+        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues the multipliers are; for
+        an autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the
+        orbit it is a similar matrix).
+    residual
+        Distance between the two ends over the period, in the units of the state.
+    iterations
+        Newton iterations used.
+    signature
+        Names of the modes in the order they are visited.
+    status
+        Whether Newton's method converged, and how far it got if not.
+    """
+
+    system: HybridSystem
+    parameters: Mapping[str, float]
+    x0: np.ndarray
+    mode: str
+    t0: float
+    period: float
+    multipliers: np.ndarray
+    log_moduli: np.ndarray
+    fundamental: np.ndarray
+    residual: float
+    iterations: int
+    signature: tuple[str, ...]
+    status: Status
+
+    def __repr__(self) -> str:
+        return (
+            f"<PeriodicOrbit period {self.period:.9g}, largest multiplier {abs(self.multipliers[0]):.6g}, "
+            f"residual {self.residual:.1e}, {self.status.code.name}>"
+        )
+
+    def arc(self, solver: RungeKutta | None = None) -> HybridArc:
+        """The orbit over one period."""
+        span = (self.t0, self.t0 + self.period)
+        return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
+
+
+def periodic_orbit(
+    system: HybridSystem,
+    x0: ArrayLike,
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    t0: float = 0.0,
+    periods: int = 1,
+    period: float | None = None,
+    solver: RungeKutta | None = None,
+    tolerance: float = 1e-10,
+    max_iterations: int = 30,
+) -> PeriodicOrbit:
+    """Periodic orbit near a guess, stable or not.
+
+    A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An
+    autonomous one closes after an unknown time near the guess ``period``; the point returned is the one
+    nearest to the guess among the solver's own.
+
+    Parameters
+    ----------
+    system, parameters
+        As for :func:`hybrid.simulate`.
+    x0, mode
+        Guess of a point of the orbit ``(n,)``, and the mode there.
+    t0, periods
+        Time at the guess, and number of forcing periods (forced systems).
+    period
+        Guess of the period (autonomous systems).
+    solver
+        By default ``DOP853(rtol=1e-12, atol=1e-14)``.
+    tolerance
+        Newton's method stops where the residual of each component is below ``tolerance`` times how far that
+        component moves over the period, or is rounding.
+    max_iterations
+        Most Newton steps.
+
+    Returns
+    -------
+    PeriodicOrbit
+        With a status that says how far it got if it did not converge. An equilibrium is no orbit of an
+        autonomous system; of a forced one it is, since it repeats after each forcing period.
+
+    Raises
+    ------
+    ArgumentError
+        If a forced system is given ``period``, an autonomous one is not, or another argument does not fit.
+
+    References
+    ----------
+    R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., Springer 2010, section 7.3,
+    doi:10.1007/978-1-4419-1740-9.
+
+    Examples
+    --------
+    >>> import models
+    >>> orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> orbit.status.ok
+    True
+    """
+    as_system("system", system)
+    periods = arguments.count("periods", periods, 1)
+    max_iterations = arguments.count("max_iterations", max_iterations, 0)
+    guess = arguments.state("x0", x0, system)
+    t0 = arguments.number("t0", t0)
+    tolerance = arguments.positive("tolerance", tolerance)
+    method = DOP853(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+    shooting = _Shooting(system, mode, parameters, method)
+    forcing = system.forcing_period(parameters)
+    if forcing is not None:
+        if period is not None:
+            raise ArgumentError(
+                f"period is for autonomous systems; this one has the forcing period {forcing}. Use periods=."
+            )
+        point = _Point(guess, t0, periods * forcing)
+        compile_system(system)
+        with CTRL_C:
+            return _kept(shooting.newton(point, False, tolerance, max_iterations))
+    if period is None:
+        raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
+    length = arguments.positive("period", period)
+    compile_system(system)
+    with CTRL_C:
+        return _kept(shooting.autonomous(_Point(guess, t0, length), tolerance, max_iterations))
+
+
+def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """The orbit, with a status that says so if the search was interrupted."""
+    if not CTRL_C.is_set():
+        return orbit
+    return attrs.evolve(orbit, status=interrupted_status("the best point so far"))
+
+
+@attrs.frozen(eq=False)
+class _Point:
+    """Unknowns of the shooting: a state, the time there, and the time to close."""
+
+    x: np.ndarray
+    t: float
+    period: float
+
+
+@attrs.frozen(eq=False)
+class _Shot:
+    """What one integration over the period gives.
+
+    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value.
+    """
+
+    point: _Point
+    mode: str
+    end: np.ndarray
+    end_mode: str
+    fundamental: np.ndarray
+    field: np.ndarray
+    end_field: np.ndarray
+    extent: np.ndarray
+    magnitude: np.ndarray
+    status: Status
+
+    @property
+    def gap(self) -> np.ndarray:
+        return self.end - self.point.x
+
+    @property
+    def whole(self) -> bool:
+        """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
+        return self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
+
+    def size(self, scale: np.ndarray) -> float:
+        """The residual in units of ``scale (n,)``, infinite where there is none."""
+        return float(np.linalg.norm(self.gap / scale)) if self.whole else np.inf
+
+    def closes(self, tolerance: float, rounding: np.ndarray) -> bool:
+        """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component."""
+        return self.whole and bool(np.all(np.abs(self.gap) <= np.maximum(tolerance * self.extent, rounding)))
+
+
+@attrs.frozen(eq=False)
+class _Shooting:
+    system: HybridSystem
+    mode: str | None
+    parameters: Mapping[str, float] | None
+    solver: RungeKutta
+
+    def shoot(self, point: _Point) -> _Shot:
+        trajectory = self._trajectory(point, self.mode)
+        mode, field = trajectory.mode, trajectory.field()
+        code = trajectory.advance(point.t + point.period, trajectory.no_record())
+        arc = self._follow(point, point.period, mode)
+        states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
+        return _Shot(
+            point,
+            mode,
+            trajectory.x,
+            trajectory.mode,
+            trajectory.tangent_matrix,
+            field,
+            trajectory.field(),
+            np.ptp(states, axis=0),
+            np.abs(states).max(axis=0),
+            trajectory.status(code),
+        )
+
+    def _trajectory(self, point: _Point, mode: str | None) -> Trajectory:
+        """A run from a point that carries the columns of the identity."""
+        return start(
+            self.system,
+            point.x,
+            point.t,
+            mode=mode,
+            parameters=self.parameters,
+            solver=self.solver,
+            tangent=np.eye(self.system.dimension),
+        )
+
+    def newton(
+        self, point: _Point, free_period: bool, tolerance: float, max_iterations: int
+    ) -> PeriodicOrbit:
+        """Newton's method from ``point``; the period may be unknown too."""
+        shot, iterations = self.shoot(point), 0
+        newton = _Newton.begin(shot, self.solver.atol, free_period)
+        while iterations < max_iterations and shot.whole:
+            if shot.closes(tolerance, FINEST_GAP * EPSILON * shot.magnitude):
+                break
+            better = self._along(shot, newton)
+            iterations += 1
+            if better is None:
+                break
+            shot = better
+            newton = attrs.evolve(newton, scale=np.maximum(newton.scale, shot.magnitude))
+        return self._result(shot, iterations, self._status(shot, newton, iterations, tolerance))
+
+    def _along(self, shot: _Shot, newton: _Newton) -> _Shot | None:
+        """The first shot along the step, halved as often as allowed, that closes better; else None."""
+        step, longer = newton.step(shot)
+        part = 1.0
+        while part >= SHORTEST_STEP:
+            period = shot.point.period + part * longer
+            if period > 0:
+                trial = self._tried(attrs.evolve(shot.point, x=shot.point.x + part * step, period=period))
+                if trial is not None and trial.size(newton.scale) < shot.size(newton.scale):
+                    return trial
+            part /= 2
+        return None
+
+    def _tried(self, point: _Point) -> _Shot | None:
+        """A shot, or None from a point that no mode allows."""
+        try:
+            return self.shoot(point)
+        except ArgumentError:
+            return None
+
+    def autonomous(self, guess: _Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
+        """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
+
+        At a jump the end of the shot would depend discontinuously on the period.
+        """
+        shift = self._quiet_time(guess)
+        shooting, moved = self._moved(guess, shift)
+        orbit = shooting.newton(moved, True, tolerance, max_iterations)
+        if orbit.period < SHORTEST_PERIOD * guess.period:
+            # Every point closes after no time at all.
+            status = Status(
+                StatusCode.NOT_CONVERGED,
+                f"The period shrank from {guess.period:.3g} to {orbit.period:.3g}: a point, no orbit.",
+                "Start nearer to the orbit, with a better guess of its period.",
+            )
+            return attrs.evolve(orbit, status=status)
+        if not orbit.status.ok:
+            return orbit
+        return self._nearest(orbit, guess)
+
+    def _quiet_time(self, guess: _Point) -> float:
+        """Time after the guess at which neither it nor one period later is close to a jump."""
+        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
+        candidates = np.linspace(0, guess.period, 201)[1:-1]
+        distance = np.minimum(
+            np.abs(candidates[:, None] - jumps).min(axis=1),
+            np.abs(candidates[:, None] + guess.period - jumps).min(axis=1),
+        )
+        return float(candidates[np.argmax(distance)])
+
+    def _moved(self, guess: _Point, shift: float) -> tuple[_Shooting, _Point]:
+        arc = self._follow(guess, shift, self.mode)
+        shooting = attrs.evolve(self, mode=str(arc.mode[-1]))
+        return shooting, _Point(arc.x[-1], guess.t + shift, guess.period)
+
+    def _nearest(self, orbit: PeriodicOrbit, guess: _Point) -> PeriodicOrbit:
+        """The same orbit from the point of its arc, both sides of jumps included, nearest to the guess."""
+        arc = orbit.arc(self.solver)
+        i = int(np.argmin(np.linalg.norm(arc.x - guess.x, axis=1)))
+        return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
+
+    def _result(self, shot: _Shot, iterations: int, status: Status) -> PeriodicOrbit:
+        eigenvalues = self._eigenvalues(shot)
+        return PeriodicOrbit(
+            system=self.system,
+            parameters=dict(self.parameters or {}),
+            x0=shot.point.x,
+            mode=shot.mode,
+            t0=shot.point.t,
+            period=shot.point.period,
+            multipliers=eigenvalues.values,
+            log_moduli=eigenvalues.log_moduli,
+            fundamental=shot.fundamental,
+            residual=float(np.linalg.norm(shot.gap)),
+            iterations=iterations,
+            signature=self._signature(shot),
+            status=status,
+        )
+
+    def _eigenvalues(self, shot: _Shot) -> ProductEigenvalues:
+        """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
+        trajectory = self._trajectory(shot.point, shot.mode)
+        factors, code = fundamental_factors(trajectory, shot.point.t + shot.point.period)
+        if code != codes.DONE or not all(np.all(np.isfinite(factor)) for factor in factors):
+            unknown = np.full(len(shot.end), np.nan)
+            return ProductEigenvalues(unknown, unknown.astype(complex))
+        return product_eigenvalues(factors)
+
+    def _signature(self, shot: _Shot) -> tuple[str, ...]:
+        arc = self._follow(shot.point, shot.point.period, shot.mode)
+        return (shot.mode, *(jump.target for jump in arc.jumps if jump.target is not None))
+
+    def _follow(self, point: _Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
+        """The arc from a point over a time, without tangent vectors."""
+        return simulate(
+            self.system,
+            point.x,
+            (point.t, point.t + span),
+            mode=mode,
+            parameters=self.parameters,
+            solver=self.solver,
+            max_jumps=max_jumps,
+        )
+
+    def _status(self, shot: _Shot, newton: _Newton, iterations: int, tolerance: float) -> Status:
+        """How Newton's method ended: with an orbit, or why there is none."""
+        if not shot.status.ok:
+            return shot.status
+        reason = self._objection(shot, newton, iterations, tolerance)
+        if reason is None:
+            return SUCCESS
+        return Status(
+            StatusCode.NOT_CONVERGED,
+            f"Newton's method did not converge: {reason}.",
+            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations.",
+        )
+
+    def _objection(self, shot: _Shot, newton: _Newton, iterations: int, tolerance: float) -> str | None:
+        """Why the last shot is no periodic orbit, or None if it is one.
+
+        The ends agree; the orbit moves, if nothing but its motion has a period; and what is left of Newton's
+        step is small. At infinity, or where a solution drifts, the ends may agree and that step is large. It
+        is arbitrary where orbits come in families: then the orbit has to be near to the guess, and to close.
+        """
+        if shot.end_mode != shot.mode:
+            return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
+        rounding = ROUNDING_OF_GAP * EPSILON * (shot.magnitude + np.abs(shot.fundamental) @ shot.magnitude)
+        # A component that is below the solver's absolute tolerance throughout counts as zero.
+        nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
+        if not shot.closes(tolerance, np.maximum(rounding, nothing)):
+            return f"the residual is {np.linalg.norm(shot.gap):.3g} after {iterations} iterations"
+        noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
+        if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
+            return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
+        step, _ = newton.step(shot)
+        enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
+        if np.all(np.abs(step) <= np.maximum(enough, nothing)):
+            return None
+        near = np.all(shot.extent <= FARTHEST * newton.first)
+        if near and np.all(np.abs(shot.gap) <= DRIFT * shot.extent):
+            return None
+        return (
+            f"the ends agree to {np.linalg.norm(shot.gap):.3g}, but the next step would move the start by "
+            f"{np.linalg.norm(step):.3g}: the solution drifts, or no orbit is near"
+        )
+
+
+@attrs.frozen(eq=False)
+class _Newton:
+    """Newton's step in units of ``scale (n,)``, so that the units of the states do not matter.
+
+    ``first (n,)`` is the scale of the first shot; where the period is unknown too the state stays in the
+    plane ``plane (n,)`` through ``anchor (n,)``, across the field there.
+    """
+
+    scale: np.ndarray
+    first: np.ndarray
+    free_period: bool
+    anchor: np.ndarray
+    plane: np.ndarray
+
+    @classmethod
+    def begin(cls, shot: _Shot, atol: float, free_period: bool) -> _Newton:
+        """From the first shot; sizes below the solver's absolute tolerance count as that."""
+        scale = np.maximum(shot.magnitude, max(atol, np.finfo(float).tiny))
+        return cls(scale, scale, free_period, shot.point.x, shot.field / scale**2)
+
+    def step(self, shot: _Shot) -> tuple[np.ndarray, float]:
+        """Newton step of the state and of the period."""
+        n, scale, period = len(shot.end), self.scale, shot.point.period
+        matrix = (shot.fundamental - np.eye(n)) / scale[:, None] * scale
+        gap = shot.gap / scale
+        if not self.free_period:
+            return np.linalg.lstsq(matrix, -gap, rcond=None)[0] * scale, 0.0
+        row = self.plane * scale
+        size = max(float(np.linalg.norm(row)), np.finfo(float).tiny)
+        bordered = np.block(
+            [[matrix, (shot.end_field / scale * period)[:, None]], [row[None, :] / size, np.zeros((1, 1))]]
+        )
+        right = np.append(-gap, -row @ ((shot.point.x - self.anchor) / scale) / size)
+        step = np.linalg.lstsq(bordered, right, rcond=None)[0]
+        return step[:n] * scale, float(step[n]) * period

@@ -1,0 +1,268 @@
+"""Sections of orbits: once a forcing period, or at each crossing of a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.display.progress import progress_bar
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types import codes
+from hybrid.simulation.interrupt import Bursts
+from hybrid.simulation.memory import empty_record
+from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
+from hybrid.solvers import RungeKutta
+from hybrid.status import Status
+from hybrid.system.graph import Guard, HybridSystem, Transition, as_system
+
+POINTS_AT_ONCE = 500
+# A surface that is not met within this many steps is taken to be missed for good.
+STEPS_BETWEEN_POINTS = 1_000_000
+MARKER = "section"
+
+
+@attrs.frozen(eq=False, repr=False)
+class Section:
+    """Points of an orbit on a section.
+
+    Attributes
+    ----------
+    t
+        Times ``(N,)``.
+    x
+        States ``(N, n)``.
+    mode
+        Names of the modes ``(N,)``.
+    jumps
+        Jumps since the point before ``(N,)``, crossings of the section not counted.
+    status
+        How the run ended.
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    mode: np.ndarray
+    jumps: np.ndarray
+    status: Status
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<Section of {len(self)} points, {self.status.code.name}>"
+
+
+def stroboscopic_section(
+    system: HybridSystem,
+    x0: ArrayLike,
+    *,
+    periods: int,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    transient: int = 0,
+    t0: float = 0.0,
+    solver: RungeKutta | None = None,
+    progress: bool = False,
+) -> Section:
+    """State once a forcing period, at the phase of ``t0``.
+
+    Parameters
+    ----------
+    system, x0, mode, parameters, solver
+        As for :func:`hybrid.simulate`; the system must declare a period.
+    periods, transient
+        Points to take, and forcing periods to run before the first of them counts.
+    t0
+        Time at the start; its phase is that of the section.
+    progress
+        Whether to show a progress bar.
+
+    Raises
+    ------
+    ArgumentError
+        If the system declares no period, or an argument does not fit it.
+
+    Examples
+    --------
+    >>> import models
+    >>> section = stroboscopic_section(models.impact_oscillator(), (0.0, 0.0), periods=10)
+    >>> section.x.shape
+    (10, 2)
+    """
+    periods = arguments.count("periods", periods, 1)
+    transient = arguments.count("transient", transient, 0)
+    progress = arguments.flag("progress", progress)
+    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
+    if trajectory.model.period <= 0:
+        raise ArgumentError(
+            "A stroboscopic section needs a forcing period, and the system declares none. "
+            "Give HybridSystem a period=, or use poincare_section."
+        )
+    chunks = [(np.empty((0, system.dimension)), np.empty((0, 3), dtype=np.int64))]
+    code, before = codes.DONE, 0
+    with trajectory.stop, progress_bar(transient + periods, "Section", progress, "period") as bar:
+        for kept, left in ((False, transient), (True, periods)):
+            while left > 0 and code == codes.DONE:
+                states, places, code = strobe(trajectory, min(left, POINTS_AT_ONCE))
+                if kept:
+                    chunks.append((states, places))
+                elif len(places):
+                    before = places[-1, 2]
+                left -= len(states)
+                bar.update(len(states))
+    states, places = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
+    cycle, index, count = places.T
+    return Section(
+        t=cycle * trajectory.model.period + trajectory.phase0,
+        x=states,
+        mode=np.array(system.mode_names)[index],
+        jumps=np.diff(count, prepend=before),
+        status=trajectory.status(code),
+    )
+
+
+def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, int]:
+    """States ``(N, n)`` and places ``(N, 3)`` of the next ``count`` periods at the phase of the start.
+
+    The places are cycle, mode and jump count; the code says why there may be fewer.
+    """
+    states = np.empty((count, trajectory.model.dimension))
+    places = np.empty((count, 3), dtype=np.int64)
+    kernel = entry(load_kernels("hybrid.kernels.events.sections").strobe)
+    record, bursts = trajectory.no_record(), Bursts([trajectory])
+    first, total, code = int(trajectory.run.count[codes.CYCLE]) + 1, 0, codes.GO_ON
+    # Points need no tangent vectors, which the trajectory may have.
+    plain = attrs.evolve(trajectory, tangents=0)
+    while code == codes.GO_ON:
+        done, code = kernel(
+            address(load_kernels().advance),
+            trajectory.parts,
+            trajectory.model,
+            trajectory.method,
+            trajectory.run,
+            record,
+            trajectory.work,
+            trajectory.phase0,
+            bursts.most(),
+            UNLIMITED,
+            states[total:],
+            places[total:],
+        )
+        total += done
+        code = bursts.judged(code)
+        if code == codes.GO_ON:
+            # The burst has ended within a period, which the kernel would begin anew.
+            code = plain.advance_to(first + total, trajectory.phase0, record)
+            if code == codes.DONE:
+                places[total] = trajectory.run.count[[codes.CYCLE, codes.MODE, codes.JUMPS]]
+                states[total] = trajectory.x
+                total += 1
+                code = codes.GO_ON if total < count else codes.DONE
+    return states[:total], places[:total], code
+
+
+def poincare_section(
+    system: HybridSystem,
+    x0: ArrayLike,
+    section: Guard,
+    *,
+    points: int,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    transient: int = 0,
+    t0: float = 0.0,
+    solver: RungeKutta | None = None,
+    progress: bool = False,
+) -> Section:
+    """State at each crossing of a surface, located as exactly as any event.
+
+    Parameters
+    ----------
+    system, x0, mode, parameters, solver
+        As for :func:`hybrid.simulate`.
+    section
+        Guard whose zeros are the surface; its direction says which crossings count.
+    points, transient
+        Points to take, and crossings to let pass before.
+    t0
+        Time at the start.
+    progress
+        Whether to show a progress bar.
+
+    Returns
+    -------
+    Section
+        With fewer points and a status if the surface is no longer met.
+
+    Raises
+    ------
+    ArgumentError
+        If ``section`` is not a Guard, or another argument does not fit.
+
+    Examples
+    --------
+    >>> import models
+    >>> apex = Guard(lambda t, x, p: x.v, direction=-1)
+    >>> section = poincare_section(models.bouncing_ball(), (1.0, 0.0), apex, points=3)
+    >>> [round(float(q), 4) for q in section.x[:, 0]]
+    [0.64, 0.4096, 0.2621]
+    """
+    points = arguments.count("points", points, 1)
+    transient = arguments.count("transient", transient, 0)
+    progress = arguments.flag("progress", progress)
+    arguments.instance("section", section, Guard, "Write Guard(function, direction=...).")
+    marked = with_section(as_system("system", system), section)
+    trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
+    with trajectory.stop, progress_bar(transient + points, "Section", progress, "point") as bar:
+        return _collect(trajectory, len(system.modes), transient, points, bar)
+
+
+def with_section(system: HybridSystem, section: Guard) -> HybridSystem:
+    """The system with a marker transition in every mode, in the order of the modes.
+
+    They come first: where an event lies on the section, the point before it counts.
+    """
+    markers = [Transition(name, name, section, name=f"{MARKER} in {name}") for name in system.mode_names]
+    return attrs.evolve(system, transitions=(*markers, *system.transitions))
+
+
+def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, bar: Any) -> Section:
+    model = trajectory.model
+    record = empty_record(model.dimension, 0, 0, POINTS_AT_ONCE)
+    rows: list[tuple[np.ndarray, ...]] = []
+    found, jumps, steps_at_point, status = 0, 0, 0, None
+    while found < transient + points:
+        limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
+        code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
+        used = record.used[1]
+        cycle, transition = record.jump_place[:used, :2].T
+        marked = transition < markers
+        counts = jumps + np.cumsum(~marked)
+        rows.append(
+            (
+                (cycle * model.period + record.jump_time[:used, 0])[marked],
+                record.jump_states[:used, 0][marked],
+                transition[marked],
+                counts[marked],
+            )
+        )
+        jumps = int(counts[-1]) if used else jumps
+        found += int(marked.sum())
+        if marked.any():
+            steps_at_point = int(trajectory.run.count[codes.STEPS])
+        bar.update(int(marked.sum()))
+        record.used[:] = 0
+        if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):
+            status = trajectory.status(code)
+            break
+    t, x, index, count = (np.concatenate(column)[: transient + points] for column in zip(*rows, strict=True))
+    steps = np.diff(count, prepend=0)
+    keep = slice(transient, None)
+    names = np.array(trajectory.system.mode_names)
+    return Section(t[keep], x[keep], names[index[keep]], steps[keep], status or trajectory.status(codes.DONE))

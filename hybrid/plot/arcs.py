@@ -1,0 +1,173 @@
+"""Arcs over time, and one component over another."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.plot.style import as_component, axes_for, colour_of, legend, plain
+from hybrid.simulation.arc import HybridArc
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+JUMP_COLOUR = "0.35"
+# Points drawn within each step of the solver, from the dense output.
+POINTS_A_STEP = 8
+
+
+def plot_arc(
+    arc: HybridArc,
+    components: Iterable[str | int] | None = None,
+    *,
+    ax: Axes | Iterable[Axes] | None = None,
+) -> np.ndarray:
+    """Draw an arc over time: a row a component, a colour a mode, a dotted line where the state is reset.
+
+    Parameters
+    ----------
+    arc
+        From :func:`hybrid.simulate`; between steps it is drawn from its dense output.
+    components
+        Names or indices of the state's components, all by default.
+    ax
+        Axes to draw into, one a component; by default those of a new figure.
+
+    Returns
+    -------
+    numpy.ndarray
+        The axes, one a component.
+
+    Raises
+    ------
+    ArgumentError
+        If a component does not exist, or the number of axes differs from that of components.
+    """
+    names = _as_arc(arc).system.state_names
+    chosen = range(len(names)) if components is None else _components(arc.system, components)
+    axes = axes_for(ax, len(chosen))
+    lines = _lines(arc)
+    for row, i in zip(axes, chosen, strict=True):
+        for mode, (t, x) in lines.items():
+            row.plot(t, x[:, i], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
+        t = np.repeat(arc.jumps.t, 3)
+        ends = _with_gaps(arc.jumps.x_minus[:, i], arc.jumps.x_plus[:, i])
+        row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
+        _shade(row, lines)
+        row.set_ylabel(names[i])
+        row.margins(x=0)
+        plain(row)
+    if len(axes):
+        axes[-1].set_xlabel("t")
+        legend(axes[0], arc.system, lines)
+    return axes
+
+
+def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = None) -> Axes:
+    """Draw one component of an arc over another: a colour a mode, jumps dashed, a dot at the start.
+
+    Parameters
+    ----------
+    arc
+        From :func:`hybrid.simulate`; between steps it is drawn from its dense output.
+    x, y
+        Names or indices of the state's components.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ArgumentError
+        If a component does not exist.
+    """
+    system = _as_arc(arc).system
+    i, j = as_component("x", system, x), as_component("y", system, y)
+    (ax,) = axes_for(ax, 1, figsize=(5.0, 4.2))
+    lines = _lines(arc)
+    for mode, (_, states) in lines.items():
+        ax.plot(states[:, i], states[:, j], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
+    before, after = arc.jumps.x_minus, arc.jumps.x_plus
+    ax.plot(
+        _with_gaps(before[:, i], after[:, i]),
+        _with_gaps(before[:, j], after[:, j]),
+        color=JUMP_COLOUR,
+        linewidth=0.9,
+        linestyle=(0, (4, 3)),
+        zorder=1,
+    )
+    if len(arc.x):
+        ax.plot(arc.x[0, i], arc.x[0, j], "o", color="black", markersize=4)
+    ax.set_xlabel(arc.system.state_names[i])
+    ax.set_ylabel(arc.system.state_names[j])
+    plain(ax)
+    legend(ax, arc.system, lines)
+    return ax
+
+
+def _as_arc(arc: object) -> HybridArc:
+    return arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.")
+
+
+def _components(system: HybridSystem, components: object) -> list[int]:
+    given = arguments.items("components", components, "be names or indices of components of the state")
+    return [as_component("components", system, each) for each in given]
+
+
+def _lines(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Times and states of each mode visited, its stays separated by a row of nan."""
+    parts: defaultdict[int, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
+    cuts = np.flatnonzero(np.diff(arc.j)) + 1
+    gap = (np.array([np.nan]), np.full((1, arc.system.dimension), np.nan))
+    bounds = [0, *cuts.tolist(), len(arc.t)] if len(arc.t) else [0]
+    for first, last in pairwise(bounds):
+        stay = _refined(arc, arc.t[first:last], arc.x[first:last])
+        parts[arc.system.mode_index(str(arc.mode[first]))] += [stay, gap]
+    return {
+        mode: (np.concatenate([t for t, _ in parts[mode]]), np.concatenate([x for _, x in parts[mode]]))
+        for mode in sorted(parts)
+    }
+
+
+def _refined(arc: HybridArc, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same points, with more between them where the arc has dense output."""
+    if arc._pieces is None or len(t) < 2:
+        return t, x
+    part = np.linspace(0, 1, POINTS_A_STEP + 1)[:-1]
+    times = (t[:-1, None] + np.diff(t)[:, None] * part).ravel()
+    states = arc(times)
+    states[::POINTS_A_STEP] = x[:-1]
+    return np.append(times, t[-1]), np.vstack([states, x[-1]])
+
+
+def _with_gaps(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """``before, after, nan`` for each jump, so that one line draws them all."""
+    return np.column_stack([before, after, np.full(len(before), np.nan)]).ravel()
+
+
+def _shade(ax: Axes, lines: dict[int, tuple[np.ndarray, np.ndarray]]) -> None:
+    """Tint the background wherever the mode is not the first."""
+    for mode, (t, _) in lines.items():
+        if mode == 0:
+            continue
+        ends = np.flatnonzero(np.isnan(t))
+        starts = np.concatenate([[0], ends[:-1] + 1])
+        spans = list(zip(t[starts], t[ends - 1] - t[starts], strict=True))
+        ax.broken_barh(
+            spans,
+            (0, 1),
+            transform=ax.get_xaxis_transform(),
+            facecolor=colour_of(mode),
+            alpha=0.12,
+            linewidth=0,
+            zorder=0,
+        )

@@ -1,0 +1,191 @@
+"""The graph of a system: modes as boxes, transitions as arrows."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.plot.style import axes_for, colour_of
+from hybrid.system.graph import END, HybridSystem, Transition, as_system
+
+if TYPE_CHECKING:
+    import networkx as nx
+    from matplotlib.axes import Axes
+
+# Arrows of a guard's direction.
+DIRECTIONS = {-1: "↓", 0: "↕", 1: "↑"}
+# Degrees between the loops of one mode.
+FAN = 60.0
+LABEL: dict[str, Any] = {"fontsize": 10, "bbox": {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}}
+
+
+def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
+    """Draw the mode graph: modes as boxes, transitions as arrows that say how their guard crosses zero.
+
+    An upward arrow marks a guard that rises through zero, a downward one a guard that falls; dashed edges
+    reset the state. Modes have the colours they have in the other pictures; a dot is the end of a run.
+
+    Parameters
+    ----------
+    system
+        The model.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    graph = as_system("system", system).graph
+    crowd = len(graph)
+    (ax,) = axes_for(ax, 1, figsize=((4.0, 2.6), (6.0, 2.8), (7.0, 6.0))[min(crowd, 3) - 1])
+    where = _places(graph)
+    boxes = {
+        mode: _draw_mode(ax, mode, where[mode], colour_of(system.mode_index(mode)))
+        for mode in system.mode_names
+    }
+    if END in graph:
+        boxes[END] = _draw_end(ax, where[END])
+    parallel: Counter[tuple[str, str]] = Counter()
+    loops: defaultdict[str, list[Transition]] = defaultdict(list)
+    for transition in system.transitions:
+        ends = (transition.source, END if transition.target is None else transition.target)
+        if ends[0] == ends[1]:
+            loops[ends[0]].append(transition)
+            continue
+        bend = 0.28 + 0.3 * parallel[ends]
+        parallel[ends] += 1
+        # Among many modes edges cross near their middles, so their labels stand before.
+        _draw_edge(
+            ax,
+            transition,
+            [where[end] for end in ends],
+            bend,
+            0.5 if crowd <= 2 else 0.38,
+            [boxes[end] for end in ends],
+        )
+    for mode, around in loops.items():
+        outward = where[mode] if crowd > 2 else np.array([0.0, 1.0])
+        middle = np.degrees(np.arctan2(outward[1], outward[0]))
+        for slot, transition in enumerate(around):
+            angle = middle + FAN * (slot - (len(around) - 1) / 2)
+            _draw_loop(ax, transition, where[mode], np.radians(angle))
+    _frame(ax, np.array(list(where.values())), bool(loops))
+    ax.text(0.5, 0.0, _key(system), transform=ax.transAxes, ha="center", va="top", fontsize=8, color="0.35")
+    return ax
+
+
+def _places(graph: nx.MultiDiGraph) -> dict[str, np.ndarray]:
+    """One mode or two in a row, more of them on a circle."""
+    import networkx as nx
+
+    if len(graph) <= 2:
+        return {mode: np.array([2.2 * i, 0.0]) for i, mode in enumerate(graph)}
+    return dict(nx.circular_layout(graph))
+
+
+def _key(system: HybridSystem) -> str:
+    key = "↑ guard rises through zero   ↓ falls"
+    if any(transition.guard.direction == 0 for transition in system.transitions):
+        key += "   ↕ either"
+    if any(transition.reset is not None for transition in system.transitions):
+        key += "   dashed: resets the state"
+    return key
+
+
+def _draw_mode(ax: Axes, mode: str, place: np.ndarray, colour: str) -> Any:
+    style = {"boxstyle": "round,pad=0.6,rounding_size=0.9", "fc": "white", "ec": colour, "lw": 1.8}
+    text = ax.text(place[0], place[1], mode, ha="center", va="center", fontsize=12, zorder=4, bbox=style)
+    return text.get_bbox_patch()
+
+
+def _draw_end(ax: Axes, place: np.ndarray) -> Any:
+    style = {"boxstyle": "circle,pad=0.25", "fc": "black", "ec": "black"}
+    return ax.text(place[0], place[1], " ", ha="center", va="center", zorder=4, bbox=style).get_bbox_patch()
+
+
+def _draw_edge(
+    ax: Axes,
+    transition: Transition,
+    places: Sequence[np.ndarray],
+    bend: float,
+    along: float,
+    boxes: Sequence[Any],
+) -> None:
+    """A bent arrow between two boxes, with its label at the part ``along`` of its Bezier curve."""
+    start, end = places
+    style = {
+        **_arrow(transition),
+        "connectionstyle": f"arc3,rad={bend}",
+        "patchA": boxes[0],
+        "patchB": boxes[1],
+        "shrinkA": 1,
+        "shrinkB": 1,
+    }
+    ax.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=style, zorder=2)
+    across = end - start
+    control = (start + end) / 2 + bend * np.array([across[1], -across[0]])
+    middle = (1 - along) ** 2 * start + 2 * along * (1 - along) * control + along**2 * end
+    ax.text(middle[0], middle[1], _label(transition), ha="center", va="center", zorder=3, **LABEL)
+
+
+def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float) -> None:
+    """A loop of fixed size, in points, that leaves and enters the box on the side of ``angle``."""
+    from matplotlib.patches import FancyArrowPatch
+    from matplotlib.path import Path
+    from matplotlib.transforms import Affine2D, ScaledTranslation
+
+    out, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    # Where a ray meets the box, half as wide as the name and its margins.
+    foot = min((3.6 * len(transition.source) + 9) / max(abs(out[0]), 1e-9), 15 / max(abs(out[1]), 1e-9)) + 2
+    far = foot + 46
+    vertices = [
+        (foot - 4) * out - 8 * side,
+        far * out - 34 * side,
+        far * out + 34 * side,
+        foot * out + 8 * side,
+    ]
+    path = Path(vertices, [Path.MOVETO, Path.CURVE4, Path.CURVE4, Path.CURVE4])
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    points = Affine2D().scale(1 / 72) + figure.dpi_scale_trans
+    patch = FancyArrowPatch(path=path, **_arrow(transition), zorder=2, clip_on=False)
+    patch.set_transform(points + ScaledTranslation(place[0], place[1], ax.transData))  # type: ignore[arg-type]
+    ax.add_patch(patch)
+    ax.annotate(
+        _label(transition),
+        xy=tuple(place),
+        xytext=tuple((far - 6) * out),
+        textcoords="offset points",
+        ha="center" if abs(out[0]) < 0.4 else ("left" if out[0] > 0 else "right"),
+        va="center" if abs(out[1]) < 0.4 else ("bottom" if out[1] > 0 else "top"),
+        zorder=3,
+        **LABEL,
+    )
+
+
+def _arrow(transition: Transition) -> dict[str, Any]:
+    return {
+        "arrowstyle": "-|>",
+        "mutation_scale": 13,
+        "linewidth": 1.2,
+        "color": "0.25",
+        "linestyle": "-" if transition.reset is None else (0, (4, 2.5)),
+    }
+
+
+def _label(transition: Transition) -> str:
+    return f"{transition.name} {DIRECTIONS[transition.guard.direction]}"
+
+
+def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:
+    """Limits with room for labels and loops, and nothing else to see."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    row = high[1] - low[1] < 1e-9
+    ax.set_xlim(low[0] - 0.7, high[0] + 0.7)
+    ax.set_ylim(low[1] - (0.65 if row else 0.6), high[1] + (1.0 if loops and row else 0.65))
+    ax.set_aspect("equal", adjustable="box")
+    ax.set_axis_off()

@@ -1,0 +1,79 @@
+"""What all pictures share: colours, axes and legends. Matplotlib is imported when one is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.errors import ArgumentError
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito's palette, told apart with any colour vision, the faintest hues last: a colour a mode.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+
+
+def as_component(name: str, system: HybridSystem, component: object) -> int:
+    """Index of a component of the state, given by name or index in the argument ``name``."""
+    names = system.state_names
+    if isinstance(component, int | np.integer) and not isinstance(component, bool):
+        if not -len(names) <= component < len(names):
+            raise ArgumentError(
+                f"{name}: State component {component} does not exist; the state has {len(names)}."
+            )
+        return int(component) % len(names)
+    return names.index(arguments.known(f"{name}: State component", component, names, "State components"))
+
+
+def as_axes(name: str, value: object) -> Axes:
+    """Axes of matplotlib, or an ArgumentError."""
+    from matplotlib.axes import Axes
+
+    return arguments.instance(name, value, Axes, "Make them with matplotlib.pyplot.subplots.")
+
+
+def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) -> np.ndarray:
+    """The axes given, or a new figure's, as an array of ``count``."""
+    if ax is None:
+        import matplotlib.pyplot as plt
+
+        size = figsize or (7.0, 0.8 + 1.5 * count)
+        return plt.subplots(count, 1, sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
+    axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
+    for each in axes:
+        as_axes("ax", each)
+    if len(axes) != count:
+        raise ArgumentError(f"ax must hold {count} axes, one per component; got {len(axes)}.")
+    return axes
+
+
+def colour_of(mode: int) -> str:
+    """The colour of the mode of that index."""
+    return COLOURS[mode % len(COLOURS)]
+
+
+def plain(ax: Axes) -> None:
+    """Leave out the frame above and to the right."""
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def legend(ax: Axes, system: HybridSystem, modes: Iterable[int]) -> None:
+    """Name the modes above the axes, if the system has more than one."""
+    if len(system.modes) < 2:
+        return
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], color=colour_of(mode), label=system.mode_names[mode]) for mode in modes]
+    ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
+        ncols=len(handles),
+        frameon=False,
+        borderaxespad=0.2,
+    )

@@ -1,0 +1,120 @@
+"""Error over time, one line per method."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.plot.style import COLOURS, axes_for, plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARKERS = "osD^vP*"
+# Height of a line of small text in points, to keep labels apart.
+LABEL_HEIGHT = 9.0
+
+
+class Measurement(Protocol):
+    """What is drawn: times and errors of methods, as :func:`hybrid.work_precision` measures them."""
+
+    @property
+    def methods(self) -> Sequence[str]:
+        """Names of the methods."""
+        ...
+
+    @property
+    def seconds(self) -> np.ndarray:
+        """Seconds taken, one per row."""
+        ...
+
+    @property
+    def reference_error(self) -> Mapping[str, float]:
+        """Error of the reference itself, by quantity."""
+        ...
+
+    def rows_of(self, method: str) -> np.ndarray:
+        """Which rows are those of a method, as a mask."""
+        ...
+
+    def error_of(self, quantity: str) -> np.ndarray:
+        """Errors of a quantity, one per row."""
+        ...
+
+
+def plot_work_precision(result: Measurement, quantity: str = "state", *, ax: Axes | None = None) -> Axes:
+    """Draw error over time on logarithmic scales: one line per method, the reference's own error in grey.
+
+    Nearer to the lower left is better. Failed runs and errors of exactly zero are not drawn.
+
+    Parameters
+    ----------
+    result
+        From :func:`hybrid.work_precision`.
+    quantity
+        Which error: ``"state"``, ``"times"``, ``"saltation"``, ``"fundamental"`` or ``"exponents"``.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ArgumentError
+        If the quantity was not measured.
+    """
+    if not hasattr(result, "error_of"):
+        raise arguments.refusal("result", "be a WorkPrecision, from hybrid.work_precision", result)
+    error = result.error_of(quantity)
+    (ax,) = axes_for(ax, 1, figsize=(6.4, 4.6))
+    ends = []
+    for index, method in enumerate(result.methods):
+        rows = result.rows_of(method) & np.isfinite(error) & (error > 0)
+        if not np.any(rows):
+            continue
+        colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index // len(COLOURS) % len(MARKERS)]
+        ax.loglog(result.seconds[rows], error[rows], marker=marker, color=colour, markersize=4, linewidth=1.4)
+        ends.append((float(result.seconds[rows][-1]), float(error[rows][-1]), method, colour))
+    floor = result.reference_error[quantity]
+    if ends and np.isfinite(floor) and floor > 0:
+        low = ax.get_ylim()[0]
+        ax.axhspan(min(floor, low) / 10, floor, color="0.88", linewidth=0, zorder=0)
+        ax.set_ylim(bottom=min(low, floor / 3))
+    ax.set_xlabel("seconds")
+    ax.set_ylabel(f"error of the {quantity}")
+    plain(ax)
+    _label_ends(ax, ends)
+    return ax
+
+
+def _label_ends(ax: Axes, ends: list[tuple[float, float, str, str]]) -> None:
+    """Names to the right of their points, pushed apart where one would cover another."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    # Limits before the layout, or it would shift what the labels were placed by.
+    low, high = ax.get_xlim()
+    ax.set_xlim(low, high * (high / low) ** 0.45)
+    figure.draw_without_rendering()
+    point = figure.dpi / 72
+    placed: list[tuple[float, float, float]] = []
+    for seconds, error, method, colour in sorted(ends, key=lambda end: end[1]):
+        x, y = ax.transData.transform((seconds, error)) / point
+        width, height = 0.55 * LABEL_HEIGHT * len(method), y
+        for left, right, other in sorted(placed, key=lambda label: label[2]):
+            if left < x + width and x < right and abs(height - other) < LABEL_HEIGHT:
+                height = other + LABEL_HEIGHT
+        placed.append((x, x + width, height))
+        ax.annotate(
+            method,
+            (seconds, error),
+            (6.0, height - y),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+            color=colour,
+        )

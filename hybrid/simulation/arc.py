@@ -1,0 +1,326 @@
+"""Solutions over hybrid time: smooth pieces joined by jumps (Goebel, Sanfelice and Teel 2012)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Any, overload
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.compiled import compile_system
+from hybrid.errors import ArgumentError
+from hybrid.simulation.saltation import matrices_at
+from hybrid.status import Status
+from hybrid.system.graph import HybridSystem
+
+# In the order of the kernel's codes.
+KINDS = ("transverse", "grazing", "limit")
+
+
+@attrs.frozen(eq=False)
+class Jump:
+    """One fired transition at hybrid time ``(t, j)``.
+
+    Attributes
+    ----------
+    t, j
+        Time, and the number of jumps before this one.
+    transition, source, target
+        Names of the transition and of the modes before and after; ``target`` is None where it ended the run.
+    x_minus, x_plus
+        States ``(n,)`` before and after.
+    transversality
+        ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the
+        saltation matrix grows without bound, unless the jump was set off by another.
+    """
+
+    t: float
+    j: int
+    transition: str
+    source: str
+    target: str | None
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+    transversality: float
+    kind: str
+    _all: Jumps = attrs.field(repr=False)
+
+    @property
+    def saltation(self) -> np.ndarray:
+        """Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
+
+        Where a jump sets off others at once, by landing beyond their guards, their time is that of its own
+        guard: the product of the matrices is then the tangent map of all of them, if those before the last
+        can be inverted.
+        """
+        return self._all.saltation[self.j]
+
+
+@attrs.frozen(eq=False)
+class Grazing:
+    """A guard that comes closer to zero than the tolerances can tell, and turns back: a touch, not a jump.
+
+    Attributes
+    ----------
+    t, j
+        Time, and the number of jumps before.
+    transition
+        Name of the transition that did not fire.
+    x
+        State ``(n,)``.
+    value, acceleration
+        The guard and its second derivative along the flow there; its speed is zero.
+    """
+
+    t: float
+    j: int
+    transition: str
+    x: np.ndarray
+    value: float
+    acceleration: float
+
+
+@attrs.frozen(eq=False, repr=False)
+class Jumps(Sequence[Jump]):
+    """The jumps of an arc in order, each made when looked at; the arrays hold all of them."""
+
+    system: HybridSystem
+    _parameters: np.ndarray
+    _period: float
+    _time: np.ndarray
+    _place: np.ndarray
+    _states: np.ndarray
+    _recorded: np.ndarray
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Times ``(jumps,)``."""
+        return self._place[:, 0] * self._period + self._time[:, 0]
+
+    @property
+    def transversality(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps,)``."""
+        return self._time[:, 1]
+
+    @property
+    def transition(self) -> np.ndarray:
+        """Indices ``(jumps,)`` into the system's transitions."""
+        return self._place[:, 1]
+
+    @property
+    def kind(self) -> np.ndarray:
+        """Indices ``(jumps,)`` into ``KINDS``."""
+        return self._place[:, 2]
+
+    @property
+    def x_minus(self) -> np.ndarray:
+        """States before the jumps, ``(jumps, n)``."""
+        return self._states[:, 0]
+
+    @property
+    def x_plus(self) -> np.ndarray:
+        """States after the jumps, ``(jumps, n)``."""
+        return self._states[:, 1]
+
+    @cached_property
+    def saltation(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
+        missing = np.flatnonzero(self._place[:, 3] == 0)
+        if not missing.size:
+            return self._recorded
+        fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
+        parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
+        model = compile_system(self.system).model(parameters)
+        matrices = np.empty((len(self), *self._recorded.shape[1:]))
+        matrices[self._place[:, 3] == 1] = self._recorded
+        matrices[missing], _ = matrices_at(
+            self.system, model, fired, phases, np.ascontiguousarray(self.x_minus[missing])
+        )
+        return matrices
+
+    def __len__(self) -> int:
+        return len(self._place)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} jumps>"
+
+    @overload
+    def __getitem__(self, index: int) -> Jump: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Jump]: ...
+    def __getitem__(self, index: int | slice) -> Jump | list[Jump]:
+        if isinstance(index, slice):
+            return [self._jump(i) for i in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"jump {index} of an arc with {len(self)} jumps")
+        return self._jump(index % len(self))
+
+    def __iter__(self) -> Iterator[Jump]:
+        return (self._jump(i) for i in range(len(self)))
+
+    def _jump(self, i: int) -> Jump:
+        transition = self.system.transitions[self.transition[i]]
+        kind = KINDS[self.kind[i]]
+        target = transition.accumulates_to if kind == "limit" else transition.target
+        return Jump(
+            float(self.t[i]),
+            i,
+            transition.name,
+            transition.source,
+            target or transition.target,
+            self.x_minus[i],
+            self.x_plus[i],
+            float(self.transversality[i]),
+            kind,
+            self,
+        )
+
+
+@attrs.frozen(eq=False)
+class Pieces:
+    """The smooth steps of a run: ``S`` polynomials, each of its place on ``[0, 1]``.
+
+    Attributes
+    ----------
+    t, low, h
+        Start of each step, what the start has lost in rounding, and length, ``(S,)``.
+    mode, j
+        Mode index and jump count of each, ``(S,)``.
+    coefficients
+        ``(S, d + 1, n + 1)`` of the powers ``1, theta, theta^2, ...``, of the state and, last, of the time
+        since the start of the step. The variable of a desingularised mode is not proportional to time.
+    """
+
+    t: np.ndarray
+    low: np.ndarray
+    h: np.ndarray
+    mode: np.ndarray
+    j: np.ndarray
+    coefficients: np.ndarray
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States ``(len(times), n)`` and the index of the step each was taken from; at a jump, after it."""
+        states = np.empty((len(times), self.coefficients.shape[2] - 1))
+        index = np.empty(len(times), dtype=np.int64)
+        kernel = entry(load_kernels("hybrid.kernels.steps.dense").states_at)
+        kernel(np.ascontiguousarray(times), self.t, self.low, self.h, self.coefficients, states, index)
+        return states, index
+
+
+@attrs.frozen(eq=False, repr=False)
+class HybridArc:
+    """A solution over hybrid time ``(t, j)``.
+
+    Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step.
+    With ``samples`` they are the states at those times, at a jump the state after it.
+
+    Attributes
+    ----------
+    system, parameters
+        The model and the parameter values ``(m,)`` of the run.
+    t, j, x
+        Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``.
+    jumps
+        Sequence of :class:`Jump`.
+    grazings
+        Each :class:`Grazing`, in order.
+    status
+        How the run ended; what was computed is here even where it ended early.
+    fundamental
+        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices,
+        if they were asked for.
+    propagators
+        How each mode was advanced, by its name: ``"exact"``, ``"Taylor series"``, ``"Taylor series,
+        desingularised"``, ``"Taylor series, with the root of a guard"`` or ``"Runge-Kutta pair"``. Where
+        every mode is exact no crossing was missed that rounding does not hide.
+    steps, rejected
+        Steps tried, and how many of them the error control rejected.
+    """
+
+    system: HybridSystem
+    parameters: np.ndarray
+    t: np.ndarray
+    j: np.ndarray
+    x: np.ndarray
+    _mode_index: np.ndarray
+    jumps: Jumps
+    grazings: tuple[Grazing, ...]
+    status: Status
+    fundamental: np.ndarray | None
+    propagators: dict[str, str]
+    steps: int
+    rejected: int
+    _pieces: Pieces | None
+
+    @cached_property
+    def mode(self) -> np.ndarray:
+        """Names of the modes, ``(N,)``."""
+        return np.array(self.system.mode_names)[self._mode_index]
+
+    def __repr__(self) -> str:
+        span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
+        return f"<HybridArc {span}, {len(self.jumps)} jumps, {self.status.code.name}>"
+
+    def __call__(self, t: ArrayLike) -> np.ndarray:
+        """State at time ``t``, a scalar or an array, from the dense output: ``t.shape + (n,)``.
+
+        At the time of a jump this is the state after it.
+
+        Raises
+        ------
+        ArgumentError
+            If a time lies outside the run, or the run kept samples only.
+        """
+        times = arguments.numbers("t", t, "be a time or an array of times")
+        if self._pieces is None:
+            raise ArgumentError(
+                "This arc keeps samples only. Run simulate without samples= for dense output."
+            )
+        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
+            raise ArgumentError(
+                f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
+            )
+        flat = times.ravel()
+        if len(self._pieces.t) == 0:
+            return np.broadcast_to(self.x[-1], (*times.shape, self.system.dimension)).copy()
+        states, _ = self._pieces.at(flat)
+        # A step ends at its jump, but the end of the run may be after it.
+        states[flat >= self.t[-1]] = self.x[-1]
+        return states.reshape(*times.shape, self.system.dimension)
+
+
+def hybrid_points(
+    system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times, jump counts, states, mode indices in order: step starts, states before jumps, the end."""
+    t_end, x_end, mode_end = end
+    count = np.arange(len(jumps))
+    # The state before a jump follows the starts of all steps with as many jumps.
+    before = np.searchsorted(pieces.j, count, side="right") + count
+    starts = np.ones(len(pieces.t) + len(jumps) + 1, dtype=bool)
+    starts[before] = starts[-1] = False
+
+    def in_order(of_steps: np.ndarray, of_jumps: np.ndarray, at_end: Any) -> np.ndarray:
+        column = np.empty((len(starts), *of_steps.shape[1:]), of_steps.dtype)
+        column[starts], column[before], column[-1] = of_steps, of_jumps, at_end
+        return column
+
+    sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
+    return (
+        in_order(pieces.t, jumps.t, t_end),
+        in_order(pieces.j, count, len(jumps)),
+        in_order(pieces.coefficients[:, 0, :-1], jumps.x_minus, x_end),
+        in_order(pieces.mode, sources[jumps.transition], mode_end),
+    )
+
+
+def join(chunks: list[tuple[Any, ...]]) -> tuple[np.ndarray, ...]:
+    """Concatenate the columns of rows of arrays."""
+    if len(chunks) == 1:
+        return chunks[0]
+    return tuple(np.concatenate(column) for column in zip(*chunks, strict=True))

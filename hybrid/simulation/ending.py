@@ -1,0 +1,150 @@
+"""What a run says of its end: the status, from what the kernels have counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import attrs
+
+from hybrid.kernels.types import codes
+from hybrid.status import (
+    Status,
+    StatusCode,
+    chatter_status,
+    discontinuous_status,
+    run_status,
+    stuck_status,
+)
+
+if TYPE_CHECKING:
+    from hybrid.simulation.trajectory import Trajectory
+
+
+def status_of(trajectory: Trajectory, code: int) -> Status:
+    """Status of a run after its ``advance`` returned ``code``."""
+    status = _status(trajectory, code)
+    notes = [*_start_beyond(trajectory), *_unproved(trajectory), *_unresolved(trajectory)]
+    return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
+
+
+def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
+    """What is to be said of guards that the start lies beyond."""
+    if trajectory.beyond:
+        names = ", ".join(map(repr, trajectory.beyond))
+        yield (
+            f"The start lies beyond the guard of {names}, which counts as crossed: only the next crossing "
+            "fires."
+        )
+
+
+def _unproved(trajectory: Trajectory) -> Iterator[str]:
+    """What is to be said of guards whose crossings are not proved."""
+    steps = trajectory.run.count.item(codes.UNPROVED)
+    if not steps:
+        return
+    names = trajectory.system.transition_names
+    sampled = [repr(name) for i, name in enumerate(names) if trajectory.compiled.emitted.is_sampled(i)]
+    if sampled:
+        yield (
+            f"The crossings of {', '.join(sampled)} are not proved: the guard could not be traced, so it "
+            "was sampled on each step. Write it with NumPy functions (np.sin, np.where)."
+        )
+    else:
+        yield (
+            f"On {steps} steps the crossings of a guard are not proved: it is too close to zero for too "
+            "long, so its signs at the ends of pieces of the step decided."
+        )
+
+
+def _unresolved(trajectory: Trajectory) -> Iterator[str]:
+    """What is to be said of steps on which the forcing could not be resolved."""
+    count = trajectory.run.count
+    steps = count.item(codes.UNRESOLVED) + count.item(codes.COARSE)
+    if steps:
+        yield (
+            f"On {steps} steps the forcing is not resolved: it changes, or its bounds are wide, over times "
+            "as short as the rounding of time. A pulse may have been stepped over there."
+        )
+
+
+def _status(trajectory: Trajectory, code: int) -> Status:
+    where = f"at t = {trajectory.t:.12g} in mode {trajectory.mode!r}"
+    if code == StatusCode.INTERRUPTED:
+        return run_status(code, where, None, bare_time=False)
+    count, jumps = trajectory.run.count.tolist(), trajectory.jumps
+    singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
+    grazed = count[codes.ILL_CONDITIONED] if trajectory.tangents else 0
+    if trajectory.tangents and singular:
+        return Status(
+            StatusCode.SINGULAR_SALTATION,
+            f"{singular} of {jumps} jumps had no saltation matrix: they grazed exactly, or were the limit of "
+            "several transitions that accumulate in turn.",
+            "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
+        )
+    if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
+        jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
+        return discontinuous_status({mode: where for mode, where in jumping if where})
+    if trajectory.tangents and code == codes.DONE and count[codes.INDISTINCT]:
+        return Status(
+            StatusCode.INDISTINCT_TANGENTS,
+            f"{count[codes.INDISTINCT]} times only rounding was left of what tells the tangent vectors "
+            "apart; the exponents after the first are not known.",
+            "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
+        )
+    if code == codes.DONE and ambiguous:
+        also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""
+        return Status(
+            StatusCode.AMBIGUOUS_ORDER,
+            f"{ambiguous} times two guards were reached together and the order of their transitions "
+            f"mattered; the one listed first was fired first.{also}",
+            "Choose the order in which the transitions are listed, or add one for the corner.",
+        )
+    if code == codes.DONE and grazed:
+        return _grazed(trajectory, grazed)
+    names = trajectory.system.transition_names
+    if code == codes.STUCK:
+        fired = _round(trajectory)
+        transitions = [trajectory.system.transitions[i] for i in fired]
+        return stuck_status(where, transitions, _faces(trajectory, fired))
+    if code == codes.ACCUMULATION and not count[codes.AT_REST]:
+        return chatter_status(where, [names[i] for i in _recent(trajectory, count[codes.ROUND])])
+    last = count[codes.LAST_FIRED]
+    bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(count[codes.MODE]) == 1
+    return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
+
+
+def _grazed(trajectory: Trajectory, grazed: int) -> Status:
+    largest = trajectory.run.clock[codes.LARGEST_SALTATION]
+    return Status(
+        StatusCode.SUCCESS,
+        f"Reached the end. {grazed} of {trajectory.jumps} jumps grazed within the tolerances: their "
+        f"saltation matrices, with entries up to {largest:.2g}, stand for a square root.",
+        "Tighten the tolerances to resolve them, or move the parameters away.",
+    )
+
+
+def _recent(trajectory: Trajectory, number: int) -> list[int]:
+    """The last transitions that fired, in order, as far as they are remembered."""
+    jumps, recent = trajectory.jumps, trajectory.run.recent
+    number = min(number, jumps, len(recent))
+    return [int(recent[j % len(recent)]) for j in range(jumps - number, jumps)]
+
+
+def _round(trajectory: Trajectory) -> list[int]:
+    """The transitions that go round at the end of the run, in order; all that are remembered if none do."""
+    fired = _recent(trajectory, len(trajectory.run.recent))
+    for length in range(1, len(fired) // 2 + 1):
+        if fired[length:] == fired[:-length]:
+            return fired[-length:]
+    return fired
+
+
+def _faces(trajectory: Trajectory, fired: list[int]) -> bool:
+    """Whether two modes send the state back to each other across one guard, without resets."""
+    transitions, emitted = trajectory.system.transitions, trajectory.compiled.emitted
+    if len(fired) != 2 or any(transitions[i].reset for i in fired):
+        return False
+    towards = [transitions[i].guard.direction * emitted.orientation[i] for i in fired]
+    one, other = fired
+    return emitted.surface[one] == emitted.surface[other] and towards[0] != towards[1]

@@ -1,0 +1,81 @@
+"""The mode that a run starts in."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types import codes
+from hybrid.system.graph import HybridSystem, Transition
+
+
+def choose_mode(
+    system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None
+) -> tuple[int, tuple[str, ...]]:
+    """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
+
+    With it come the transitions of a named mode whose guards the state lies beyond.
+
+    Raises
+    ------
+    ModelError
+        If the name is unknown; if the state violates every mode, or more than one allows it.
+    """
+    if mode is not None:
+        index = system.mode_index(mode)
+        verdicts = _verdicts(system, parts, model, run, work, range(index, index + 1))
+        said = zip(system.transition_names, verdicts, strict=True)
+        return index, tuple(name for name, verdict in said if verdict == codes.BEYOND)
+    modes = system.mode_names
+    verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
+    if len(modes) == 1 and codes.BEYOND not in verdicts:
+        return 0, ()
+    violated = {transition.source for transition in _against(system, verdicts)}
+    allowed = [name for name in modes if name not in violated]
+    if len(allowed) == 1:
+        return modes.index(allowed[0]), ()
+    if not allowed:
+        raise ArgumentError(
+            f"{_place(system, run)} violates every mode: {_faults(system, verdicts)}. Start on the other "
+            "side of a guard, or name the mode with mode= if that side is meant."
+        )
+    candidates = ", ".join(allowed)
+    raise ArgumentError(
+        f"{_place(system, run)} is allowed in more than one mode: {candidates}. Choose one with mode=."
+    )
+
+
+def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: range) -> list[int]:
+    """What each transition that leaves one of the modes says of the start of the run, a code each."""
+    verdicts = np.zeros(len(system.transitions), dtype=np.int64)
+    kernel = entry(load_kernels("hybrid.kernels.events.initial_mode").try_modes)
+    undefined = kernel(parts, model, run, work, modes.start, modes.stop, verdicts)
+    if undefined != codes.NO_TRANSITION:
+        raise ArgumentError(
+            f"Transition {system.transition_names[undefined]!r}: the guard is {work.scalar[0]} at "
+            f"t = {run.clock[codes.PHASE]}, {_place(system, run)}. "
+            "A guard must be finite wherever its mode runs."
+        )
+    return verdicts.tolist()
+
+
+def _against(system: HybridSystem, verdicts: list[int]) -> list[Transition]:
+    """Transitions whose guards object to the start."""
+    said = zip(system.transitions, verdicts, strict=True)
+    return [transition for transition, verdict in said if verdict != codes.NO_OBJECTION]
+
+
+def _faults(system: HybridSystem, verdicts: list[int]) -> str:
+    """The guards against each mode."""
+    against = _against(system, verdicts)
+    return "; ".join(
+        f"mode {name!r} is left through {', '.join(repr(tr.name) for tr in against if tr.source == name)}"
+        for name in system.mode_names
+    )
+
+
+def _place(system: HybridSystem, run: Any) -> str:
+    return f"x0 = {tuple(float(v) for v in run.y[: system.dimension])}"

@@ -1,0 +1,155 @@
+"""Memory of a run: what the kernels write to, laid out once for all runs of the same shapes."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels.types import codes
+from hybrid.simulation.periods import split_time
+
+# Deep enough for intervals halved down to rounding.
+ISOLATION_DEPTH = 64
+# Transitions remembered in the order in which they fired: enough to see which go round without end. A power
+# of two.
+RECENT = 64
+# Solvers, and shapes of memory, that are kept for the next run.
+MOST_LAYOUTS = 64
+
+
+def workspace(method: Any, dimension: int, tangents: int, columns: int, rows: int = 0) -> Any:
+    """Scratch memory for one run; ``columns`` are those of series, ``rows`` those of the guards' programs."""
+    return fresh_work(work_layout(method, dimension, tangents, columns, rows), method)
+
+
+def fresh_work(layout: Any, method: Any) -> Any:
+    """Scratch memory that knows nothing of another run."""
+    work = layout.zeros()
+    if method.implicit:
+        # There is no last step whose polynomial could be a guess.
+        work.systems[-1] = -1.0
+    return work
+
+
+@lru_cache(MOST_LAYOUTS)
+def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: int) -> Any:
+    """Where the arrays of a workspace lie."""
+    from hybrid.kernels.arithmetic.lanes import whole_registers
+    from hybrid.kernels.types.layout import Work
+    from hybrid.kernels.types.structure import Layout
+
+    n, length = dimension, dimension * (1 + tangents)
+    stages, degree = len(method.a), len(method.interpolant) - 1
+    coupled = len(method.b) if method.implicit else 0
+    # Whole vectors of columns are evaluated: there may be a few more than are in use.
+    width_of_series = whole_registers(columns, codes.WIDE)
+    width = max(degree, codes.HIGHEST_ORDER if method.order else 0) + 4
+    shapes = {
+        "stages": (stages, length + 1),
+        "speeds": (stages,),
+        "trial": (length,),
+        "new": (length,),
+        "error": (length,),
+        "second_error": (length,),
+        "jacobian": (n, n + 1),
+        "reset_jacobian": (n, n + 1),
+        "gradient": (n + 1,),
+        "scalar": (1,),
+        "field": (n,),
+        "field_after": (n,),
+        "state": (n,),
+        "settled": (n,),
+        "saltation": (n, n),
+        "path": (degree + 1, n),
+        "polynomial": (width,),
+        "stack": (ISOLATION_DEPTH, width),
+        "intervals": (ISOLATION_DEPTH, 2),
+        "systems": (n + coupled * (n + 1) + 4, coupled * n),
+        "pivots": ((coupled + 1) * n,),
+        "series": (codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0),
+        "weights": (1, width_of_series),
+        "registers": (rows, codes.REGISTERS),
+        "samples": (max(len(method.nodes), len(method.series_nodes)) + 1, 2 * rows),
+    }
+    return Layout(Work, shapes)
+
+
+def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
+    """A record with room for that many steps and jumps; none means that they are not kept."""
+    # Room that is not used costs nothing, not even to be cleared: all is written before it is read.
+    record = record_layout(dimension, degree, steps, jumps).unwritten()
+    record.used[:] = 0
+    return record
+
+
+@lru_cache(MOST_LAYOUTS)
+def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
+    """Where the arrays of a record lie."""
+    from hybrid.kernels.types.layout import Record
+    from hybrid.kernels.types.structure import Layout
+
+    n = dimension
+    shapes = {
+        "used": (4,),
+        "step_time": (steps, 3),
+        "step_place": (steps, 3),
+        "step_coefficients": (steps, degree + 1, n + 1),
+        "jump_time": (jumps, 2),
+        "jump_place": (jumps, 4),
+        "jump_states": (jumps, 2, n),
+        "jump_saltation": (jumps, n, n),
+        "grazing_time": (jumps, 3),
+        "grazing_place": (jumps, 3),
+        "grazing_state": (jumps, n),
+    }
+    return Layout(Record, shapes)
+
+
+@lru_cache(MOST_LAYOUTS)
+def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
+    """Where the arrays of a run lie."""
+    from hybrid.kernels.types.layout import Run
+    from hybrid.kernels.types.structure import Layout
+
+    n = dimension
+    shapes = {
+        "count": (codes.COUNTERS,),
+        "clock": (codes.CLOCKS,),
+        "y": (n * (1 + tangents),),
+        "side": (transitions,),
+        "on_guard": (transitions,),
+        "due": (transitions,),
+        "recent": (RECENT,),
+        "rehearsal": (3, transitions),
+        "visits": (RECENT, n + 2),
+        "first_step": (modes,),
+        "stay": (modes,),
+        "scale": (n,),
+        "growth": (tangents,),
+        "trail": (3, n + 1),
+        "before": (n * tangents,),
+        "growth_before": (tangents,),
+        "instant": (n * (1 + n),),
+    }
+    return Layout(Run, shapes)
+
+
+def fresh_run(
+    layout: Any, model: Any, state: np.ndarray, tangent: np.ndarray | None, t0: float
+) -> tuple[Any, float]:
+    """The run at its start, in no mode yet, and the phase of the start."""
+    run, n = layout.zeros(), model.dimension
+    count, clock, y = run.count, run.clock, run.y
+    cycle, phase = split_time(t0, model.period)
+    count[codes.CYCLE], clock[codes.PHASE] = cycle, phase
+    count[codes.PHASE_OF_RUN] = codes.ENTERING
+    for slot in (codes.LAST_FIRED, codes.PENDING, codes.PREVIOUS_MODE):
+        count[slot] = codes.NO_TRANSITION
+    clock[codes.LAST_JUMP_PHASE] = np.nan
+    y[:n] = state
+    if tangent is not None:
+        y[n:] = tangent.T.ravel()
+    np.abs(state, out=run.scale)
+    return run, phase

@@ -1,0 +1,158 @@
+"""What all runs of a system by one solver have in common: method, kernels, layouts of memory."""
+
+from __future__ import annotations
+
+from functools import cache, lru_cache
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import Absent, address, load_kernels
+from hybrid.compiler.compiled import CompiledSystem
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types import codes
+from hybrid.simulation.memory import MOST_LAYOUTS, run_layout, work_layout
+from hybrid.solvers import RungeKutta, Taylor
+from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
+
+DEFAULT_SOLVER = Taylor()
+
+
+def check_solver(solver: object) -> RungeKutta:
+    """The solver, or the default one; ArgumentError for anything else."""
+    if solver is None:
+        return DEFAULT_SOLVER
+    if isinstance(solver, RungeKutta) and hasattr(solver, "tableau"):
+        return solver
+    raise ArgumentError(
+        f"solver must be a solver object; got {arguments.shown(solver)}. "
+        "Write for instance hybrid.DOP853(rtol=1e-8)."
+    )
+
+
+@attrs.frozen(eq=False)
+class Plan:
+    """What all runs of a system by a solver, with so many tangent vectors, have in common.
+
+    ``model`` is that at the default parameters. ``propagators`` says how each mode is advanced, by its name;
+    ``degree`` is that of a record's steps.
+    """
+
+    method: Any
+    parts: Any
+    model: Any
+    propagators: dict[str, str]
+    degree: int
+    run_layout: Any
+    work_layout: Any
+
+
+def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan:
+    """The plan of a run, made once; kernels that the run needs are loaded."""
+    plan = compiled.plans.get((solver, tangents))
+    if plan is None:
+        system, method = compiled.system, kernel_method(solver)
+        load_kernels("hybrid.kernels.events.initial_mode")
+        n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
+        kinds, is_taylor = propagator_kinds(compiled, solver), isinstance(solver, Taylor)
+        plan = Plan(
+            method,
+            driver_parts(
+                codes.RUNGE_KUTTA not in kinds,
+                bool(solver.tableau.implicit),
+                bool(compiled.emitted.forcing_component),
+            ),
+            compiled.moved_by(
+                compiled.moving(kinds, tangents), None if is_taylor else np.array(kinds, dtype=np.int64)
+            ),
+            {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
+            dense_degree(compiled, method, kinds),
+            run_layout(n, tangents, modes, transitions),
+            work_layout(
+                method, n, tangents, compiled.series_columns(tangents), compiled.emitted.programs.longest
+            ),
+        )
+        while len(compiled.plans) >= MOST_LAYOUTS:
+            compiled.plans.pop(next(iter(compiled.plans)), None)
+        compiled.plans[solver, tangents] = plan
+    return plan
+
+
+@lru_cache(MOST_LAYOUTS)
+def kernel_method(solver: RungeKutta) -> Any:
+    """The kernel's view of a solver: tableau and tolerances."""
+    from hybrid.kernels.types.layout import Method
+
+    tableau = solver.tableau
+    return Method(
+        a=tableau.a,
+        b=tableau.b,
+        c=tableau.c,
+        error=tableau.error,
+        second_error=tableau.second_error,
+        quadrature=tableau.quadrature,
+        interpolant=tableau.interpolant,
+        powers=tableau.powers,
+        nodes=tableau.nodes,
+        series_nodes=SERIES_NODES,
+        series_weights=SERIES_WEIGHTS,
+        implicit=int(tableau.implicit),
+        order=solver.order if isinstance(solver, Taylor) else 0,
+        exponent=1.0 / tableau.error_order,
+        rtol=solver.rtol,
+        atol=solver.atol,
+        max_step=solver.max_step,
+    )
+
+
+@cache
+def driver_parts(series_only: bool, implicit: bool, forced: bool) -> Any:
+    """The pieces that the driver is handed; what the run does not need is not loaded."""
+    from hybrid.kernels.types.layout import Attempts, Parts
+
+    jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
+    if implicit:
+        attempt = load_kernels("hybrid.kernels.steps.radau").attempt_radau
+    else:
+        attempt = load_kernels("hybrid.kernels.steps.step").no_attempt
+    if series_only and not forced:
+        step = load_kernels("hybrid.kernels.steps.step").no_step
+    else:
+        step = load_kernels("hybrid.kernels.steps.runge_kutta").runge_kutta_step
+    explained_step, explained_series = Absent(), Absent()
+    if forced:
+        forcing = load_kernels("hybrid.kernels.steps.forcing")
+        explained_step, explained_series = map(address, (forcing.explained_step, forcing.explained_series))
+    return Parts(
+        attempts=Attempts(
+            attempt_implicit=address(attempt),
+            explained_step=explained_step,
+            explained_series=explained_series,
+        ),
+        runge_kutta_step=address(step),
+        enter=address(corners.enter),
+        jump=address(jumps.jump),
+        finish_chatter=address(jumps.finish_chatter),
+        rest=address(jumps.rest),
+        first_in_order=address(corners.first_in_order),
+    )
+
+
+def propagator_kinds(compiled: CompiledSystem, solver: RungeKutta) -> list[int]:
+    """How each mode is advanced: only Taylor takes series from the model."""
+    modes = compiled.emitted.propagators
+    return [each.kind for each in modes] if isinstance(solver, Taylor) else [codes.RUNGE_KUTTA] * len(modes)
+
+
+def dense_degree(compiled: CompiledSystem, method: Any, kinds: list[int]) -> int:
+    """Degree of the polynomials that a record of steps holds, for propagators of these kinds."""
+
+    def degree_of(kind: int, of_solutions: int) -> int:
+        if kind == codes.RUNGE_KUTTA:
+            return len(method.interpolant) - 1
+        return of_solutions or (codes.HIGHEST_ORDER if kind == codes.EXACT else method.order)
+
+    modes = compiled.emitted.propagators
+    return max(degree_of(kind, each.degree) for kind, each in zip(kinds, modes, strict=True))

@@ -1,0 +1,93 @@
+"""The saltation matrix of one transition at one point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.compiled import compile_system
+from hybrid.errors import ArgumentError
+from hybrid.simulation.memory import workspace
+from hybrid.simulation.periods import check_time, split_time
+from hybrid.simulation.plan import kernel_method
+from hybrid.solvers import Tsit5
+from hybrid.system.graph import HybridSystem, Transition
+
+
+def saltation_matrix(
+    system: HybridSystem,
+    transition: str | Transition,
+    t: float,
+    x: ArrayLike,
+    *,
+    parameters: Mapping[str, float] | None = None,
+) -> np.ndarray:
+    """Saltation matrix ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``.
+
+    It carries a perturbation of the state just before the jump, at the unperturbed jump's time, to the
+    perturbation just after. The time terms serve moving guards and time-dependent resets. A jump that another
+    sets off at once, by landing beyond its guard, does not happen at the time of that guard: its
+    ``saltation`` in a run is another matrix.
+
+    Parameters
+    ----------
+    system, transition
+        The model, and the transition or its name.
+    t, x
+        Time and state ``(n,)`` before the jump, on the guard.
+    parameters
+        Values that override the system's.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n, n)``.
+
+    Raises
+    ------
+    ArgumentError
+        If the crossing is not transverse (``D_t g + D_x g f_minus`` is zero): the matrix does not exist
+        there.
+    ModelError
+        If the transition does not exist.
+
+    References
+    ----------
+    N. J. Kong, J. J. Payne, J. Zhu, A. M. Johnson, Saltation matrices: the essential tool for linearizing
+    hybrid dynamical systems, Proceedings of the IEEE, 2024, arXiv:2306.06862.
+    """
+    compiled = compile_system(system)
+    index = system.transition_index(transition)
+    state = arguments.state("x", x, system)
+    model = compiled.model(parameters)
+    t = arguments.number("t", t)
+    check_time("t", t, model.period)
+    phase = split_time(t, model.period)[1]
+    matrices, (transversality,) = matrices_at(system, model, [index], [phase], state[None])
+    if not np.all(np.isfinite(matrices)):
+        raise ArgumentError(
+            f"Transition {system.transitions[index].name!r}: the saltation matrix does not exist at t = {t}, "
+            f"x = {tuple(float(v) for v in state)}; the transversality is {transversality}. "
+            "A grazing crossing has no linear tangent map."
+        )
+    return matrices[0]
+
+
+def matrices_at(
+    system: HybridSystem, model: Any, transitions: list[int], phases: list[float], states: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Saltation matrices ``(J, n, n)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
+    n = system.dimension
+    matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
+    sources = [system.mode_index(transition.source) for transition in system.transitions]
+    kernel = entry(load_kernels("hybrid.kernels.jumps.jump").saltation)
+    work, x_plus = workspace(kernel_method(Tsit5()), n, 0, 0), np.empty(n)
+    for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
+        transversalities[i] = kernel(model, fired, sources[fired], phase, state, x_plus, work)
+        matrices[i] = work.saltation
+    return matrices, transversalities

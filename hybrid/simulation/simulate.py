@@ -1,0 +1,243 @@
+"""From a model and a start to a hybrid arc."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.types import codes
+from hybrid.simulation.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
+from hybrid.simulation.memory import empty_record, record_layout
+from hybrid.simulation.periods import check_time
+from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.solvers import RungeKutta
+from hybrid.status import StatusCode
+from hybrid.system.graph import HybridSystem, as_system
+
+# Room of the record that kernels fill before Python empties it: large enough that the crossing costs nothing.
+STEPS_AT_ONCE = 2048
+JUMPS_AT_ONCE = 1024
+
+
+def simulate(
+    system: HybridSystem,
+    x0: ArrayLike,
+    t_span: tuple[float, float],
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    solver: RungeKutta | None = None,
+    tangent: ArrayLike | bool | None = None,
+    samples: ArrayLike | None = None,
+    max_jumps: int = 100_000,
+) -> HybridArc:
+    """Solve a hybrid system from ``x0`` over ``t_span``.
+
+    Parameters
+    ----------
+    system
+        The model.
+    x0
+        State ``(n,)`` at the start.
+    t_span
+        ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
+    mode
+        Mode to start in; by default the only one, or the only one whose guards allow ``x0``.
+    parameters
+        Values that override the system's.
+    solver
+        Method and tolerances, by default ``Taylor(rtol=1e-10, atol=1e-12)``: what fits each mode.
+    tangent
+        True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is
+        controlled with the state's.
+    samples
+        Increasing times at which to keep the state; nothing else is then kept but the jumps.
+    max_jumps
+        The run ends with a status at this many jumps.
+
+    Returns
+    -------
+    HybridArc
+        With a status; a run that ends early keeps what it has. Ctrl-C ends a run that takes longer than some
+        milliseconds with the status ``INTERRUPTED``.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Examples
+    --------
+    >>> import models
+    >>> arc = simulate(models.bouncing_ball(), x0=(1.0, 0.0), t_span=(0.0, 1.0))
+    >>> round(arc.jumps[0].t, 4)
+    0.4515
+    """
+    as_system("system", system)
+    t0, t1 = arguments.time_span("t_span", t_span)
+    times = None if samples is None else arguments.increasing_times("samples", samples, t0, t1)
+    vectors = None if tangent is None or tangent is False else _tangent_matrix(tangent, system)
+    most = arguments.count("max_jumps", max_jumps, 0)
+    trajectory = start(
+        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors, time="t_span"
+    )
+    check_time("t_span", t1, trajectory.model.period)
+    arc = _Recorder(trajectory, times, t1).run(t1, most)
+    trajectory.release()
+    return arc
+
+
+def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
+    n = system.dimension
+    if tangent is True:
+        return np.eye(n)
+    wanted = f"be True or a finite matrix of shape ({n}, k), one tangent vector per column"
+    matrix = arguments.numbers("tangent", tangent, wanted)
+    if matrix.ndim == 1:
+        matrix = matrix[:, None]
+    if matrix.ndim != 2 or matrix.shape[0] != n or matrix.shape[1] == 0 or not np.all(np.isfinite(matrix)):
+        raise arguments.refusal("tangent", wanted, matrix)
+    return matrix
+
+
+class _Recorder:
+    """Runs a trajectory in bursts and files what the kernel wrote down in each."""
+
+    def __init__(self, trajectory: Trajectory, times: np.ndarray | None, t1: float) -> None:
+        self.trajectory = trajectory
+        self.times = times
+        # The state at the end is at hand without any polynomial.
+        only_the_end = times is not None and not (times.size and times[0] < t1)
+        self.steps_at_once = 0 if only_the_end else STEPS_AT_ONCE
+        if times is not None and self.steps_at_once:
+            # Compiled before the run, not in the middle of it, where an interrupt would meet the compiler.
+            load_kernels("hybrid.kernels.steps.dense")
+        n, degree = trajectory.model.dimension, trajectory.plan.degree
+        self.layout = record_layout(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
+        self.steps: list[tuple[np.ndarray, ...]] = []
+        self.jumps: list[tuple[np.ndarray, ...]] = []
+        self.grazings: list[Grazing] = []
+        self.states = np.empty((0 if times is None else len(times), trajectory.model.dimension))
+        self.places = np.empty((2, len(self.states)), dtype=np.int64)
+        self.sampled = 0
+
+    def run(self, t1: float, max_jumps: int) -> HybridArc:
+        trajectory, run = self.trajectory, self.trajectory.run
+        code = self._advance(t1, max_jumps)
+        if code == codes.RECORD_FULL:
+            with trajectory.stop:
+                while code == codes.RECORD_FULL:
+                    code = (
+                        StatusCode.INTERRUPTED if trajectory.stop.is_set() else self._advance(t1, max_jumps)
+                    )
+        model, system, count = trajectory.model, trajectory.system, run.count.tolist()
+        columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
+        jumps = Jumps(system, model.parameters, model.period, *columns)
+        t_end = t1 if code == codes.DONE else trajectory.t
+        end = (t_end, trajectory.x, count[codes.MODE])
+        pieces = None
+        if self.times is None:
+            pieces = Pieces(*join(self.steps))
+            t, j, x, mode = hybrid_points(system, pieces, jumps, end)
+        else:
+            self._sample_end(*end)
+            t, x = self.times[: self.sampled], self.states[: self.sampled]
+            mode, j = self.places[:, : self.sampled]
+        return HybridArc(
+            system,
+            model.parameters.copy(),
+            t,
+            j,
+            x,
+            mode,
+            jumps,
+            tuple(self.grazings),
+            trajectory.status(code),
+            trajectory.tangent_matrix if trajectory.tangents else None,
+            trajectory.plan.propagators.copy(),
+            count[codes.STEPS],
+            count[codes.REJECTED],
+            pieces,
+        )
+
+    def _advance(self, t1: float, max_jumps: int) -> int:
+        """Run until the record is full or the run ends; the code."""
+        record = self.layout.unwritten()
+        record.used[:] = 0
+        code = self.trajectory.advance(t1, record, max_jumps)
+        self._file(record)
+        return code
+
+    def _file(self, record: Any) -> None:
+        period = self.trajectory.model.period
+        steps, jumps, grazings, matrices = record.used.tolist()
+        if jumps:
+            self.jumps.append(_jump_columns(record, jumps, matrices))
+        if grazings:
+            self.grazings += _grazings(self.trajectory.system, record, grazings, period)
+        if self.times is None:
+            places, polynomials = _places_of_steps(record, steps, period), record.step_coefficients[:steps]
+            if 2 * steps > self.steps_at_once:
+                # The arc keeps the record: new memory costs more than what of this was not used.
+                self.steps.append((*places, polynomials))
+                return
+            self.steps.append((*places, polynomials.copy()))
+        elif steps:
+            places = _places_of_steps(record, steps, period)
+            self._sample(Pieces(*places, record.step_coefficients[:steps]))
+        self.layout.take_back(record)
+
+    def _sample(self, pieces: Pieces) -> None:
+        """States at the samples that fall before the current end of the run."""
+        assert self.times is not None
+        stop = int(self.times.searchsorted(self.trajectory.t, side="left"))
+        if stop > self.sampled:
+            part = slice(self.sampled, stop)
+            self.states[part], index = pieces.at(self.times[part])
+            self.places[:, part] = pieces.mode[index], pieces.j[index]
+            self.sampled = stop
+
+    def _sample_end(self, t: float, x: np.ndarray, mode: int) -> None:
+        """States at the samples that fall on the very end of the run: those after its last jump."""
+        assert self.times is not None
+        stop = int(self.times.searchsorted(t, side="right"))
+        self.states[self.sampled : stop] = x
+        self.places[0, self.sampled : stop], self.places[1, self.sampled : stop] = mode, self.trajectory.jumps
+        self.sampled = stop
+
+
+def _places_of_steps(
+    record: Any, used: int, period: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Start in two parts, length, mode and jump count of the steps in a record."""
+    cycle, mode, j = record.step_place[:used].T
+    phase, h, low = record.step_time[:used].T
+    return cycle * period + phase, low.copy(), h.copy(), mode.copy(), j.copy()
+
+
+@cache
+def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
+    """Columns of jumps, empty, so that any number of arcs can have the same."""
+    return _jump_columns(empty_record(dimension, 0), 0, 0)
+
+
+def _jump_columns(record: Any, used: int, matrices: int) -> tuple[np.ndarray, ...]:
+    columns = record.jump_time, record.jump_place, record.jump_states
+    return (*(column[:used].copy() for column in columns), record.jump_saltation[:matrices].copy())
+
+
+def _grazings(system: HybridSystem, record: Any, used: int, period: float) -> list[Grazing]:
+    cycle, transition, j = record.grazing_place[:used].T
+    phase, value, acceleration = record.grazing_time[:used].T
+    x = record.grazing_state[:used].copy()
+    columns = cycle * period + phase, j, transition, x, value, acceleration
+    return [
+        Grazing(float(t), int(j), system.transition_names[transition], x, float(value), float(acceleration))
+        for t, j, transition, x, value, acceleration in zip(*columns, strict=True)
+    ]

@@ -1,0 +1,207 @@
+"""One trajectory in the hands of the kernels, and how to take it further."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.compiled import CompiledSystem, compile_system
+from hybrid.kernels.types import codes
+from hybrid.simulation.ending import status_of
+from hybrid.simulation.initial_mode import choose_mode
+from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
+from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
+from hybrid.simulation.periods import check_time, split_time
+from hybrid.simulation.plan import Plan, check_solver, plan_of
+from hybrid.solvers import RungeKutta
+from hybrid.status import Status
+from hybrid.system.graph import HybridSystem
+
+UNLIMITED = np.iinfo(np.int64).max
+
+
+def start(
+    system: HybridSystem,
+    x0: Any,
+    t0: float,
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    solver: RungeKutta | None = None,
+    tangent: np.ndarray | None = None,
+    time: str = "t0",
+    stop: Stop = CTRL_C,
+) -> Trajectory:
+    """A trajectory at its start, everything about the call checked.
+
+    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
+    name of the argument that ``t0`` comes from, ``stop`` who may end the run early.
+    """
+    compiled = compile_system(system)
+    state = arguments.state("x0", x0, system)
+    t0 = arguments.number(time, t0)
+    solver = check_solver(solver)
+    tangents = 0 if tangent is None else tangent.shape[1]
+    plan = plan_of(compiled, solver, tangents)
+    model = compiled.at(parameters, plan.model) if parameters else plan.model
+    check_time(time, t0, model.period)
+    run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
+    work = fresh_work(plan.work_layout, plan.method)
+    run.count[codes.MODE], beyond = choose_mode(system, plan.parts, model, run, work, mode)
+    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond, stop)
+
+
+@attrs.frozen(eq=False)
+class Trajectory:
+    """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed.
+
+    ``beyond`` names the transitions whose guards the start lies beyond.
+    """
+
+    compiled: CompiledSystem
+    plan: Plan
+    model: Any
+    run: Any
+    work: Any
+    tangents: int
+    max_steps: int
+    phase0: float
+    beyond: tuple[str, ...] = ()
+    stop: Stop = CTRL_C
+
+    @property
+    def method(self) -> Any:
+        """The kernel's view of the solver."""
+        return self.plan.method
+
+    @property
+    def parts(self) -> Any:
+        """The pieces that the driver is handed."""
+        return self.plan.parts
+
+    @property
+    def system(self) -> HybridSystem:
+        """The model that runs."""
+        return self.compiled.system
+
+    @property
+    def t(self) -> float:
+        """Current time."""
+        run = self.run
+        return run.count.item(codes.CYCLE) * self.model.period + run.clock.item(codes.PHASE)
+
+    @property
+    def x(self) -> np.ndarray:
+        """Current state ``(n,)``, a copy."""
+        return self.run.y[: self.model.dimension].copy()
+
+    @property
+    def mode(self) -> str:
+        """Current mode."""
+        return self.system.mode_names[self.run.count[codes.MODE]]
+
+    @property
+    def jumps(self) -> int:
+        """Jumps so far."""
+        return int(self.run.count[codes.JUMPS])
+
+    @property
+    def steps(self) -> int:
+        """Steps tried so far."""
+        return int(self.run.count.item(codes.STEPS))
+
+    @property
+    def tangent_matrix(self) -> np.ndarray:
+        """Tangent vectors as columns ``(n, k)``, a copy."""
+        n = self.model.dimension
+        return self.run.y[n:].reshape(self.tangents, n).T.copy()
+
+    def replace_tangents(self, matrix: np.ndarray) -> None:
+        """Go on with other tangent vectors, the columns of ``(n, k)``."""
+        self.run.y[self.model.dimension :] = matrix.T.ravel()
+        if self.run.count[codes.PHASE_OF_RUN] == codes.READY:
+            self.run.count[codes.PHASE_OF_RUN] = codes.STALE
+
+    def jacobian(self) -> np.ndarray:
+        """``D_x f`` of the current mode at the current point, ``(n, n)``."""
+        from hybrid.kernels.steps.step import flow_jacobian
+
+        run, n = self.run, self.model.dimension
+        flow_jacobian(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, self.work.jacobian)
+        return self.work.jacobian[:, :n].copy()
+
+    def field(self) -> np.ndarray:
+        """``f`` of the current mode at the current point, ``(n,)``."""
+        from hybrid.kernels.steps.step import field
+
+        run, out = self.run, np.empty(self.model.dimension)
+        field(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, out)
+        return out
+
+    def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:
+        """Run to time ``t`` or until something else ends it; a code of ``hybrid.kernels.types.codes``."""
+        return self.advance_to(*split_time(t, self.model.period), record, max_jumps=max_jumps)
+
+    def advance_to(
+        self,
+        cycle: int,
+        phase: float,
+        record: Any,
+        *,
+        max_steps: int | None = None,
+        max_jumps: int = UNLIMITED,
+    ) -> int:
+        """Run to a number of whole periods and a phase; ``max_steps`` counts from the start of the run.
+
+        The code is INTERRUPTED if the run was asked to stop. A run of few steps does not ask.
+        """
+        limit = self.max_steps if max_steps is None else max_steps
+        most = min(limit, self.steps + FIRST_BURST)
+        code = self._burst(cycle, phase, record, most, max_jumps)
+        if code != codes.MAX_STEPS or most == limit:
+            return code
+        bursts = Bursts([self])
+        code = codes.GO_ON
+        with self.stop:
+            while code == codes.GO_ON:
+                most = min(limit, bursts.most())
+                code = self._burst(cycle, phase, record, most, max_jumps)
+                if code == codes.MAX_STEPS and most < limit:
+                    code = bursts.judged(code)
+        return code
+
+    def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
+        return int(
+            entry(load_kernels().advance)(
+                self.plan.parts,
+                self.model,
+                self.plan.method,
+                self.run,
+                record,
+                self.tangents,
+                False,
+                cycle,
+                phase,
+                max_steps,
+                max_jumps,
+                self.work,
+            )
+        )
+
+    def release(self) -> None:
+        """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
+        self.plan.run_layout.take_back(self.run)
+        self.plan.work_layout.take_back(self.work)
+
+    def no_record(self) -> Any:
+        """A record that keeps nothing."""
+        return empty_record(self.model.dimension, self.plan.degree)
+
+    def status(self, code: int) -> Status:
+        """Status of the run after ``advance`` returned ``code``."""
+        return status_of(self, code)

@@ -1,0 +1,314 @@
+"""Where a field jumps: found in its expression, unless it is proved that the jump has no size.
+
+A field that jumps on a surface of the state bends its tangent vectors there as a transition does, with no
+matrix to tell how. What jumps at given times, whatever the state, bends none.
+"""
+
+from __future__ import annotations
+
+import dis
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+import sympy
+from sympy.core.parameters import distribute
+
+from hybrid.symbolic.expressions import (
+    ONE,
+    ZERO,
+    And,
+    Atan2,
+    Ceiling,
+    Equal,
+    Floor,
+    Less,
+    LessEqual,
+    Not,
+    Or,
+    Remainder,
+    Select,
+    Sign,
+    Step,
+    Truncate,
+    TruncatedRemainder,
+)
+from hybrid.symbolic.nodes import (
+    MOST_EXPANDED,
+    contains,
+    is_larger_than,
+    mentions,
+    nodes,
+    nodes_of,
+    once,
+    replaced,
+    symbols_of,
+)
+
+ROUNDING = (Floor, Ceiling, Truncate)
+REMAINDERS = (Remainder, TruncatedRemainder)
+JUMPS = (Less, LessEqual, Sign, Step, *ROUNDING, *REMAINDERS, Atan2)
+UNKNOWN = frozenset((sympy.nan, sympy.zoo, sympy.oo))
+# A constant this much smaller than the terms that it is the sum of is rounding.
+SMALL = 1e-12
+# Floats are taken for multiples of this part of pi.
+PARTS_OF_PI = 12
+
+
+def jumps_of(field: Iterable[sympy.Expr], states: Sequence[sympy.Symbol]) -> list[str]:
+    """Where entries of a field are not proved continuous in the states, in words, ``x[0]`` the first."""
+    found: dict[str, None] = {}
+    with distribute(True):
+        for entry in field:
+            for surface in _surfaces(entry, states):
+                found[surface] = None
+    return [*found]
+
+
+def _surfaces(entry: sympy.Expr, states: Sequence[sympy.Symbol]) -> list[str]:
+    if not contains(entry, JUMPS):
+        return []
+    entry = _with_exact_turns(entry)
+    jumps = (node for node in nodes_of(JUMPS, entry) if mentions(node, states))
+    atoms = sorted(jumps, key=sympy.default_sort_key)
+    names = {atom: sympy.Dummy(real=True) for atom in atoms}
+    return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
+
+
+def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Expr, sympy.Dummy]) -> bool:
+    """Whether the entry is the same on both sides of where an atom jumps."""
+    step = sympy.Dummy(integer=True)
+    surface, sides = _sides(atom, step)
+    if surface is None:
+        return False
+    # Atoms of one surface jump together.
+    together: list[tuple[sympy.Expr, tuple[sympy.Expr, sympy.Expr]]] = []
+    for other in names:
+        other_surface, other_sides = _sides(other, step)
+        if other is not atom and other_surface is not None:
+            ratio = _ratio(other_surface, surface)
+            if ratio and type(atom) not in (*ROUNDING, *REMAINDERS):
+                together.append((other, other_sides if ratio > 0 else other_sides[::-1]))
+    together.append((atom, sides))
+    ours = {each for each, _ in together}
+    bare = _replaced(surface, {}, names)
+    for old, new in _substitutions(bare):
+        # Some of the other atoms are known where this one jumps: q < 1 where q = 0.
+        known = {
+            other: side
+            for other in names
+            if other not in ours and (side := _known_side(other, step, names, old, new)) is not None
+        }
+        below, above = (
+            _without_choices(_replaced(entry, known | {each: pair[side] for each, pair in together}, names))
+            for side in (0, 1)
+        )
+        if _is_zero((above - below).subs(old, new)):
+            return True
+    return False
+
+
+def _substitutions(surface: sympy.Expr) -> Iterator[tuple[sympy.Expr, sympy.Expr]]:
+    """What to put for what, so that a surface vanishes."""
+    variables = [each for each in symbols_of(surface) if each.name == "t" or each.name.startswith("x[")]
+    for variable in sorted(variables, key=sympy.default_sort_key):
+        # A slope that depends on the state may vanish, where the surface has another sheet.
+        slope = surface.diff(variable)
+        if slope != 0 and not mentions(slope, variables) and not contains(slope, sympy.Dummy):
+            yield variable, sympy.expand(variable - surface / slope)
+    for term in sympy.Add.make_args(surface):
+        if not (term.is_number or term.is_Symbol):
+            coefficient, factor = term.as_coeff_Mul()
+            yield factor, factor - surface / coefficient
+
+
+def _known_side(
+    atom: sympy.Expr,
+    step: sympy.Symbol,
+    names: Mapping[sympy.Expr, sympy.Dummy],
+    old: sympy.Expr,
+    new: sympy.Expr,
+) -> sympy.Expr | None:
+    """What an atom is with one expression put for another, if its side is known then."""
+    if isinstance(atom, (*ROUNDING, *REMAINDERS, Atan2)):
+        return None
+    surface, sides = _sides(atom, step)
+    if surface is None:
+        return None
+    height = sympy.expand(_replaced(surface, {}, names).subs(old, new))
+    if not (height.is_number and height.is_real) or height == 0:
+        return None
+    return sides[1] if height.is_positive else sides[0]
+
+
+def _sides(atom: sympy.Expr, step: sympy.Symbol) -> tuple[sympy.Expr | None, tuple[sympy.Expr, sympy.Expr]]:
+    """An expression that vanishes where the atom jumps, and what the atom is below and above."""
+    nothing = (ZERO, ZERO)
+    if isinstance(atom, Atan2):
+        return atom.args[0], (-sympy.pi, sympy.pi)
+    if isinstance(atom, Less | LessEqual):
+        a, b = atom.args
+        return b - a, (ZERO, ONE)
+    if isinstance(atom, Sign):
+        return atom.args[0], (-ONE, ONE)
+    if isinstance(atom, Step):
+        return atom.args[0], (ZERO, ONE)
+    if isinstance(atom, ROUNDING):
+        surface = atom.args[0] - step
+        if isinstance(atom, Ceiling):
+            return surface, (step, step + 1)
+        # Truncation jumps like the floor on the positive side, and like the ceiling on the negative one.
+        return (surface, (step - 1, step)) if isinstance(atom, Floor) else (None, nothing)
+    if isinstance(atom, Remainder):
+        a, b = atom.args
+        return a - step * b, (b, ZERO)
+    return None, nothing
+
+
+@once
+def _with_exact_turns(expression: sympy.Expr) -> sympy.Expr:
+    """The expression with multiples of pi for floats that stand for them in sines and cosines."""
+    if not expression.args:
+        return expression
+    args = [_with_exact_turns(argument) for argument in expression.args]
+    if isinstance(expression, sympy.sin | sympy.cos | sympy.tan):
+        exact = {number: _turns(number) for number in nodes_of(sympy.Float, args[0])}
+        args = [replaced(args[0], exact)]
+    return expression.func(*args)
+
+
+def _turns(number: sympy.Float) -> sympy.Expr:
+    parts = round(float(number) / math.pi * PARTS_OF_PI)
+    value = parts * math.pi / PARTS_OF_PI
+    return sympy.Rational(parts, PARTS_OF_PI) * sympy.pi if abs(value - number) <= 1e-15 * value else number
+
+
+def _ratio(one: sympy.Expr, other: sympy.Expr) -> float:
+    """The constant ratio of two expressions, 0 if they have none."""
+    if one == other:
+        return 1.0
+    ratio = sympy.cancel(one / other)
+    return float(ratio) if ratio.is_number and ratio.is_real and ratio.is_finite else 0.0
+
+
+def _replaced(
+    expression: sympy.Expr,
+    values: Mapping[sympy.Expr, sympy.Expr],
+    names: Mapping[sympy.Expr, sympy.Dummy],
+) -> sympy.Expr:
+    """The expression with values for some atoms, and for all other atoms names of unknown value."""
+    return replaced(expression, {**names, **values})
+
+
+@once
+def _without_choices(expression: sympy.Expr) -> sympy.Expr:
+    """Choices and connectives as polynomials in their conditions, which are 0 or 1.
+
+    What holds on a surface only, an equality, does not hold beside it.
+    """
+    if not expression.args:
+        return expression
+    args = [_without_choices(argument) for argument in expression.args]
+    if isinstance(expression, Select):
+        condition, a, b = args
+        condition = _truth(expression.args[0], condition)
+        return condition * a + (1 - condition) * b
+    if isinstance(expression, And | Or):
+        a, b = (_truth(raw, arg) for raw, arg in zip(expression.args, args, strict=True))
+        return a * b if isinstance(expression, And) else a + b - a * b
+    if isinstance(expression, Not):
+        return 1 - _truth(expression.args[0], args[0])
+    if isinstance(expression, Equal):
+        return ZERO if symbols_of(expression) else expression
+    return expression.func(*args)
+
+
+def _truth(raw: sympy.Expr, value: sympy.Expr) -> sympy.Expr:
+    """0 or 1 for a condition; a number is true but where it vanishes."""
+    is_truth = isinstance(raw, And | Or | Not | Equal | Less | LessEqual | sympy.Dummy)
+    if is_truth or value in (ZERO, ONE):
+        return value
+    return ONE
+
+
+def _is_zero(expression: sympy.Expr) -> bool:
+    if is_larger_than(MOST_EXPANDED, expression) or not UNKNOWN.isdisjoint(nodes(expression)):
+        return False
+    expanded = sympy.expand(expression)
+    if expanded == 0:
+        return True
+    scale = max((abs(float(c)) for c in _coefficients(expression)), default=0.0)
+    return all(abs(float(c)) <= SMALL * scale for c in _coefficients(expanded))
+
+
+def _coefficients(expression: sympy.Expr) -> list[sympy.Expr]:
+    """Numbers in front of the terms of a sum; a term that is no number times something has 1."""
+    return [term.as_coeff_Mul()[0] for term in sympy.Add.make_args(expression) if term != 0]
+
+
+def _told(atom: sympy.Expr) -> str:
+    if isinstance(atom, ROUNDING):
+        return f"{atom.args[0]} is a whole number"
+    if isinstance(atom, REMAINDERS):
+        return f"{atom.args[0]} is a multiple of {atom.args[1]}"
+    if isinstance(atom, Atan2):
+        return f"the angle of ({atom.args[1]}, {atom.args[0]}) turns from pi to -pi"
+    if isinstance(atom, Less | LessEqual):
+        return f"{atom.args[1]} = {atom.args[0]}"
+    return f"{atom.args[0]} = 0"
+
+
+# What jumps among the functions that compiled code may call.
+JUMPING_NAMES = frozenset(
+    {
+        "argmax", "argmin", "bool", "ceil", "copysign", "digitize", "divmod", "fix", "floor",
+        "floor_divide", "fmod", "heaviside", "int", "mod", "piecewise", "remainder", "rint", "round",
+        "searchsorted", "select", "sign", "signbit", "trunc", "where",
+    }
+)  # fmt: skip
+# By these a complex number tells its real part, which can be compared.
+REAL_PARTS = frozenset({"real", "abs", "absolute", "hypot"})
+
+
+def may_jump(function: Callable[..., Any], differentiable: bool) -> bool:
+    """Whether a function that could not be traced may jump, judged by its code.
+
+    ``differentiable`` is whether it runs on complex numbers, which have no order: then it does not branch on
+    the state, unless by way of the real parts.
+    """
+    codes = codes_of(function)
+    names = {name for code in codes for name in code.co_names}
+    decides = any(_decides(code) for code in codes)
+    if differentiable:
+        return decides and bool(names & REAL_PARTS)
+    return decides or bool(names & JUMPING_NAMES) or _calls_others(function, names)
+
+
+def codes_of(function: Callable[..., Any]) -> list[CodeType]:
+    """The code of a function and of the functions within it."""
+    codes = [function.__code__] if isinstance(function, FunctionType) else []
+    for code in codes:
+        codes += [constant for constant in code.co_consts if isinstance(constant, CodeType)]
+    return codes
+
+
+def _decides(code: CodeType) -> bool:
+    return any(
+        instruction.opname in ("COMPARE_OP", "CONTAINS_OP", "IS_OP")
+        or "JUMP_IF" in instruction.opname
+        or "_IF_" in instruction.opname
+        or (instruction.opname == "BINARY_OP" and instruction.argrepr.strip("=") in ("%", "//"))
+        for instruction in dis.get_instructions(code)
+    )
+
+
+def _calls_others(function: Callable[..., Any], names: Iterable[str]) -> bool:
+    """Whether it calls functions that are neither Python's nor NumPy's, and so are not looked into."""
+    if not isinstance(function, FunctionType):
+        return True
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    used = [function.__globals__[name] for name in names if name in function.__globals__] + cells
+    allowed = (ModuleType, BuiltinFunctionType, np.ufunc, type)
+    return any(callable(each) and not isinstance(each, allowed) for each in used)

@@ -1,0 +1,122 @@
+"""Derivatives of expressions by the chain rule: all partial ones at once, or one along a vector.
+
+SymPy's own ``diff`` walks an expression once for each variable and asks about assumptions at every node. Here
+every node is differentiated once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import sympy
+from sympy.core.parameters import global_parameters
+
+from hybrid.symbolic.expressions import ONE, ZERO, Select, product
+from hybrid.symbolic.nodes import interned, once
+
+Partials = dict[sympy.Symbol, sympy.Expr]
+
+
+def partial_derivatives(
+    expressions: Iterable[sympy.Expr], variables: Sequence[sympy.Symbol]
+) -> list[list[sympy.Expr]]:
+    """Rows of the partial derivatives of ``expressions`` with respect to ``variables``."""
+    wanted = frozenset(variables)
+    rows = (_partials(expression, wanted, global_parameters.distribute) for expression in expressions)
+    return [[interned(row.get(variable, ZERO)) for variable in variables] for row in rows]
+
+
+def divergence(field: Sequence[sympy.Expr], variables: Sequence[sympy.Symbol]) -> sympy.Expr:
+    """Sum of the derivatives of each rate in its own variable."""
+    return sympy.Add(*(row[i] for i, row in enumerate(partial_derivatives(field, variables))))
+
+
+@once
+def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distributed: bool) -> Partials:
+    """The partial derivatives that are not zero; ``distributed`` is how SymPy treats numbers times sums.
+
+    Those of an expression are the same objects each time. Two that are only equal are compared branch by
+    branch, for as long as a tree of them takes.
+    """
+    if expression.is_Symbol:
+        return {expression: ONE} if expression in wanted else {}
+    if isinstance(expression, sympy.sign):
+        return {}
+    args = expression.args
+    inner = [_partials(argument, wanted, distributed) for argument in args]
+    terms: dict[sympy.Symbol, list[sympy.Expr]] = {}
+    if isinstance(expression, Select):
+        condition, (_, one, other) = args[0], inner
+        for v in one | other:
+            terms[v] = [Select(condition, one.get(v, ZERO), other.get(v, ZERO))]
+    else:
+        for place, partials in enumerate(inner):
+            if not partials:
+                continue
+            if expression.is_Add:
+                products = partials
+            elif expression.is_Mul:
+                before, behind = args[:place], args[place + 1 :]
+                products = {v: _with_factor(part, before, behind) for v, part in partials.items()}
+            else:
+                outer = _outer(expression, place)
+                products = {v: product(outer, part) for v, part in partials.items()}
+            for v, term in products.items():
+                terms.setdefault(v, []).append(term)
+    sums = {v: sympy.Add(*each) if len(each) > 1 else each[0] for v, each in terms.items()}
+    return {v: total for v, total in sums.items() if total != 0}
+
+
+def directional(
+    expressions: Iterable[sympy.Expr], seeds: dict[sympy.Symbol, sympy.Symbol]
+) -> list[sympy.Expr]:
+    """Derivatives along the seeds, one for each symbol, in a form that keeps common factors together."""
+    found: dict[sympy.Expr, sympy.Expr] = {}
+    return [interned(_along(expression, seeds, found)) for expression in expressions]
+
+
+def _along(
+    expression: sympy.Expr, seeds: dict[sympy.Symbol, sympy.Symbol], found: dict[sympy.Expr, sympy.Expr]
+) -> sympy.Expr:
+    if expression.is_Symbol:
+        return seeds.get(expression, ZERO)
+    known = found.get(expression)
+    if known is not None:
+        return known
+    args = expression.args
+    terms = []
+    for place, argument in enumerate(args):
+        inner = _along(argument, seeds, found)
+        if inner == 0:
+            continue
+        if expression.is_Add:
+            terms.append(inner)
+        elif expression.is_Mul:
+            terms.append(_with_factor(inner, args[:place], args[place + 1 :]))
+        else:
+            terms.append(product(_outer(expression, place), inner))
+    found[expression] = sympy.Add(*terms) if len(terms) != 1 else terms[0]
+    return found[expression]
+
+
+def _with_factor(
+    factor: sympy.Expr, before: tuple[sympy.Expr, ...], behind: tuple[sympy.Expr, ...]
+) -> sympy.Expr:
+    """A product with one factor put in its place."""
+    if factor is ONE and len(before) + len(behind) == 1:
+        [other] = (*before, *behind)
+        return other
+    return product(*before, factor, *behind)
+
+
+def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
+    """Derivative of the outermost function in its argument of that index."""
+    if expression.is_Pow:
+        base, exponent = expression.args
+        return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
+    # SymPy would evaluate the other function anew.
+    if isinstance(expression, sympy.sin):
+        return sympy.cos(expression.args[0], evaluate=False)
+    if isinstance(expression, sympy.cos):
+        return -sympy.sin(expression.args[0], evaluate=False)
+    return expression.fdiff(index + 1)

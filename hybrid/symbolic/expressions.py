@@ -1,0 +1,258 @@
+"""SymPy functions with the floating-point meaning of NumPy's: kinks, jumps and choices.
+
+SymPy's own Max, Piecewise, sign and Mod reason about their arguments, which is slow, and rewrite them,
+which can change how they round. These do neither: they fold plain numbers and know their derivative.
+"""
+
+# ruff: noqa: D102 - the methods are the hooks that SymPy documents
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import sympy
+
+from hybrid.symbolic.nodes import contains, interned, once
+
+ZERO = sympy.Integer(0)
+ONE = sympy.Integer(1)
+HALF = sympy.Rational(1, 2)
+# Numbers to remember.
+MOST_NUMBERS = 10_000
+
+
+def number(value: Any) -> sympy.Expr:
+    """A float or an integer as a SymPy number of the same value.
+
+    Multiples of 1/8 become exact rationals, so that ``z**1.5`` and ``2.0*x`` keep their structure.
+    """
+    return _number(float(value))
+
+
+# The same object each time: what SymPy finds out about a number stays with it.
+@lru_cache(maxsize=MOST_NUMBERS)
+def _number(value: float) -> sympy.Expr:
+    if math.isfinite(value) and abs(value) < 2.0**50 and (8.0 * value).is_integer():
+        return sympy.Rational(int(8.0 * value), 8)
+    return sympy.Float(value) if math.isfinite(value) else sympy.sympify(value)
+
+
+def product(*factors: sympy.Expr) -> sympy.Expr:
+    """SymPy's product. Of a number and a symbol or a function it is made without a question to SymPy."""
+    if len(factors) == 2:
+        a, b = factors if factors[0].is_Number else factors[::-1]
+        if a.is_Number and (b.is_Symbol or b.is_Function) and a is not ZERO and a is not ONE:
+            return sympy.Mul(a, b, evaluate=False)
+    return sympy.Mul(*factors)
+
+
+class RealFunction(sympy.Function):
+    """A real function that folds numbers by ``value``."""
+
+    is_real = True
+    value: ClassVar[Callable[..., float]]
+
+    @classmethod
+    def eval(cls, *args: sympy.Expr) -> sympy.Expr | None:
+        if all(arg.is_Number for arg in args):
+            return number(cls.value(*map(float, args)))
+        return None
+
+
+class PiecewiseConstant(RealFunction):
+    """A function that only changes by jumping."""
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        return ZERO
+
+
+class Floor(PiecewiseConstant):
+    """The largest integer not above ``u``."""
+
+    value = staticmethod(math.floor)
+
+
+class Ceiling(PiecewiseConstant):
+    """The smallest integer not below ``u``."""
+
+    value = staticmethod(math.ceil)
+
+
+class Truncate(PiecewiseConstant):
+    """``u`` without its fraction."""
+
+    value = staticmethod(math.trunc)
+
+
+class Sign(PiecewiseConstant):
+    """-1, 0 or 1."""
+
+    value = staticmethod(lambda u: float((u > 0) - (u < 0)))
+
+
+class Step(PiecewiseConstant):
+    """1 where ``u > 0``, 0 where ``u < 0``, 1/2 at 0."""
+
+    value = staticmethod(lambda u: 0.5 + 0.5 * ((u > 0) - (u < 0)))
+
+
+class Less(PiecewiseConstant):
+    """1 if ``a < b``, else 0."""
+
+    value = staticmethod(lambda a, b: float(a < b))
+
+
+class LessEqual(PiecewiseConstant):
+    """1 if ``a <= b``, else 0."""
+
+    value = staticmethod(lambda a, b: float(a <= b))
+
+
+class Equal(PiecewiseConstant):
+    """1 if ``a == b``, else 0."""
+
+    value = staticmethod(lambda a, b: float(a == b))
+
+
+class And(PiecewiseConstant):
+    """1 if neither is 0."""
+
+    value = staticmethod(lambda a, b: float(bool(a and b)))
+
+
+class Or(PiecewiseConstant):
+    """1 unless both are 0."""
+
+    value = staticmethod(lambda a, b: float(bool(a or b)))
+
+
+class Not(PiecewiseConstant):
+    """1 if ``a`` is 0."""
+
+    value = staticmethod(lambda a: float(not a))
+
+
+class Absolute(RealFunction):
+    """``|u|``, of slope 0 at 0."""
+
+    value = staticmethod(abs)
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        return Sign(self.args[0])
+
+
+class Maximum(RealFunction):
+    """The larger of two, of slope 1/2 in each where they tie."""
+
+    value = staticmethod(max)
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        mine, other = self.args if argindex == 1 else self.args[::-1]
+        return Step(mine - other)
+
+
+class Minimum(RealFunction):
+    """The smaller of two, of slope 1/2 in each where they tie."""
+
+    value = staticmethod(min)
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        mine, other = self.args if argindex == 1 else self.args[::-1]
+        return Step(other - mine)
+
+
+class Remainder(RealFunction):
+    """``a - b*floor(a/b)``, of the sign of ``b``."""
+
+    value = staticmethod(lambda a, b: a % b if b else math.nan)
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        return ONE if argindex == 1 else -Floor(self.args[0] / self.args[1])
+
+
+class TruncatedRemainder(RealFunction):
+    """``a - b*trunc(a/b)``, of the sign of ``a``."""
+
+    value = staticmethod(lambda a, b: math.fmod(a, b) if b else math.nan)
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        return ONE if argindex == 1 else -Truncate(self.args[0] / self.args[1])
+
+
+class Atan2(RealFunction):
+    """The angle of the point ``(x, y)``, called with ``y`` first."""
+
+    value = staticmethod(math.atan2)
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        y, x = self.args
+        return (x if argindex == 1 else -y) / (x**2 + y**2)
+
+
+class CubeRoot(RealFunction):
+    """The real cube root, of the sign of ``u``."""
+
+    value = staticmethod(lambda u: math.copysign(abs(u) ** (1 / 3), u))
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        return 1 / (3 * self**2)
+
+
+class Select(RealFunction):
+    """``a`` where the condition holds, else ``b``."""
+
+    @classmethod
+    def eval(cls, condition: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> sympy.Expr | None:
+        if condition.is_Number:
+            return b if condition.is_zero else a
+        return a if a == b else None
+
+    def _eval_derivative(self, variable: sympy.Symbol) -> sympy.Expr:
+        condition, a, b = self.args
+        return Select(condition, a.diff(variable), b.diff(variable))
+
+
+class Gate(RealFunction):
+    """``Step(u)*rest``, but 0 where ``u < 0`` even if ``rest`` is infinite there."""
+
+    @classmethod
+    def eval(cls, u: sympy.Expr, rest: sympy.Expr) -> sympy.Expr | None:
+        return None
+
+
+# Functions whose derivative misses the jumps they make: a constant derivative proves nothing about them.
+JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)
+
+
+@once
+def close_gates(expression: sympy.Expr) -> sympy.Expr:
+    """Let a factor that switches a product off win over one that is infinite where it does.
+
+    The slope of ``max(z, 0)**(1/4)`` is ``max(z, 0)**(-3/4)/4 * Step(z)``: 0 for ``z < 0``, never
+    ``inf*0``.
+    """
+    return interned(_closed(expression)) if contains(expression, (Step, Select)) else expression
+
+
+def _closed(expression: sympy.Expr) -> sympy.Expr:
+    arguments = [close_gates(argument) for argument in expression.args]
+    if not expression.is_Mul:
+        return expression.func(*arguments)
+    plain = [factor for factor in arguments if not _switches(factor)]
+    product = sympy.Mul(*plain)
+    for factor in arguments:
+        if isinstance(factor, Step) and product != 1:
+            product = Gate(factor.args[0], product)
+        elif isinstance(factor, Step):
+            product = factor
+        elif _switches(factor):
+            condition, a, b = factor.args
+            product = Select(condition, a * product, b * product)
+    return product
+
+
+def _switches(factor: sympy.Expr) -> bool:
+    return isinstance(factor, Step) or (isinstance(factor, Select) and ZERO in factor.args[1:])

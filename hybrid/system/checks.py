@@ -1,0 +1,222 @@
+"""A few calls of every model function when a system is made, to meet a slip where it is made."""
+
+from __future__ import annotations
+
+import inspect
+import numbers
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.errors import ModelError
+from hybrid.system.derivatives import check_derivative, evaluate, sample_points
+from hybrid.system.functions import CONDITION, Role, roles
+from hybrid.system.variables import parameter_view, state_values
+
+if TYPE_CHECKING:
+    from hybrid.system.graph import HybridSystem
+
+SAMPLE_TIME = np.float64(0.7548776662466927)
+# Multiples of an irrational number modulo 1 keep the components apart, clear of kinks and symmetries.
+SAMPLE_STRIDE = 0.6180339887498949
+
+
+def probe_system(system: HybridSystem) -> None:
+    """Call every model function at a few generic points and check what comes back.
+
+    Arithmetic trouble there (a logarithm of a negative number, a division by zero) is no error: the
+    points are arbitrary. Given derivatives are compared with the functions they belong to, and all functions
+    with themselves: called again, and one declared period later.
+
+    Raises
+    ------
+    ModelError
+        If a function has the wrong arity, asks for a name that does not exist, fails, is not pure, or returns
+        the wrong number or kind of values; or if a given derivative or the period is wrong.
+    """
+    for role in roles(system):
+        _probe_role(system, role)
+    if callable(system.period):
+        _probe_period(system)
+    _check_period(system)
+
+
+def sample_state(system: HybridSystem) -> np.ndarray:
+    """The fixed point ``(n,)`` of the probe, in (1/2, 3/2)."""
+    fractions: np.ndarray = np.mod(SAMPLE_STRIDE * np.arange(1, system.dimension + 1), 1.0)
+    return 0.5 + fractions
+
+
+def derivative_has_time_column(system: HybridSystem, role: Role) -> bool:
+    """Whether a given derivative returns ``n + 1`` columns; no, if it cannot be told at the sample point."""
+    assert role.derivative is not None
+    value = _call(role.derivative_title, role.derivative, _arguments(system))
+    if value is None:
+        return False
+    return int(np.asarray(value[0]).size) == role.rows * (system.dimension + 1)
+
+
+def _arguments(system: HybridSystem) -> tuple[Any, ...]:
+    p = parameter_view(system, system.parameter_values())
+    return SAMPLE_TIME, state_values(system, sample_state(system)), p
+
+
+def _probe_role(system: HybridSystem, role: Role) -> None:
+    arguments = _arguments(system)
+    value = _call(role.title, role.function, arguments)
+    if value is not None:
+        _check_value(system, role, value[0])
+        _check_pure(system, role)
+    if role.derivative is not None:
+        _probe_derivative(system, role, arguments)
+
+
+def _check_pure(system: HybridSystem, role: Role) -> None:
+    """The same arguments must give the same values, however often and in whatever order they come."""
+    values, points = system.parameter_values(), [*sample_points(system.dimension)]
+    passes = [[evaluate(system, role.function, t, x, values) for t, x in points] for _ in range(2)]
+    for (t, x), first, second in zip(points, *passes, strict=True):
+        if first is not None and second is not None and not np.array_equal(first, second):
+            raise ModelError(
+                f"{role.title} returned {first.tolist()} and, called again with the same arguments "
+                f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
+                "random numbers, no counters, nothing kept between calls."
+            )
+
+
+def _probe_derivative(system: HybridSystem, role: Role, arguments: tuple[Any, ...]) -> None:
+    assert role.derivative is not None
+    value = _call(role.derivative_title, role.derivative, arguments)
+    if value is not None:
+        _check_derivative_shape(system, role, value[0])
+        check_derivative(system, role)
+
+
+def _probe_period(system: HybridSystem) -> None:
+    title = "HybridSystem: period"
+    assert callable(system.period)
+    value = _call(title, system.period, (parameter_view(system, system.parameter_values()),), "p")
+    if value is not None and not _is_number(value[0]):
+        raise ModelError(f"{title} must return a number; got {value[0]!r}.")
+
+
+def _check_period(system: HybridSystem) -> None:
+    """A declared period must be one at the declared parameters."""
+    from hybrid.system.graph import period_at
+    from hybrid.system.periodicity import period_fault
+
+    values = system.parameter_values()
+    try:
+        period = period_at(system, values)
+    except (ArithmeticError, ValueError):  # told by the run at these parameters
+        return
+    fault = None if period is None else period_fault(system, values, period)
+    if fault is not None:
+        raise ModelError(fault)
+
+
+def _call(
+    title: str, function: Callable[..., Any], arguments: tuple[Any, ...], signature: str = "t, x, p"
+) -> tuple[Any] | None:
+    """The value in a 1-tuple, or None where the arithmetic fails at the sample point."""
+    _check_arity(title, function, arguments, signature)
+    try:
+        with np.errstate(all="ignore"):
+            return (function(*arguments),)
+    except ArithmeticError:
+        return None
+    except ModelError as error:
+        raise ModelError(f"{title}: {error}") from error
+    except Exception as error:
+        if isinstance(error, ValueError) and "math domain" in str(error):
+            return None
+        if isinstance(error, ValueError) and "read-only" in str(error):
+            raise ModelError(
+                f"{title} writes into its argument, which is the state of the run: {error}. Take a copy "
+                "first, x = x.copy(), or build the values anew."
+            ) from error
+        raise ModelError(
+            f"{title} fails when called with ({signature}): {type(error).__name__}: {error}."
+        ) from error
+
+
+def _check_arity(
+    title: str, function: Callable[..., Any], arguments: tuple[Any, ...], signature: str
+) -> None:
+    try:
+        expected = inspect.signature(function)
+    except (TypeError, ValueError):  # some builtins and ufuncs have none to look at
+        return
+    try:
+        expected.bind(*arguments)
+    except TypeError as error:
+        raise ModelError(f"{title} must take ({signature}); got a function of {expected}: {error}.") from None
+
+
+def _check_value(system: HybridSystem, role: Role, value: Any) -> None:
+    if role.size is None:
+        if role.name == CONDITION:
+            if not _is_number(value):
+                raise ModelError(
+                    f"{role.title} must return one number, positive where the guard may fire, or a truth "
+                    f"value; got {value!r}."
+                )
+            return
+        # A truth value has no side to cross from and no slope to cross with.
+        if isinstance(value, bool | np.bool_) or not _is_number(value):
+            raise ModelError(f"{role.title} must return one number that changes sign; got {value!r}.")
+        return
+    values = _as_sequence(role.title, value, f"one value per state ({_names(system)})")
+    if len(values) != role.size:
+        what = "time derivative" if role.name == "field" else "value"
+        raise ModelError(
+            f"{role.title} returned {len(values)} values; the state has {role.size} "
+            f"({_names(system)}). Return one {what} per state."
+        )
+    _check_numbers(role.title, values)
+
+
+def _check_derivative_shape(system: HybridSystem, role: Role, value: Any) -> None:
+    n, title = system.dimension, role.derivative_title
+    if role.size is None:
+        rows = [_as_sequence(title, value, f"{n} or {n + 1} values")]
+    else:
+        rows = [
+            _as_sequence(title, row, f"rows of {n} or {n + 1} values")
+            for row in _as_sequence(title, value, f"{n} rows")
+        ]
+    widths = sorted({len(row) for row in rows})
+    if len(rows) != role.rows or len(widths) != 1 or widths[0] not in (n, n + 1):
+        wanted = f"{n} or {n + 1} values" if role.size is None else f"{n} rows of {n} or {n + 1} values"
+        shape = " or ".join(map(str, widths))
+        got = f"{shape} values" if role.size is None else f"{len(rows)} rows of {shape} values"
+        raise ModelError(
+            f"{title} returned {got}; it must return {wanted}: "
+            f"one column per state ({_names(system)}), and D_t last if there is one more."
+        )
+    for row in rows:
+        _check_numbers(title, row)
+
+
+def _as_sequence(title: str, value: Any, wanted: str) -> list[Any]:
+    try:
+        return list(value)
+    except TypeError:
+        raise ModelError(f"{title} must return a sequence of {wanted}; got {value!r}.") from None
+
+
+def _check_numbers(title: str, values: list[Any]) -> None:
+    for i, value in enumerate(values):
+        if not _is_number(value):
+            raise ModelError(f"{title}: value {i} is not a number: {value!r}.")
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.ndim == 0 and value.dtype.kind in "fiub"
+    return isinstance(value, numbers.Real | np.bool_)
+
+
+def _names(system: HybridSystem) -> str:
+    return ", ".join(system.state_names)

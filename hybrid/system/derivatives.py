@@ -1,0 +1,251 @@
+"""Derivatives of model functions: symbolic ones of traced functions, and numerical ones to check against.
+
+Every derivative has ``n + 1`` columns, one per state and the one for time last.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid.errors import ModelError
+from hybrid.system.functions import Role
+from hybrid.system.variables import parameter_view, state_values
+
+if TYPE_CHECKING:
+    import sympy
+
+    from hybrid.system.graph import HybridSystem
+
+COMPLEX_STEP = 1e-30
+# A central difference carried twice, so that its own convergence gives its error.
+DIFFERENCE_STEP = 2.0**-16
+
+
+def symbolic_jacobian(
+    expressions: Iterable[sympy.Expr], variables: Iterable[sympy.Symbol]
+) -> list[list[sympy.Expr]]:
+    """Rows of the derivatives of ``expressions`` with respect to ``variables`` (states, then time).
+
+    At a kink ``np.maximum`` and ``np.minimum`` pass half of either slope, ``np.abs`` none; piecewise
+    constant functions have slope zero.
+    """
+    from sympy.core.parameters import distribute
+
+    from hybrid.symbolic.derivatives import partial_derivatives
+    from hybrid.symbolic.expressions import close_gates
+
+    with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
+        rows = partial_derivatives(expressions, list(variables))
+        return [[close_gates(entry) for entry in row] for row in rows]
+
+
+def check_derivative(system: HybridSystem, role: Role) -> None:
+    """Compare the derivative a user gives with the complex step of the function, at default parameters.
+
+    The complex step is believed where central differences confirm it (``np.abs`` of a complex number,
+    for one, has no complex derivative); elsewhere the central differences themselves are the measure,
+    to their own accuracy. Points where the function is not finite are passed over.
+
+    Raises
+    ------
+    ModelError
+        If an entry is wrong, or if the column for time is missing and the function depends on time.
+    """
+    values = system.parameter_values()
+    for t, x in sample_points(system.dimension):
+        reference = reference_derivative(system, role, t, x, values)
+        given = evaluate(system, role.derivative, t, x, values)
+        if reference is None or given is None:
+            continue
+        fault = derivative_fault(system, role, given.reshape(role.rows, -1), reference)
+        if fault is not None:
+            raise ModelError(fault)
+
+
+def complex_step_error(system: HybridSystem, role: Role) -> Exception | None:
+    """Why the complex step cannot be taken through a function, or None if it can.
+
+    It must run on complex numbers, and agree with central differences.
+    """
+    values = system.parameter_values()
+    for t, x in sample_points(system.dimension):
+        try:
+            found = complex_step(system, role, t, x, values)
+        except ArithmeticError:
+            continue
+        except Exception as error:
+            return error
+        reference = _central_difference(system, role, t, x, values)
+        if reference is not None and not reference.confirms(found):
+            return ModelError("it runs on complex numbers, but is not differentiable there")
+    return None
+
+
+def sample_points(n: int) -> Iterator[tuple[float, np.ndarray]]:
+    """A few fixed points ``(t, x)`` of size near 1, in the positive orthant first."""
+    rng = np.random.default_rng(20240507)
+    for signs in (np.ones(n), np.ones(n), rng.choice([-1.0, 1.0], n), -np.ones(n)):
+        yield rng.uniform(0.5, 1.5), signs * rng.uniform(0.5, 1.5, n)
+
+
+@attrs.frozen(eq=False)
+class Reference:
+    """Derivative of a model function at a point, and how far to believe it.
+
+    Attributes
+    ----------
+    t, x
+        The point.
+    values, tolerance
+        ``(rows, n + 1)``; the tolerance is infinite where the function has a kink or a jump.
+    source
+        How it was found, for error texts.
+    """
+
+    t: float
+    x: np.ndarray
+    values: np.ndarray
+    tolerance: np.ndarray
+    source: str
+
+    def confirms(self, other: np.ndarray) -> bool:
+        """Whether another derivative agrees; an entry that is nan says nothing against it."""
+        return not np.any(np.abs(other - self.values) > self.tolerance)
+
+
+def reference_derivative(
+    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+) -> Reference | None:
+    """Complex step where central differences confirm it, else those; None where the function is not finite.
+
+    ``parameters`` is the vector ``(m,)`` of their values.
+    """
+    difference = _central_difference(system, role, t, x, parameters)
+    if difference is None:
+        return None
+    try:
+        values = complex_step(system, role, t, x, parameters)
+    except Exception:  # whatever stops it, the central difference stands in
+        return difference
+    if not np.all(np.isfinite(values)) or not difference.confirms(values):
+        return difference
+    # Where a magnitude with a small factor hides its derivative the two differ by that factor.
+    tolerance = 1e-9 * (1.0 + np.abs(values)) + 2.0 * np.abs(values - difference.values)
+    tolerance[np.isinf(difference.tolerance)] = np.inf
+    return Reference(t, x, values, tolerance, "complex step")
+
+
+def evaluate(
+    system: HybridSystem,
+    function: Callable[..., Any] | None,
+    t: float,
+    x: np.ndarray,
+    parameters: np.ndarray,
+) -> Any:
+    """Values of a model function as a flat array, or None where they do not exist or are not finite."""
+    assert function is not None
+    p = parameter_view(system, parameters)
+    try:
+        with np.errstate(all="ignore"):
+            values = np.ravel(np.asarray(function(np.float64(t), state_values(system, x), p), dtype=float))
+    except Exception:  # whatever stops it there, it has no value there
+        return None
+    return values if np.all(np.isfinite(values)) else None
+
+
+def derivative_fault(system: HybridSystem, role: Role, given: np.ndarray, reference: Reference) -> str | None:
+    """What is wrong with a derivative ``(rows, n)`` or ``(rows, n + 1)``, in words; None if nothing is."""
+    n = system.dimension
+    missing_time = given.shape[1] == n
+    full = np.column_stack([given, np.zeros(role.rows)]) if missing_time else given
+    wrong = np.abs(full - reference.values) > reference.tolerance
+    if not np.any(wrong):
+        return None
+    # Look at the states first: a wrong entry there tells more than a missing column.
+    j, i = (int(k) for k in np.argwhere(wrong.T)[0])
+    place = f"t = {reference.t:.6g}, x = ({', '.join(f'{value:.6g}' for value in reference.x)})"
+    row = "" if role.size is None else f" of {system.state_names[i]}"
+    expected = f"{reference.values[i, j]:.10g}"
+    if missing_time and j == n:
+        return (
+            f"{role.derivative_title} has {n} columns, but the {role.name} depends on t: D_t{row} is "
+            f"{expected} at {place}. Return {n + 1} columns with D_t last."
+        )
+    column = (*system.state_names, "t")[j]
+    return (
+        f"{role.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
+        f"{reference.source} of the {role.name} gives {expected}. Fix it, or leave it out: "
+        "the library derives it."
+    )
+
+
+def _central_difference(
+    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+) -> Reference | None:
+    here = evaluate(system, role.function, t, x, parameters)
+    if here is None:
+        return None
+    coarse = _differences(system, role, t, x, parameters, here, DIFFERENCE_STEP)
+    fine = _differences(system, role, t, x, parameters, here, DIFFERENCE_STEP / 2)
+    if coarse is None or fine is None:
+        return None
+    (central, bend), (half_central, half_bend) = coarse, fine
+    size = 1.0 + np.abs(half_central)
+    rounding = 1e-10 * np.abs(here).reshape(-1, 1)
+    tolerance = 1e-7 * size + rounding + 4.0 * np.abs(half_central - central)
+    # The slopes ahead and behind approach each other with the step, save where the function has a kink.
+    kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size + rounding)
+    tolerance[kink] = np.inf
+    return Reference(t, x, (4.0 * half_central - central) / 3.0, tolerance, "central difference")
+
+
+def _differences(
+    system: HybridSystem,
+    role: Role,
+    t: float,
+    x: np.ndarray,
+    parameters: np.ndarray,
+    here: np.ndarray,
+    h: float,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Central differences, and how much the slopes ahead and behind differ."""
+    central, bend = [], []
+    for shift in h * np.eye(len(x) + 1):
+        ahead = evaluate(system, role.function, t + shift[-1], x + shift[:-1], parameters)
+        behind = evaluate(system, role.function, t - shift[-1], x - shift[:-1], parameters)
+        if ahead is None or behind is None:
+            return None
+        central.append((ahead - behind) / (2.0 * h))
+        bend.append(np.abs(ahead - 2.0 * here + behind) / h)
+    return np.column_stack(central), np.column_stack(bend)
+
+
+class _ComplexState(np.ndarray):
+    """Gives out Python's complex numbers, which have no order, as in compiled code; NumPy's have one."""
+
+    def __getitem__(self, key: Any) -> Any:
+        value = super().__getitem__(key)
+        return complex(value) if isinstance(value, np.complexfloating) else value
+
+
+def complex_step(
+    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+) -> np.ndarray:
+    """Derivative ``(rows, n + 1)`` of a model function by the complex step, in plain Python."""
+    p = parameter_view(system, parameters)
+    columns = []
+    for shift in COMPLEX_STEP * np.eye(len(x) + 1):
+        z = x + 1j * shift[:-1]
+        z.flags.writeable = False
+        state = z.view(_ComplexState) if isinstance(system.state, int) else state_values(system, z.tolist())
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            # Storing a complex number in a real array drops the derivative, with a mere warning.
+            warnings.simplefilter("error", np.exceptions.ComplexWarning)
+            values = np.asarray(role.function(complex(t, shift[-1]), state, p), dtype=complex)
+        columns.append(np.ravel(values).imag / COMPLEX_STEP)
+    return np.column_stack(columns)

@@ -1,0 +1,162 @@
+"""Figures of the study, written as PNG files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lyapunov.study.paper import ROWS
+from lyapunov.study.report import histories, paper_columns
+from lyapunov.study.runs import Regime
+from lyapunov.study.tangents import Trap
+from lyapunov.floquet import floquet_exponents
+from lyapunov.plot import COLOURS, INK, Panel, plot_convergence, plot_phase_portrait, plot_regimes, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BODIES = (
+    ("main body", "x1", "v1", ("$x_1$, m", "$\\dot x_1$, m/s")),
+    ("attached body", "x2", "v2", ("$x_2$, m", "$\\dot x_2$, m/s")),
+)
+# Up to here every estimate is a tangle.
+FIRST_SHOWN = 10
+# The first estimates of every method are far off; the scale is that of what they come to.
+LEAST_HEIGHT = 0.03
+ESTIMATES = (
+    ("Two orbits, formulas (7) and (8)", ("(7)", "(8)")),
+    ("Two orbits, formula (9)", ("(9)",)),
+    ("Benettin, two starts", ("(10) I", "(10) II")),
+    ("What converges", ("two-orbit", "tapered")),
+)
+
+
+def write_figures(folder: Path, regimes: Sequence[Regime]) -> list[Path]:
+    """A phase portrait and the convergence for each regime, and all regimes compared; returns the paths."""
+    paths = []
+    with style():
+        for regime in regimes:
+            paths.append(_save(portrait(regime), folder / f"portrait_{regime.omega:.2f}.png"))
+            paths.append(_save(convergence(regime), folder / f"convergence_{regime.omega:.2f}.png"))
+        paths.append(_save(comparison(regimes), folder / "regimes.png"))
+    return paths
+
+
+def write_tolerance_figure(folder: Path, trap: Trap) -> Path:
+    """The trap, as ``tolerances.png``."""
+    with style():
+        return _save(tolerances(trap), folder / "tolerances.png")
+
+
+def _title(regime: Regime) -> str:
+    return f"$\\omega$ = {regime.omega:.2f} rad/s, {regime.kind}"
+
+
+def portrait(regime: Regime) -> Figure:
+    """Phase portraits of both bodies with the points once a period."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.8))
+    for ax, (body, x, v, labels) in zip(axes, BODIES, strict=True):
+        plot_phase_portrait(ax, regime.arc, x, v, section=regime.section.x, labels=labels)
+        ax.set_title(body)
+    figure.suptitle(f"{_title(regime)}: orbit, and section once a period", x=0.01, ha="left", fontsize=10.5)
+    return figure
+
+
+def convergence(regime: Regime) -> Figure:
+    """Every estimate over M, the paper's figures as open circles."""
+    import matplotlib.pyplot as plt
+
+    ours, theirs = histories(regime), paper_columns(regime.omega)
+    truth, label = _truth(regime)
+    figure, axes = plt.subplots(2, 2, figsize=(8.4, 6.4), sharex=True)
+    for ax, (title, names) in zip(axes.flat, ESTIMATES, strict=True):
+        points = {name: _printed(theirs[name]) for name in names if name in theirs}
+        points = {name: point for name, point in points.items() if len(point[0])}
+        shown = {name: ours[name] for name in names}
+        plot_convergence(ax, shown, points=points, points_label="paper", truth=truth, truth_label=label)
+        if names != ("(9)",):
+            _fit_height(ax, list(shown.values()), [point[1] for point in points.values()], truth)
+        ax.set_title(title)
+    axes[0, 0].set_xlim(left=FIRST_SHOWN if len(ours["(7)"]) > 10 * FIRST_SHOWN else 1)
+    for ax in axes[0]:
+        ax.set_xlabel("")
+    for ax in axes[:, 1]:
+        ax.set_ylabel("")
+    figure.suptitle(
+        f"{_title(regime)}: first exponent after M periods, 1/s", x=0.01, ha="left", fontsize=10.5
+    )
+    return figure
+
+
+def _truth(regime: Regime) -> tuple[float, str]:
+    """The best value known, and what it is."""
+    if regime.kind == "periodic" and regime.orbit.status.ok:
+        return float(floquet_exponents(regime.orbit)[0]), "Floquet exponent"
+    if regime.kind == "quasi-periodic":
+        return 0.0, "zero, of a torus"
+    return float(regime.spectra[0].exponents[0]), "last tapered estimate"
+
+
+def _printed(column: tuple[float | None, ...]) -> tuple[list[int], list[float]]:
+    pairs = [(M, value) for M, value in zip(ROWS, column, strict=True) if value is not None]
+    return [M for M, _ in pairs], [value for _, value in pairs]
+
+
+def _fit_height(
+    ax: Axes, estimates: Sequence[np.ndarray], printed: Sequence[Sequence[float]], truth: float
+) -> None:
+    """Limits that hold the paper's points, the truth, and all but the first hundredth of the histories."""
+    shown = [history[len(history) // 100 :] for history in estimates]
+    values = np.concatenate([*shown, *map(np.asarray, printed), [truth]])
+    values = values[np.isfinite(values)]
+    low, high = values.min(), values.max()
+    margin = max(0.08 * (high - low), (LEAST_HEIGHT - (high - low)) / 2)
+    ax.set_ylim(low - margin, high + margin)
+
+
+def comparison(regimes: Sequence[Regime]) -> Figure:
+    """The regimes side by side, the second body's plane."""
+    _, x, v, labels = BODIES[1]
+    panels = [
+        Panel(_title(regime), regime.arc, regime.section.x, regime.spectra[0].history[:, 0], 0.08)
+        for regime in regimes
+    ]
+    return plot_regimes(panels, x, v, labels=labels)
+
+
+def tolerances(trap: Trap) -> Figure:
+    """Errors over tolerances, of the first exponent and of the sum, tangents controlled and not."""
+    import matplotlib.pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(6.4, 4.2))
+    lines = (
+        ("first exponent, outside", trap.outside[:, 0] - trap.truth[0], COLOURS[1], "o-"),
+        ("sum of all four, outside", trap.outside.sum(axis=1) - trap.truth.sum(), COLOURS[4], "s--"),
+        ("first exponent, inside", trap.inside[:, 0] - trap.truth[0], COLOURS[0], "o-"),
+    )
+    for label, errors, colour, marker in lines:
+        ax.loglog(trap.tolerances, np.abs(errors), marker, color=colour, label=label, markersize=4.5)
+    ax.axhline(
+        abs(trap.truth[0]), color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label="the exponent itself"
+    )
+    ax.set_xlabel("tolerance, rtol = atol")
+    ax.set_ylabel("error, 1/s")
+    ax.set_title("Tangent vectors inside the error control, and outside of it")
+    ax.grid(True)
+    ax.invert_xaxis()
+    ax.legend()
+    return figure
+
+
+def _save(figure: Figure, path: Path) -> Path:
+    import matplotlib.pyplot as plt
+
+    figure.savefig(path)
+    plt.close(figure)
+    return path

@@ -1,0 +1,215 @@
+"""Exponents when tangent vectors are carried carelessly, and what the paper's figures may owe to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid import DOP853, HybridSystem, Mode, Taylor, Tsit5, periodic_orbit, simulate
+from hybrid.solvers import RungeKutta
+from lyapunov.study.paper import DOUBTFUL
+from lyapunov.study.runs import STARTS, Settings
+from lyapunov.floquet import floquet_exponents
+from lyapunov.spectrum import lyapunov_spectrum
+
+TOLERANCES = tuple(10.0**-digits for digits in range(4, 11))
+LOOSE = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+TRAP_OMEGA = 7.40
+
+# So small that no absolute tolerance sees it, and powers of ten away from the smallest numbers there are.
+UNSEEN = 1e-30
+# Few enough that the directions stay apart between two orthonormalisations.
+PERIODS_AT_ONCE = 10
+# Most periods of an exponent that need not have more than four digits, and of one whose mean converges fast.
+ENOUGH = 2000
+ENOUGH_OF_REGULAR_MOTION = 500
+
+
+def with_tangent(system: HybridSystem) -> HybridSystem:
+    r"""Vibro-impact system with one tangent vector as a state: ``u1, u2, w1, w2`` before ``x1, x2, v1, v2``.
+
+    The vector obeys :math:`\dot u = A u` with the Jacobian as the paper writes it, :math:`A`, where the
+    parameter ``slip = 1`` leaves out the :math:`\chi` that :math:`a_{34} = 2 \xi_2 \omega_2 \chi` is
+    printed without. Saltation matrices are the identity, so nothing happens to it at a jump.
+
+    From ``u = 0`` this is a way to the exponents of the wrong Jacobian: displacements of ``u`` alone follow
+    it, stay among themselves, and their growth is what ``lyapunov_spectrum`` with ``k = 4`` measures, their
+    error controlled.
+    """
+    fields = {mode.name: mode.field for mode in system.modes}
+    return HybridSystem(
+        name=f"{system.name} with a tangent vector",
+        state=("u1", "u2", "w1", "w2", *system.state_names),
+        parameters={**system.parameters, "slip": 0.0},
+        modes=[
+            Mode("free", _with_variation(fields["free"], lambda x, p: 0.0)),
+            Mode("contact", _with_variation(fields["contact"], _contact_stiffness)),
+        ],
+        transitions=system.transitions,
+        period=system.period,
+    )
+
+
+def _with_variation(field: Callable[..., Any], stiffness: Callable[..., Any]) -> Callable[..., Any]:
+    def extended(t, x, p):  # type: ignore[no-untyped-def]
+        chi = p.m2 / p.m1
+        chi_of_a34 = chi + p.slip * (1 - chi)
+        damping = 2 * p.xi2 * p.omega2
+        spring = p.omega2**2 * (x.u1 - x.u2)
+        contact = stiffness(x, p) * (x.u1 - x.u2)
+        main = -(p.omega1**2) * x.u1 - 2 * p.xi1 * p.omega1 * x.w1
+        dw1 = main - chi * (spring + damping * x.w1) + chi_of_a34 * damping * x.w2 - contact / p.m1
+        dw2 = spring + damping * (x.w1 - x.w2) + contact / p.m2
+        return (x.w1, x.w2, dw1, dw2, *field(t, x, p))
+
+    return extended
+
+
+def _contact_stiffness(x: Any, p: Any) -> Any:
+    """Derivative of the Hertz force, kept off the zero where it has no derivative of its own."""
+    return 1.5 * p.K * np.sqrt(np.maximum(x.x1 - x.x2, 1e-20))
+
+
+@attrs.frozen(eq=False)
+class Trap:
+    """Exponents of the periodic regime with tangent vectors inside the error control and outside.
+
+    Attributes
+    ----------
+    truth
+        Floquet exponents ``(4,)``.
+    tolerances
+        ``rtol = atol``, ``(N,)``.
+    inside, outside
+        Exponents ``(N, 4)``.
+    """
+
+    truth: np.ndarray
+    tolerances: np.ndarray
+    inside: np.ndarray
+    outside: np.ndarray
+
+
+def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
+    """The trap: what each tolerance gives with and without error control of the tangents, and the truth.
+
+    Without, steps that follow the state alone need not be short enough for the tangents. It is a trap of
+    Runge-Kutta methods, so one of these it is.
+    """
+    x0, parameters = STARTS[0].x0, {"omega": TRAP_OMEGA}
+    method = DOP853 if isinstance(settings.solver, Taylor) else type(settings.solver)
+    solvers = [method(rtol=tolerance, atol=tolerance) for tolerance in TOLERANCES]
+    periods = min(settings.intervals, ENOUGH_OF_REGULAR_MOTION)
+    extended = with_tangent(system)
+    inside = [
+        lyapunov_spectrum(system, x0, parameters=parameters, intervals=periods, solver=solver).exponents
+        for solver in solvers
+    ]
+    outside = [_uncontrolled_exponents(extended, TRAP_OMEGA, solver, periods) for solver in solvers]
+    truth = floquet_exponents(periodic_orbit(system, x0, parameters=parameters))
+    return Trap(truth, np.array(TOLERANCES), np.array(inside), np.array(outside))
+
+
+def _uncontrolled_exponents(
+    extended: HybridSystem, omega: float, solver: RungeKutta, periods: int
+) -> np.ndarray:
+    """Exponents ``(4,)`` by QR of tangent vectors that the error control does not see, from start I.
+
+    One column at a time: the steps follow the state alone, so they are the same for all.
+    """
+    span = PERIODS_AT_ONCE * 2 * np.pi / omega
+    bursts = max(periods // PERIODS_AT_ONCE, 1)
+    x, mode, vectors = np.array(STARTS[0].x0), "free", np.eye(4)
+    growths = np.empty((bursts, 4))
+    for burst in range(bursts):
+        columns = []
+        for vector in vectors.T:
+            arc = simulate(
+                extended,
+                np.concatenate([UNSEEN * vector, x]),
+                (0.0, span),
+                mode=mode,
+                parameters={"omega": omega},
+                solver=solver,
+                samples=[span],
+            )
+            columns.append(arc.x[-1, :4] / UNSEEN)
+        x, mode = arc.x[-1, 4:], str(arc.mode[-1])
+        vectors, r = np.linalg.qr(np.column_stack(columns))
+        growths[burst] = np.log(np.abs(np.diag(r))) / span
+    # The first fifth is the turning of the vectors into their directions.
+    return growths[bursts // 5 :].mean(axis=0)
+
+
+@attrs.frozen(eq=False)
+class Candidate:
+    """A way the paper's Benettin column might have come about: the ``index``-th exponent of a run."""
+
+    text: str
+    system: HybridSystem
+    x0: tuple[float, ...]
+    solver: RungeKutta
+    parameters: dict[str, float] = attrs.field(factory=dict)
+    index: int = 0
+
+    def exponent(self, omega: float, settings: Settings) -> float:
+        """What the column would then tend to at one frequency."""
+        spectrum = lyapunov_spectrum(
+            self.system,
+            self.x0,
+            parameters={"omega": omega, **self.parameters},
+            k=self.index + 1,
+            intervals=min(settings.intervals, ENOUGH),
+            transient=settings.transient,
+            solver=self.solver,
+            progress=settings.progress,
+        )
+        return float(spectrum.exponents[self.index])
+
+
+@attrs.frozen(eq=False)
+class Explanation:
+    """Text of a candidate, and the exponent it gives at each frequency."""
+
+    text: str
+    exponents: dict[float, float]
+
+    @property
+    def misfit(self) -> float:
+        """Largest distance from the paper's two figures in doubt; nan unless both were computed."""
+        if not DOUBTFUL.keys() <= self.exponents.keys():
+            return float("nan")
+        return max(abs(self.exponents[omega] - value) for omega, value in DOUBTFUL.items())
+
+
+def candidates(system: HybridSystem, solver: RungeKutta) -> list[Candidate]:
+    """The exponent as it is, then with each of the faults that might explain the paper's."""
+    first, other = STARTS[0].x0, STARTS[2].x0
+    loose = [
+        Candidate(
+            f"(b) loose tangents, {method.__name__} {value:.0e}",
+            system,
+            first,
+            method(rtol=value, atol=value),
+        )
+        for method in (Tsit5, DOP853)
+        for value in LOOSE
+    ]
+    return [
+        Candidate("the exponent as it is", system, first, solver),
+        Candidate("(a) a34 without chi", with_tangent(system), (0.0,) * 4 + first, solver, {"slip": 1.0}),
+        *loose,
+        Candidate("(c) the attractor of start III", system, other, solver),
+        Candidate("(d) the second exponent", system, first, solver, index=1),
+    ]
+
+
+def explanations(system: HybridSystem, omegas: Sequence[float], settings: Settings) -> list[Explanation]:
+    """What each candidate gives at the frequencies."""
+    return [
+        Explanation(candidate.text, {omega: candidate.exponent(omega, settings) for omega in omegas})
+        for candidate in candidates(system, settings.solver)
+    ]

@@ -1,0 +1,250 @@
+"""Generated text computes as machine code what it computes as Python, to the last bit."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+from llvmlite import binding, ir
+
+from hybrid.compiler.llvm.builder import Builder
+from hybrid.compiler.llvm.calls import NUMBER, WHOLE
+from hybrid.compiler.llvm.lowering import MATRIX_ROLE, VECTOR_ROLE, LoweringError, parsed
+from hybrid.compiler.llvm.machine import machine_code
+from hybrid.symbolic import expressions as sym
+from hybrid.symbolic.printer import MATH_FUNCTIONS, assignments, power_text
+from tests.hybrid.text import both
+
+X = np.array([0.7, -1.3, 0.0, 2.5])
+P = np.array([0.3])
+
+
+def results(lines, x=X, kind=VECTOR_ROLE, index=0, size=4):
+    """What both leave in ``out``."""
+    found = []
+    for run in both(lines, kind):
+        out = np.full(size if kind is VECTOR_ROLE else (size, size), 7.0)
+        with np.errstate(all="ignore"):
+            run(index, 0.25, np.array(x, dtype=float), P, out)
+        found.append(out)
+    return found
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "out[0] = x[0] + x[1]*t - x[3]/p[0]",
+        "out[0] = -x[1]",
+        "out[0] = 3 + 2*1.5",
+        "out[0] = x[1]/x[2]",
+        "out[0] = x[1] % x[0]",
+        "out[0] = x[0] % x[1]",
+        "out[0] = (-x[3]) % 2.5",
+        "out[0] = np.fmod(x[1], x[0])",
+        "out[0] = x[0]**1.7",
+        "out[0] = max(x[0], x[1], x[3], 1e-300)",
+        "out[0] = abs(x[1]) + sqrt(x[3])",
+        "out[0] = np.floor(x[1]) + np.ceil(x[1]) + np.trunc(x[1])",
+        "out[0] = (1.0 if x[0] < x[3] else 0.0)",
+        "out[0] = (1.0 if x[0] < x[3] <= 2.0 else sqrt(x[3]))",
+        "out[0] = (x[0] if (x[0] > 1.0) or (not (x[1] >= 0.0)) else x[1])",
+        "out[0] = (1.0 if (x[0] == 0.7) and (x[1] != 0.7) else 0.0)",
+        "out[0] = copysign(x[0], x[1])",
+        "out[len(x) - 1] = inf",
+        "out[0], out[1] = x[1], x[0]",
+        "pass",
+    ],
+)
+def test_a_statement(line):
+    np.testing.assert_array_equal(*results([line]))
+
+
+@pytest.mark.parametrize("name", sorted({name for name in MATH_FUNCTIONS.values() if "." not in name}))
+def test_functions_of_mathematics(name):
+    """Python calls the same library; LLVM may round the last bit otherwise."""
+    first = "1.7" if name == "acosh" else "0.6"
+    arguments = f"{first}, 0.8" if name in ("atan2", "hypot", "copysign") else f"{first}*x[3]/2.5"
+    found = results([f"out[0] = {name}({arguments})"])
+    np.testing.assert_allclose(*found, rtol=4e-16)
+
+
+@pytest.mark.parametrize("call", ["sin(n)", "atan2(n, 3)", "abs(-n)", "max(1, n)", "np.floor(n)"])
+def test_whole_numbers_are_numbers_to_functions(call):
+    found = results(["n = 2", f"out[0] = {call} + n"])
+    np.testing.assert_allclose(*found, rtol=4e-16)
+
+
+def test_a_comparison_with_nan_is_false():
+    lines = [
+        "u = x[0]",
+        "out[0] = (1.0 if u > 0.0 else -1.0 if u < 0.0 else u)",
+        "out[1] = (2.0 if u != u else 3.0)",
+    ]
+    out = results(lines, x=[math.nan] * 4)
+    np.testing.assert_array_equal(*out)
+    assert math.isnan(out[1][0])
+    assert out[1][1] == 2.0
+
+
+def test_nothing_is_fused_where_it_is_not_allowed():
+    """``a*b - a*b`` is zero, not what rounding took from the product."""
+    found = results(["a = x[0]*x[1]", "out[0] = x[0]*x[1] - a"])
+    assert found[0][0] == found[1][0] == 0.0
+
+
+def test_loops_count_as_python_does():
+    lines = [
+        "s = 0.0",
+        "for i in range(4):",
+        "    for j in range(1, len(x), 2):",
+        "        s = s + (i + 10*j)*x[j]",
+        "    out[i] = s",
+        "for k in range(3, 3):",
+        "    out[k] = 99.0",
+        "for k in range(1, 3):",
+        "    out[k] = out[k] + k",
+    ]
+    np.testing.assert_array_equal(*results(lines))
+
+
+def test_matrices():
+    lines = ["r = len(x) - 2", "out[r, 1] = x[0]", "out[1, r + 1] = out[r, 1]*2.0"]
+    np.testing.assert_array_equal(*results(lines, kind=MATRIX_ROLE))
+
+
+@pytest.mark.parametrize("index", [0, 1, -1])
+def test_branches(index):
+    """A variable of one branch has nothing to do with that of another."""
+    lines = ["if index == 0:", "    y = x[0]", "    out[0] = y", "elif index == 1:", "    y = len(x)"]
+    lines += ["    out[0] = y", "else:", "    out[0] = 5.0"]
+    np.testing.assert_array_equal(*results(lines, index=index))
+
+
+def test_as_many_branches_as_a_model_has_transitions():
+    """A chain of choices is no nest: it may be longer than Python goes down."""
+    lines = [f"{'if' if i == 0 else 'elif'} index == {i}:\n        out[0] = {i}.0" for i in range(300)]
+    _, run = both(lines, VECTOR_ROLE)
+    for index in (0, 150, 299):
+        out = np.zeros(1)
+        run(index, 0.0, X, P, out)
+        assert out[0] == index
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("out[0] = x[0].real", "x[0].real"),
+        ("out[0] = unknown(x[0])", "unknown"),
+        ("out[0] = y", "'y'"),
+        ("while t < 1.0: pass", "while"),
+        ("out[0] = x[0] @ x[1]", "x[0] @ x[1]"),
+        ("t = 1.0", "t is an argument"),
+        ("index = 1", "index is an argument"),
+        ("out[0] = 1.0 if x[0] else 0.0", "x[0]"),
+        ("out[0] = 'a'", "'a'"),
+    ],
+)
+def test_other_text_is_refused(line, told):
+    with pytest.raises(LoweringError) as error:
+        both([line], VECTOR_ROLE)
+    assert told in str(error.value)
+
+
+def test_a_variable_keeps_its_type():
+    with pytest.raises(LoweringError, match="n is i64 in one place and double in another"):
+        both(["n = 1", "n = x[0]"], VECTOR_ROLE)
+    role = parsed("def role(a, b):\n    pass")["role"]
+    with pytest.raises(LoweringError, match=r"takes \('a', 'b'\); a role of its kind takes \('index'"):
+        machine_code([(role, VECTOR_ROLE, False)])
+
+
+def grown(rng, depth):
+    """A random expression of all that the printer writes of sums, products, choices and jumps."""
+    if depth == 0 or rng.random() < 0.1:
+        leaves = [*sympy.symbols("x[0] x[1] x[3] p[0] t", real=True), sym.number(rng.uniform(-3.0, 3.0))]
+        return leaves[rng.integers(len(leaves))]
+    a, b, c = (grown(rng, depth - 1) for _ in range(3))
+    made = [
+        lambda: a + b,
+        lambda: a * b,
+        lambda: a - 2 * b,
+        lambda: sym.Maximum(a, b),
+        lambda: sym.Minimum(a, b),
+        lambda: sym.Remainder(a, b),
+        lambda: sym.TruncatedRemainder(a, b),
+        lambda: sym.Less(a, b),
+        lambda: sym.Or(sym.Less(a, b), sym.Not(sym.LessEqual(b, c))),
+        lambda: sym.Select(sym.And(sym.Less(a, c), b), b, c),
+        lambda: a**3,
+        lambda: sym.Absolute(a) ** sympy.Rational(3, 2),
+        lambda: sym.Step(a) * b,
+        lambda: sym.Gate(a, b),
+        lambda: sym.Sign(a) * b,
+        lambda: sym.Floor(a),
+        lambda: sympy.sin(a),
+        lambda: 1 / (a + b),
+    ]
+    return made[rng.integers(len(made))]()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_expression(seed):
+    """No bit differs but that of a sine, and where Python raises IEEE has an answer."""
+    rng = np.random.default_rng(seed)
+    written = [assignments(["out[0]"], [grown(rng, 4)]) for _ in range(40)]
+    lines = []
+    for i, each in enumerate(written):
+        lines += [f"{'elif' if i else 'if'} index == {i}:", *(f"    {line}" for line in each)]
+    as_python, as_machine_code = both(lines, VECTOR_ROLE)
+    compared = 0
+    for i in range(len(written)):
+        expected, found = np.full(1, 7.0), np.full(1, 7.0)
+        as_machine_code(i, 0.25, X, P, found)
+        try:
+            with np.errstate(all="ignore"):
+                as_python(i, 0.25, X, P, expected)
+        except (ZeroDivisionError, OverflowError, ValueError, TypeError):
+            continue
+        compared += 1
+        np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13, err_msg="\n".join(written[i]))
+        if not any("sin" in line for line in written[i]):
+            np.testing.assert_array_equal(found, expected, err_msg="\n".join(written[i]))
+    assert compared > 30
+
+
+@pytest.mark.parametrize("exponent", ["1/2", "3/2", "5/2", "-1/2", "-3/2", "-5/2"])
+def test_half_integer_powers_are_products_with_a_root(exponent):
+    text = power_text("z", sympy.Rational(exponent), "k")
+    assert "**" not in text
+    value = eval(text, {"z": 1.7, "sqrt": math.sqrt})
+    assert value == pytest.approx(1.7 ** float(sympy.Rational(exponent)), rel=1e-15)
+
+
+def test_types_that_do_not_fit_are_refused():
+    function = ir.Function(ir.Module(), ir.FunctionType(ir.VoidType(), [NUMBER, WHOLE]), "f")
+    number, whole = function.args
+    builder = Builder(function.append_basic_block("body"))
+    place = builder.alloca(NUMBER)
+    with pytest.raises(ValueError, match="fadd of double and i64"):
+        builder.fadd(number, whole)
+    with pytest.raises(TypeError, match="i64 has no place at double"):
+        builder.store(whole, place)
+    assert builder.bitcast(number, NUMBER) is number
+
+
+def test_lines_are_read_by_llvm():
+    """Addresses, aligned stores and flags among them."""
+    module = ir.Module()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [NUMBER.as_pointer(), WHOLE]), "f")
+    address, index = function.args
+    builder = Builder(function.append_basic_block("body"))
+    here = builder.gep(address, [builder.mul(index, WHOLE(3))])
+    value = builder.fmul(builder.load(here, align=8), NUMBER(-0.5), flags=("contract",))
+    builder.store(builder.fadd(value, NUMBER(float("inf"))), here, align=8)
+    bits = builder.load(builder.bitcast(here, WHOLE.as_pointer()))
+    builder.store(
+        builder.sub(bits, WHOLE(1)), builder.gep(builder.bitcast(address, WHOLE.as_pointer()), [index])
+    )
+    builder.ret_void()
+    binding.parse_assembly(str(module)).verify()
+    assert "fmul contract double" in str(module)

@@ -1,0 +1,105 @@
+"""Tanks that empty: the field is a fractional power of the guard, and the speed vanishes with it."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid import Guard, HybridSystem, Mode, StatusCode, Transition
+from hybrid.kernels.types import codes
+
+
+def tank(field, guard=lambda t, x, p: x.h, state=("h",), direction=-1, **options):
+    mode = Mode("emptying", field)
+    empty = Transition("emptying", None, Guard(guard, direction), name="empty")
+    return HybridSystem(
+        state=state, parameters={"c": 1.0, "q": 0.0}, modes=[mode], transitions=[empty], **options
+    )
+
+
+def with_overflow(t, x, p):
+    """The level of a second tank, which the first one fills."""
+    return -p.c * np.sqrt(x.h), p.c * np.sqrt(x.h) - x.k
+
+
+@pytest.mark.parametrize(
+    ("field", "guard", "direction", "time"),
+    [
+        (lambda t, x, p: (-np.sqrt(x.h),), lambda t, x, p: x.h, -1, 2.0),
+        (lambda t, x, p: (-p.c * x.h**0.5 * 4,), lambda t, x, p: -3 * x.h, +1, 0.5),
+        (lambda t, x, p: (-np.sqrt(np.maximum(x.h, 0)),), lambda t, x, p: x.h, -1, 2.0),
+        (lambda t, x, p: (-np.sqrt(np.abs(x.h)) * np.sign(x.h),), lambda t, x, p: x.h, -1, 2.0),
+        (lambda t, x, p: (-np.sqrt(x.h - 0.25),), lambda t, x, p: x.h - 0.25, -1, math.sqrt(3)),
+        (
+            lambda t, x, p: (-np.sqrt(2 * x.h) * (1 + x.h / 10),),
+            lambda t, x, p: 2 * x.h,
+            -1,
+            math.sqrt(20) * math.atan(math.sqrt(0.1)),
+        ),
+        (lambda t, x, p: (-np.sqrt(x.h) / (1 + t),), lambda t, x, p: x.h, -1, math.exp(2) - 1),
+    ],
+)
+def test_a_tank_empties_when_it_should(field, guard, direction, time):
+    system = tank(field, guard, direction=direction)
+    arc = hybrid.simulate(system, (1.0,), (0.0, 10.0))
+    assert hybrid.compile_system(system).emitted.propagators[0].kind == codes.ROOTED
+    assert arc.status.code == StatusCode.TERMINAL
+    [empty] = arc.jumps
+    assert empty.t == pytest.approx(time, rel=1e-14 if time == 2.0 else 1e-10)
+    assert abs(guard(0.0, type("X", (), {"h": empty.x_minus[0]}), None)) <= 1e-16
+    assert arc.steps < 100
+
+
+def test_two_tanks_and_their_derivatives():
+    """``k' = w - k`` with ``w = 1 - t/2`` until 2; a higher start fills the second tank by ``1/(2 w)``."""
+    system = HybridSystem(
+        state=("h", "k"),
+        parameters={"c": 1.0},
+        modes=[Mode("both", with_overflow), Mode("one", lambda t, x, p: (0.0, -x.k))],
+        transitions=[Transition("both", "one", Guard(lambda t, x, p: x.h, -1), name="empty")],
+    )
+    arc = hybrid.simulate(system, (1.0, 0.0), (0.0, 3.0), mode="both", tangent=True)
+    assert arc.status.ok
+    assert arc.jumps[0].t == pytest.approx(2.0, abs=1e-14)
+    assert arc.jumps[0].x_plus[0] == 0.0
+    level = 0.5 - 1.5 * math.exp(-2) + 0.0
+    # k(2) = integral of exp(s - 2) (1 - s/2) over [0, 2]
+    assert arc.jumps[0].x_plus[1] == pytest.approx(0.5 * (1 - 3 * math.exp(-2)), abs=1e-10)
+    assert arc.x[-1][1] == pytest.approx(level * math.exp(-1), abs=1e-10)
+    expected = [[0.0, 0.0], [0.5 * (math.exp(-1) - math.exp(-3)), math.exp(-3)]]
+    np.testing.assert_allclose(arc.fundamental, expected, atol=1e-9)
+
+
+def test_inflow_that_is_switched_off_by_a_parameter_does_not_run_for_ever():
+    system = tank(lambda t, x, p: (p.q - np.sqrt(x.h),))
+    arc = hybrid.simulate(system, (1.0,), (0.0, 3.0))
+    assert arc.status.code == StatusCode.STEP_TOO_SMALL
+    assert arc.steps < 1000
+    np.testing.assert_allclose(arc.x[-1], 0.0, atol=1e-9)
+    drained = hybrid.simulate(system, (1.0,), (0.0, 3.0), parameters={"q": -0.5})
+    assert drained.jumps[0].t == pytest.approx(2 - math.log(3), abs=1e-10)
+    filled = hybrid.simulate(system, (1.0,), (0.0, 60.0), parameters={"q": 0.5})
+    np.testing.assert_allclose(filled.x[-1], 0.25, atol=1e-9)
+
+
+@pytest.mark.parametrize("power", [0.5, 2.0 / 3.0])
+def test_without_a_guard_the_field_ends_where_its_root_does(power):
+    """The series of ``(1 - t/2)**2`` would go on to rise again."""
+    system = HybridSystem(
+        state=("h",), parameters={}, modes=[Mode("only", lambda t, x, p: (-(x.h**power),))], transitions=[]
+    )
+    arc = hybrid.simulate(system, (1.0,), (0.0, 5.0))
+    assert not arc.status.ok
+    assert arc.t[-1] == pytest.approx(1 / (1 - power), abs=1e-3)
+    assert arc.steps < 1000
+
+
+def test_roots_of_what_keeps_its_sign_have_series():
+    system = HybridSystem(
+        state=("x", "y"),
+        parameters={},
+        modes=[Mode("only", lambda t, x, p: (x.y / np.sqrt(1 + x.y**2), -x.x))],
+        transitions=[],
+    )
+    assert hybrid.compile_system(system).emitted.propagators[0].kind == codes.TAYLOR

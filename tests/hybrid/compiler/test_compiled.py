@@ -1,0 +1,130 @@
+"""From a model to machine code and a graph of indices."""
+
+import attrs
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
+from hybrid.compiler.parts import EVENTS, FIELDS, PARTS, SERIES, TANGENT_SERIES, VARIATIONAL
+from hybrid.orbits.sections import with_section
+from models import bouncing_ball, impact_oscillator, vibroimpact
+
+
+def test_once_for_all_calls():
+    system = bouncing_ball()
+    assert compile_system(system) is compile_system(system)
+
+
+def test_models_alike_share_their_code():
+    one, other = compile_system(bouncing_ball()), compile_system(bouncing_ball())
+    assert one is not other
+    assert one.functions(FIELDS) is other.functions(FIELDS)
+    assert one.functions(EVENTS) is other.functions(EVENTS)
+
+
+def test_parameters_do_not_compile_anew():
+    compiled = compile_system(bouncing_ball())
+    moon = attrs.evolve(compiled.system, parameters={"g": 1.62, "e": 0.8})
+    assert compile_system(moon).functions(FIELDS) is compiled.functions(FIELDS)
+    np.testing.assert_array_equal(compiled.model({"g": 1.62}).parameters, [1.62, 0.8])
+
+
+def test_repr():
+    assert repr(compile_system(bouncing_ball())) == (
+        "CompiledSystem of bouncing ball: 2 states\n"
+        "  mode flight: exact (polynomials of degree 2)\n"
+        "  transition bounce: affine guard, its crossings are isolated on each step"
+    )
+    nameless = HybridSystem(
+        state=("x",),
+        modes=[Mode("a", lambda t, x, p: (-(x.x**3),))],
+        transitions=[Transition("a", "a", Guard(lambda t, x, p: np.sin(x.x)), name="wave")],
+    )
+    assert repr(compile_system(nameless)) == (
+        "CompiledSystem of a system: 1 states\n"
+        "  mode a: Taylor series (smooth, nonlinear in the state)\n"
+        "  transition wave: guard bounded on each step, its crossings are proved"
+    )
+
+
+def test_what_tracing_proves():
+    emitted = compile_system(vibroimpact()).emitted
+    assert list(emitted.affine_mode) == [True, False]
+    assert list(emitted.affine_guard) == [True, True]
+    assert not emitted.opaque
+
+
+def test_graph_as_indices():
+    model = compile_system(vibroimpact()).model({"omega": 8.0})
+    np.testing.assert_array_equal(model.first_outgoing, [0, 1, 2])
+    np.testing.assert_array_equal(model.outgoing, [0, 1])
+    np.testing.assert_array_equal(model.target, [1, 0])
+    np.testing.assert_array_equal(model.direction, [1, -1])
+    assert model.surface[0] == model.surface[1]
+    np.testing.assert_array_equal(model.paired, [0, 0])
+    np.testing.assert_array_equal(model.marker, [0, 0])
+    assert model.period == pytest.approx(2 * np.pi / 8)
+    assert compile_system(bouncing_ball()).model().period == 0.0
+
+
+def test_roles_are_the_model_functions():
+    system = impact_oscillator()
+    compiled = compile_system(system)
+    assert set(compiled.functions(FIELDS)) == set(PARTS[FIELDS])
+    t, x, p = 0.7, np.array([0.3, -0.5]), compiled.model().parameters
+    out = np.empty(2)
+    from hybrid.compiler.cache.loader import load_kernels
+
+    load_kernels()
+    from hybrid.kernels.steps.step import field, flow_jacobian
+
+    field(compiled.model(), 0, t, x, out)
+    np.testing.assert_allclose(out, [-0.5, np.cos(0.7) + 0.05 - 0.3])
+    jacobian = np.empty((2, 3))
+    flow_jacobian(compiled.model(), 0, t, x, jacobian)
+    np.testing.assert_allclose(jacobian, [[0.0, 1.0, 0.0], [-1.0, -0.1, -np.sin(0.7)]])
+    assert len(p) == 6
+
+
+def test_a_run_compiles_only_what_it_needs():
+    system = impact_oscillator()
+    parts = compile_system(system).parts
+    needed = {FIELDS, EVENTS}
+    assert set(parts) == needed
+    start, span = (0.3, -0.5), (0.0, 5.0)
+    alone = hybrid.simulate(system, start, span)
+    assert set(parts) == {*needed, SERIES}
+    carried = hybrid.simulate(system, start, span, tangent=True)
+    assert set(parts) == {*needed, SERIES, TANGENT_SERIES}
+    hybrid.simulate(system, start, span, solver=hybrid.DOP853())
+    assert VARIATIONAL not in parts
+    other = hybrid.simulate(system, start, span, solver=hybrid.DOP853(), tangent=True)
+    assert set(parts) == set(PARTS)
+    np.testing.assert_allclose(carried.x[-1], alone.x[-1], rtol=1e-12)
+    np.testing.assert_allclose(other.fundamental, carried.fundamental, rtol=1e-6)
+
+
+def test_a_section_shares_the_fields_of_its_system():
+    system = impact_oscillator()
+    compiled = compile_system(system)
+    marked = compile_system(with_section(system, Guard(lambda t, x, p: x.v, -1)))
+    assert marked.functions(FIELDS) is compiled.functions(FIELDS)
+    assert marked.functions(EVENTS) is not compiled.functions(EVENTS)
+
+
+def test_no_system():
+    with pytest.raises(
+        hybrid.ArgumentError, match=r"system must be a HybridSystem; got .* Call the model's fact"
+    ):
+        compile_system(bouncing_ball)
+
+
+def test_a_function_that_cannot_be_compiled():
+    import math
+
+    sine = HybridSystem(state=("x",), modes=[Mode("a", lambda t, x, p: (math.sin(x.x),))])
+    with pytest.raises(
+        hybrid.ModelError, match=r"Mode 'a': field cannot be .*use np.sin in place of math.sin"
+    ):
+        compile_system(sine)

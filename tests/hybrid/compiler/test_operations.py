@@ -1,0 +1,292 @@
+"""What tracing found out, kept on disk: the same answer for the same model, and never another's."""
+
+import importlib.util
+import json
+from itertools import pairwise
+
+import attrs
+import numpy as np
+import pytest
+
+import models
+from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition
+from hybrid.compiler.cache import store
+from hybrid.compiler.cache.store import models_folder
+from hybrid.compiler.compiled import emitted_of
+from hybrid.compiler.emit import emit
+from hybrid.compiler.operations import operations_of
+from hybrid.symbolic.ufuncs import RULES
+from hybrid.symbolic.values import UFUNCS, WHERE
+
+MODELS = [
+    models.ball_chain,
+    models.bouncing_table,
+    models.buck_converter,
+    models.chua_circuit,
+    models.simplest_walker,
+    models.slip_hopper,
+    models.vibroimpact,
+]
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def emissions(monkeypatch):
+    """The systems that were traced, in order."""
+    found = []
+
+    def counted(system):
+        found.append(system)
+        return emit(system)
+
+    monkeypatch.setattr("hybrid.compiler.emit.emit", counted)
+    return found
+
+
+def oscillator(field, *, jacobian=None, state=("q", "v"), parameters=("k", "c"), guard=None, **options):
+    """A system with one mode and one guard."""
+    return HybridSystem(
+        state=state,
+        parameters=dict.fromkeys(parameters, 2.0),
+        modes=[Mode("swing", field, jacobian=jacobian)],
+        transitions=[
+            Transition(
+                "swing",
+                "swing",
+                guard or Guard(lambda t, x, p: x[0], -1),
+                options.pop("reset", Reset(lambda t, x, p: (0.0, -x[1]))),
+                name="stop",
+                **options,
+            )
+        ],
+    )
+
+
+def linear(t, x, p):
+    return x.v, -p.k * x.q
+
+
+def assert_all_differ(systems):
+    keys = [operations_of(system) for system in systems]
+    assert None not in keys
+    assert len(set(keys)) == len(keys)
+    for one, other in pairwise(systems):
+        emitted_of(one)
+        assert emitted_of(other) == emit(other)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
+def test_what_is_kept_is_what_was_emitted(model, emissions):
+    first = emitted_of(model())
+    assert len(emissions) == 1
+    again = emitted_of(model())
+    assert len(emissions) == 1
+    assert again == first == emit(model())
+    assert [type(each) for each in attrs.astuple(again, recurse=False)] == [
+        type(each) for each in attrs.astuple(first, recurse=False)
+    ]
+    assert all(type(row) is tuple for row in again.programs.rows)
+
+
+def test_every_function_has_a_rule():
+    assert {*UFUNCS, WHERE} == RULES.keys()
+
+
+def test_closures():
+    def field(stiffness):
+        return lambda t, x, p: (x.v, -stiffness * x.q)
+
+    assert_all_differ([oscillator(field(value)) for value in (1.0, np.nextafter(1.0, 2.0), -1.0)])
+
+
+def test_signs_of_zero():
+    def field(offset):
+        return lambda t, x, p: (x.v, offset - x.q)
+
+    assert_all_differ([oscillator(field(0.0)), oscillator(field(-0.0))])
+
+
+STIFFNESS = 1.0
+TABLE = np.array([1.0, 2.0])
+
+
+def helper(q):
+    return STIFFNESS * q
+
+
+def test_globals_of_a_helper(monkeypatch):
+    def field(t, x, p):
+        return x.v, -helper(x.q)
+
+    one = operations_of(oscillator(field))
+    monkeypatch.setitem(globals(), "STIFFNESS", 3.0)
+    other = operations_of(oscillator(field))
+    monkeypatch.setitem(globals(), "helper", lambda q: 3.0 * q * q)
+    assert len({one, other, operations_of(oscillator(field))}) == 3
+
+
+def test_a_global_array_that_is_written_to(monkeypatch, emissions):
+    def field(t, x, p):
+        return x.v, -(TABLE * x.q).sum() - TABLE @ np.array([x.q, x.v])
+
+    monkeypatch.setitem(globals(), "TABLE", TABLE.copy())
+    system = oscillator(field)
+    before = emitted_of(system)
+    TABLE[1] = 5.0
+    after = emitted_of(system)
+    assert len(emissions) == 2
+    assert after == emit(system) != before
+
+
+def test_defaults():
+    def field(t, x, p, k=1.0):
+        return x.v, -k * x.q
+
+    one = operations_of(oscillator(field))
+    field.__defaults__ = (2.0,)
+    assert operations_of(oscillator(field)) != one
+
+
+def test_nested_functions_and_attributes():
+    class Spring:
+        def __init__(self, force):
+            self.force = force
+
+        def field(self, t, x, p):
+            return x.v, *[(lambda q: self.force(q))(q) for q in (x.q,)]
+
+    assert_all_differ(
+        [oscillator(Spring(force).field) for force in (lambda q: -q, lambda q: -(q**3), np.sin, np.arctan)]
+    )
+
+
+def test_a_module_of_the_same_name_with_other_contents(tmp_path):
+    def field_of(text):
+        path = tmp_path / "spring.py"
+        path.write_text(f"def field(t, x, p):\n    return x.v, {text}\n")
+        spec = importlib.util.spec_from_file_location("spring", path)
+        module = importlib.util.module_from_spec(spec)
+        exec(compile(path.read_text(), str(path), "exec"), vars(module))
+        return module.field
+
+    assert_all_differ([oscillator(field_of(text)) for text in ("-x.q", "-x.v", "-p.k * x.q", "-p.c * x.q")])
+
+
+def test_order_of_names():
+    def field(t, x, p):
+        return x.v, -p.k * x.q - p.c * x.v
+
+    assert_all_differ([oscillator(field), oscillator(field, parameters=("c", "k"))])
+    assert_all_differ(
+        [
+            oscillator(lambda t, x, p: (x.q, x.v), state=names, reset=None)
+            for names in (("q", "v"), ("v", "q"))
+        ]
+    )
+
+
+def test_order_of_operands():
+    assert_all_differ(
+        [
+            oscillator(lambda t, x, p: (x.v, (x.q + x.v) + t)),
+            oscillator(lambda t, x, p: (x.v, x.q + (x.v + t))),
+            oscillator(lambda t, x, p: (x.v, x.q - x.v)),
+            oscillator(lambda t, x, p: (x.v, x.v - x.q)),
+            oscillator(lambda t, x, p: (x.v, np.where(x.q > 0, x.v, x.q))),
+            oscillator(lambda t, x, p: (x.v, np.where(x.q >= 0, x.v, x.q))),
+            oscillator(lambda t, x, p: (x.v, np.where(x.q >= 0, x.q, x.v))),
+            oscillator(lambda t, x, p: (x.v, np.maximum(x.q, 0.0))),
+            oscillator(lambda t, x, p: (x.v, np.minimum(x.q, 0.0))),
+        ]
+    )
+
+
+def test_graph():
+    def position(t, x, p):
+        return x.q
+
+    assert_all_differ(
+        [
+            oscillator(linear),
+            oscillator(linear, guard=Guard(position, -1)),
+            oscillator(linear, guard=Guard(position, +1)),
+            oscillator(linear, guard=Guard(position, +1, when=lambda t, x, p: x.v)),
+            oscillator(linear, guard=Guard(position, +1, when=lambda t, x, p: -x.v)),
+            oscillator(linear, reset=None),
+            oscillator(linear, reset=Reset(lambda t, x, p: (x.q, x.v))),
+            oscillator(linear, accumulates_to="swing"),
+        ][1:]
+    )
+
+
+def test_given_derivatives():
+    def jacobian(t, x, p):
+        return ((0.0, 1.0), (-p.k, 0.0))
+
+    def same(t, x, p):
+        return ((0.0, 1.0), (-p.k, 0.0 * x.q))
+
+    assert_all_differ(
+        [oscillator(linear), oscillator(linear, jacobian=jacobian), oscillator(linear, jacobian=same)]
+    )
+
+
+def opaque(t, x, p):
+    return (x.v, -x.q) if x.q.real > 0 else (x.v, -2.0 * x.q)
+
+
+def shown(t, x, p):
+    return x.v, -float(len(repr(x.q))) * x.q
+
+
+def proved(t, x, p):
+    zero = getattr(x.q - x.q, "expression", 0) == 0
+    return x.v, -x.q if zero else x.q
+
+
+def caught(t, x, p):
+    try:
+        square = x.q.square(x.v)  # one argument too many for the rule
+    except TypeError:
+        square = STIFFNESS * x.q
+    except AttributeError:
+        square = x.q
+    return x.v, square
+
+
+def test_a_function_that_catches_what_stops_tracing_is_refused(emissions):
+    with pytest.raises(ModelError, match=r"Mode 'swing': field cannot be traced, and what catches errors"):
+        emitted_of(oscillator(caught))
+
+
+@pytest.mark.parametrize("field", [opaque, shown, proved])
+def test_functions_that_operations_do_not_tell_all_of_are_traced_each_time(field, emissions):
+    for count in (1, 2):
+        emitted_of(oscillator(field))
+        assert len(emissions) == count
+
+
+def test_a_damaged_file_is_written_anew(emissions):
+    system = models.bouncing_ball()
+    first = emitted_of(system)
+    [path] = models_folder().glob("emitted_*.json")
+    whole = path.read_text()
+    unlike = json.loads(whole.partition("\n")[2])
+    del unlike["propagators"][0]["kind"]
+    others = [f"{store._checksum(text)}\n{text}" for text in ("[]", "{}", json.dumps(unlike))]
+    for damaged in ("", whole[:-20], *others):
+        path.write_text(damaged)
+        assert emitted_of(system) == first
+        assert path.read_text() == whole
+    assert len(emissions) == 6
+
+
+def test_another_tracer_starts_anew(monkeypatch, emissions):
+    for tracer in ("this version", "the next"):
+        monkeypatch.setattr(store, "_tracer", lambda tracer=tracer: tracer)
+        emitted_of(models.bouncing_ball())
+    assert len(emissions) == 2

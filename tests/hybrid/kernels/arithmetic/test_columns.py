@@ -1,0 +1,118 @@
+"""Compiled arithmetic on columns of series against its plain definition."""
+
+import numpy as np
+import pytest
+from numba import float64, int64, njit, void
+
+from hybrid.kernels.arithmetic.columns import (
+    evaluate,
+    evaluate_with_sizes,
+    gather_tangents,
+)
+from hybrid.kernels.types.layout import MATRIX
+from tests.hybrid.text import both
+
+NOTHING = np.zeros(1)
+
+
+@njit(void(MATRIX, int64, float64, int64, int64))
+def compiled_evaluate(series, order, s, first, width):
+    evaluate(series, order, s, first, width)
+
+
+@njit(void(MATRIX, int64, float64, int64, int64))
+def compiled_evaluate_with_sizes(series, order, s, first, width):
+    evaluate_with_sizes(series, order, s, first, width)
+
+
+def pair(columns=44):
+    series = np.random.default_rng(columns).normal(size=(33, columns))
+    return series, series.copy()
+
+
+def test_convolve():
+    """The width of a convolution and its registers' are known from the text; each is a branch of its own."""
+    cases = [
+        (width, inset, widest, name)
+        for width in (4, 8, 12, 20, 36)
+        for inset in (1, 2)
+        for widest, name in ((4, "convolve"), (8, "convolve"), (8, "convolve_pairs"))
+    ]
+    lines = []
+    for i, (width, inset, widest, name) in enumerate(cases):
+        lines += [f"if index == {i}:", f"    {name}(out, order, {inset}, 3, 43, {width}, {widest})"]
+    as_python, as_machine_code = both(lines, fused=True)
+    for i in range(len(cases)):
+        for order in (1, 2, 3, 4, 7, 28):
+            series, plain = pair(80)
+            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
+            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
+@pytest.mark.parametrize("order", [1, 2, 3, 13, 28, 30])
+@pytest.mark.parametrize(
+    ("plain_function", "compiled"),
+    [(evaluate, compiled_evaluate), (evaluate_with_sizes, compiled_evaluate_with_sizes)],
+)
+def test_evaluate(order, width, plain_function, compiled):
+    series, plain = pair(width + 3)
+    compiled(series, order, 0.7, 2, width)
+    plain_function(plain, order, 0.7, 2, width)
+    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+    powers, terms = 0.7 ** np.arange(order + 1), plain[: order + 1, 2 : 2 + width]
+    np.testing.assert_allclose(series[order + 1, 2 : 2 + width], powers @ terms, rtol=1e-12, atol=1e-14)
+    if plain_function is evaluate_with_sizes:
+        np.testing.assert_allclose(series[order + 2, 2 : 2 + width], powers @ abs(terms), rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_combine(count):
+    numbers = tuple(np.random.default_rng(count).normal(size=count).tolist())
+    widths = (4, 8, 12)
+    lines = []
+    for i, width in enumerate(widths):
+        lines += [
+            f"if index == {i}:",
+            f"    combine(out, order, 14, {width}, ({', '.join(map(repr, map(float, numbers)))},))",
+        ]
+    as_python, as_machine_code = both(lines, fused=True)
+    for i, width in enumerate(widths):
+        for order in (1, 2, 28):
+            series, plain = pair(100)
+            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
+            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+            expected = sum(number * plain[order, 14 + width * c] for c, number in enumerate(numbers))
+            assert series[order, 0] == pytest.approx(expected, rel=1e-13, abs=1e-14)
+
+
+@pytest.mark.parametrize(("n", "width"), [(1, 4), (2, 8), (4, 8), (7, 12)])
+def test_combine_tangents(n, width):
+    as_python, as_machine_code = both([f"combine_tangents(out, order, 5, {width}, 100, {n})"], fused=True)
+    series, plain = pair(140)
+    as_python(0, 0.0, NOTHING, NOTHING, 9, plain)
+    as_machine_code(0, 0.0, NOTHING, NOTHING, 9, series)
+    np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+    matrix = plain[9, 5 : 5 + width * n].reshape(n, width)[:, :n].T
+    vectors = plain[0, 100 : 100 + 4 * n].reshape(n, 4)
+    np.testing.assert_allclose(series[9, 100 : 100 + 4 * n].reshape(n, 4), matrix @ vectors, rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [0, 1, 4, 6])
+def test_tangent_vectors_there_and_back(count):
+    """Vectors that fill no whole register are followed by zeros."""
+    y = np.random.default_rng(count).normal(size=3 * (1 + count))
+    runs = both(["vectors = 8", "spread_tangents(x, 3, out, vectors, 20)"])
+    found = []
+    for run in runs:
+        series, back = np.full((2, 60), 7.0), y.copy()
+        run(0, 0.0, y, NOTHING, 1, series)
+        back[3:] = 0.0
+        gather_tangents(series, 0, 3, 8, 20, back)
+        np.testing.assert_array_equal(back, y)
+        assert count == 0 or series[0, 8 + 4] == y[4]
+        assert not count % 4 or np.all(series[0, 8 + (count // 4) * 20 :][count % 4 : 12 : 4] == 0.0)
+        found.append(series)
+    np.testing.assert_array_equal(*found)

@@ -1,0 +1,92 @@
+"""Four numbers in a register compute what an array of four does."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from hybrid.kernels.arithmetic.lanes import (
+    NARROW,
+    four_times,
+    larger,
+    largest,
+    load,
+    magnitude,
+    square_root,
+    store,
+)
+from tests.hybrid.text import both
+
+EXPRESSIONS = {
+    "sum": lambda a, b, s: a + b,
+    "difference": lambda a, b, s: a - b,
+    "product": lambda a, b, s: a * b,
+    "quotient": lambda a, b, s: a / b,
+    "negative": lambda a, b, s: -a,
+    "numbers on the left": lambda a, b, s: s * a + (s - b),
+    "numbers on the right": lambda a, b, s: (a - s) / 2 + b * s,
+    "functions": lambda a, b, s: square_root(magnitude(a)) + larger(a, b) * four_times(s),
+    "one number": lambda a, b, s: s,
+}
+
+
+@pytest.mark.parametrize("name", EXPRESSIONS)
+def test_arithmetic(name):
+    expression = njit(EXPRESSIONS[name])
+
+    @njit
+    def compiled(matrix, s):
+        store(matrix, 2, 3, expression(load(matrix, 0, 1), load(matrix, 1, 2), s))
+
+    matrix = np.random.default_rng(1).normal(size=(3, 8))
+    expected = matrix.copy()
+    store(expected, 2, 3, EXPRESSIONS[name](load(expected, 0, 1), load(expected, 1, 2), 0.3))
+    compiled(matrix, 0.3)
+    np.testing.assert_allclose(matrix, expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("place", range(NARROW))
+def test_the_largest_wherever_it_is(place):
+    @njit
+    def compiled(matrix):
+        return largest(load(matrix, 0, 0))
+
+    numbers = np.array([[-3.0, 1.0, 0.5, -7.0]])
+    numbers[0, place] = 2.0
+    assert compiled(numbers) == largest(load(numbers, 0, 0)) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("count", "filled"), [(1, 4), (3, 4), (4, 4), (5, 8), (8, 8), (9, 12), (12, 12), (13, 16)]
+)
+def test_a_row_is_written_in_whole_registers(count, filled):
+    """What is not a whole register is filled up with zeros, and nothing behind it is touched."""
+    numbers = tuple(1.0 + i for i in range(count))
+    expected = np.full((3, 20), np.nan)
+    expected[1, 2 : 2 + count], expected[1, 2 + count : 2 + filled] = numbers, 0.0
+    for run in both([f"store_row(out, 1, 2, {numbers})"]):
+        matrix = np.full((3, 20), np.nan)
+        run(0, 0.0, np.zeros(1), np.zeros(1), 0, matrix)
+        np.testing.assert_array_equal(matrix, expected)
+
+
+def test_a_register_is_written_down_a_column():
+    expected = np.arange(60.0).reshape(3, 20)
+    expected[1, [2, 7, 12, 17]] = expected[0, :4]
+    for run in both(["store_down(out, 1, 2, 5, load(out, 0, 0))"]):
+        matrix = np.arange(60.0).reshape(3, 20)
+        run(0, 0.0, np.zeros(1), np.zeros(1), 0, matrix)
+        np.testing.assert_array_equal(matrix, expected)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a + b", "a - b", "a*b", "a/b", "-a", "s*a + (s - b)", "(a - s)/2.0 + b*s", "four_times(s)*a", "s"],
+)
+def test_arithmetic_of_generated_text(text):
+    lines = ["s = p[0]", "a, b = load(out, 0, 1), load(out, 1, 2)", f"store(out, 2, 3, {text})"]
+    found = []
+    for run in both(lines):
+        matrix = np.random.default_rng(1).normal(size=(3, 8))
+        run(0, 0.0, np.zeros(1), np.array([0.3]), 0, matrix)
+        found.append(matrix)
+    np.testing.assert_array_equal(*found)

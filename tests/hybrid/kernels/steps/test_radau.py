@@ -1,0 +1,171 @@
+"""Single steps of the implicit kernel: order, interpolant, tangent vectors, divergence, the guess."""
+
+import numpy as np
+import pytest
+from numba import float64, int64, njit
+
+import hybrid
+from hybrid.compiler.cache.loader import load_kernels
+from hybrid.simulation.trajectory import start
+
+load_kernels()
+from hybrid.kernels.types.layout import METHOD, MODEL, VECTOR, WORK  # noqa: E402
+
+radau = load_kernels("hybrid.kernels.steps.radau")
+NOT_SOLVED, attempt_radau = radau.NOT_SOLVED, radau.attempt_radau
+
+# Newton's iteration to rounding; fixed steps ignore the error ratio.
+TIGHT = hybrid.RadauIIA(rtol=1e-13, atol=1e-14)
+
+
+@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
+def attempt(model, method, mode, t, h, y, tangents, work):
+    return attempt_radau(model, method, mode, t, h, y, tangents, work)
+
+
+def system(*fields, state, **parameters):
+    return hybrid.HybridSystem(
+        state=state,
+        parameters=parameters,
+        modes=[hybrid.Mode("m", lambda t, x, p: tuple(field(t, x, p) for field in fields))],
+        transitions=[],
+    )
+
+
+# Volterra's equations with a season: nonlinear, not autonomous, with a divergence that varies.
+PREY = system(
+    lambda t, x, p: x.u * (1 + 0.5 * np.sin(t) - x.w),
+    lambda t, x, p: x.w * (x.u - 1),
+    state=("u", "w"),
+)
+X0 = (1.5, 0.5)
+
+
+def field(t, x):
+    u, w = x
+    return np.array([u * (1 + 0.5 * np.sin(t) - w), w * (u - 1)])
+
+
+class Steps:
+    """Steps of a given length from a given start, whatever their error."""
+
+    def __init__(self, tangent=None, x0=X0, solver=TIGHT):
+        self.trajectory = start(PREY, x0, 0.0, solver=solver, tangent=tangent)
+        self.t, self.y, self.divergence = 0.0, self.trajectory.run.y.copy(), 0.0
+
+    def attempt(self, h):
+        trajectory = self.trajectory
+        work, k = trajectory.work, trajectory.tangents
+        work.stages[0, :2] = field(self.t, self.y[:2])
+        if k:
+            jacobian = np.array(
+                [
+                    [1 + 0.5 * np.sin(self.t) - self.y[1], -self.y[0]],
+                    [self.y[1], self.y[0] - 1],
+                ]
+            )
+            work.stages[0, 2:-1] = (self.y[2:].reshape(k, 2) @ jacobian.T).ravel()
+            work.stages[0, -1] = np.trace(jacobian)
+        return attempt(trajectory.model, trajectory.method, 0, self.t, h, self.y, k, work)
+
+    def take(self, h, count=1):
+        work, method = self.trajectory.work, self.trajectory.method
+        for _ in range(count):
+            assert self.attempt(h) != NOT_SOLVED
+            self.divergence += h * method.quadrature @ work.stages[:, -1]
+            self.t, self.y = self.t + h, work.new.copy()
+        return self.y
+
+
+@pytest.fixture(scope="module")
+def exact():
+    solver = hybrid.DOP853(rtol=1e-14, atol=1e-15)
+    return hybrid.simulate(PREY, X0, (0.0, 2.0), solver=solver, tangent=True)
+
+
+def slope(lengths, errors):
+    return np.polyfit(np.log(lengths), np.log(errors), 1)[0]
+
+
+LENGTHS = np.array([1 / 8, 1 / 16, 1 / 32])
+
+
+def test_steps_are_of_order_five(exact):
+    errors, tangent_errors, divergence_errors = [], [], []
+    log_determinant = np.log(np.linalg.det(exact.fundamental))
+    for h in LENGTHS:
+        steps = Steps(tangent=np.eye(2))
+        y = steps.take(h, round(2 / h))
+        errors.append(np.abs(y[:2] - exact.x[-1]).max())
+        tangent_errors.append(np.abs(y[2:].reshape(2, 2).T - exact.fundamental).max())
+        divergence_errors.append(abs(steps.divergence - log_determinant))
+    assert slope(LENGTHS, errors) == pytest.approx(5, abs=0.3)
+    assert slope(LENGTHS, tangent_errors) == pytest.approx(5, abs=0.3)
+    assert slope(LENGTHS, divergence_errors) == pytest.approx(5, abs=0.4)
+
+
+def test_interpolant_is_of_order_three(exact):
+    """Between the ends of one step its error falls with the fourth power of the length."""
+    errors = []
+    for h in LENGTHS:
+        steps = Steps()
+        steps.attempt(h)
+        work, method = steps.trajectory.work, steps.trajectory.method
+        bernstein = np.array(X0) + h * method.interpolant @ work.stages[:, :2]
+        np.testing.assert_allclose(bernstein[0], X0, rtol=0)
+        np.testing.assert_allclose(bernstein[-1], work.new, rtol=1e-15)
+        theta = np.linspace(0, 1, 21)
+        basis = np.array(
+            [(1 - theta) ** 3, 3 * theta * (1 - theta) ** 2, 3 * theta**2 * (1 - theta), theta**3]
+        )
+        errors.append(np.abs(basis.T @ bernstein - [exact(t) for t in theta * h]).max())
+    assert slope(LENGTHS, errors) == pytest.approx(4, abs=0.3)
+
+
+def test_the_last_stage_is_the_derivative_at_the_end():
+    steps = Steps(tangent=np.eye(2))
+    steps.attempt(0.3)
+    work = steps.trajectory.work
+    np.testing.assert_allclose(work.stages[3, :2], field(0.3, work.new[:2]), rtol=1e-12)
+
+
+def test_tangents_are_the_derivative_of_the_step():
+    """Of the step itself, not only of the flow, which it misses by more than the differences do."""
+    h, epsilon = 0.2, 1e-5
+    tangents = Steps(tangent=np.eye(2)).take(h)[2:].reshape(2, 2).T
+    for column, shift in enumerate(epsilon * np.eye(2)):
+        difference = Steps(x0=X0 + shift).take(h) - Steps(x0=X0 - shift).take(h)
+        np.testing.assert_allclose(tangents[:, column], difference / (2 * epsilon), rtol=0, atol=1e-9)
+
+
+def test_a_step_does_not_depend_on_what_was_tried_before():
+    """The guess from the last polynomial, of this step or of the one before, only saves iterations."""
+    fresh = Steps().take(0.2)
+    retaken = Steps()
+    retaken.attempt(0.7)
+    np.testing.assert_allclose(retaken.take(0.2), fresh, rtol=1e-13)
+    onwards, alone = Steps(), Steps(x0=fresh)
+    onwards.take(0.2)
+    alone.t = 0.2
+    np.testing.assert_allclose(onwards.take(0.3), alone.take(0.3), rtol=1e-13)
+
+
+def test_a_step_of_no_length():
+    steps = Steps(tangent=np.eye(2))
+    before = steps.y.copy()
+    assert steps.attempt(0.0) <= 1.0
+    np.testing.assert_array_equal(steps.trajectory.work.new, before)
+    np.testing.assert_array_equal(steps.take(0.1), Steps(tangent=np.eye(2)).take(0.1))
+
+
+def test_the_estimate_is_of_the_size_of_the_interpolants_error(exact):
+    """On a step at the tolerance the interpolant misses the solution by about as much."""
+    tolerance = 1e-6
+    arc = hybrid.simulate(PREY, X0, (0.0, 2.0), solver=hybrid.RadauIIA(rtol=tolerance, atol=tolerance))
+    worst = max(np.abs(arc(t) - exact(t)).max() for t in np.linspace(0, 2, 500))
+    assert 0.05 * tolerance < worst < 5 * tolerance
+
+
+@pytest.mark.parametrize("h", [1e3, 1e6])
+def test_no_solution_is_no_step(h):
+    assert not Steps().attempt(h) <= 1.0

@@ -1,0 +1,130 @@
+import re
+
+import attrs
+import numpy as np
+import pytest
+
+from hybrid.errors import ModelError
+from hybrid.symbolic.tracing import model_symbols, trace
+from hybrid.system.derivatives import complex_step_error, symbolic_jacobian
+from hybrid.system.functions import field_role
+from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+
+
+def oscillator(jacobian=None, *, field=lambda t, x, p: (x.v, -p.k * x.q**3 + np.cos(p.w * t))):
+    return HybridSystem(
+        state=("q", "v"), parameters={"k": 2.0, "w": 3.0}, modes=[Mode("a", field, jacobian=jacobian)]
+    )
+
+
+def test_columns_are_the_states_then_time():
+    symbols = model_symbols(2, 1)
+    (q, v), (k,), t = symbols.x, symbols.p, symbols.t
+    expressions = trace(lambda t, x, p: (x.v, -p.k * x.q**3 + t * x.v), ("q", "v"), ("k",))
+    assert symbolic_jacobian(expressions, symbols.variables) == [[0, 1, 0], [-3 * k * q**2, t, v]]
+
+
+def test_right_derivatives_pass():
+    oscillator(lambda t, x, p: ((0, 1, 0), (-3 * p.k * x.q**2, 0, -p.w * np.sin(p.w * t))))
+
+
+def test_a_wrong_entry_is_named_with_point_given_and_expected():
+    text = (
+        r"Mode 'a': jacobian: entry D_q of v is .* at t = .*, x = \(.*\); the complex step of the field gives"
+    )
+    with pytest.raises(ModelError, match=text):
+        oscillator(lambda t, x, p: ((0, 1, 0), (-2 * p.k * x.q**2, 0, -p.w * np.sin(p.w * t))))
+    with pytest.raises(ModelError, match="entry D_t of v is"):
+        oscillator(lambda t, x, p: ((0, 1, 0), (-3 * p.k * x.q**2, 0, 0)))
+
+
+def test_the_complex_step_catches_the_eighth_digit():
+    with pytest.raises(ModelError, match=r"entry D_v of q is 1\.00000001"):
+        oscillator(lambda t, x, p: ((0, 1 + 1e-8, 0), (-3 * p.k * x.q**2, 0, -p.w * np.sin(p.w * t))))
+
+
+def test_a_missing_time_column_is_asked_for():
+    with pytest.raises(ModelError, match=r"has 2 columns, but the field depends on t: D_t of v.*D_t last"):
+        oscillator(lambda t, x, p: ((0, 1), (-3 * p.k * x.q**2, 0)))
+    oscillator(lambda t, x, p: ((0, 1), (0, 0)), field=lambda t, x, p: (x.v, p.k))
+
+
+def test_guards_and_resets_are_checked_too():
+    good = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("a", lambda t, x, p: (x.v, 0.0))],
+        transitions=[
+            Transition(
+                "a",
+                "a",
+                Guard(lambda t, x, p: x.q * x.v - t, gradient=lambda t, x, p: (x.v, x.q, -1.0)),
+                Reset(
+                    lambda t, x, p: (x.q, -(x.v**2)), jacobian=lambda t, x, p: ((1.0, 0.0), (0.0, -2 * x.v))
+                ),
+                name="hit",
+            )
+        ],
+    )
+    (transition,) = good.transitions
+    no_time = attrs.evolve(transition.guard, gradient=lambda t, x, p: (x.v, x.q))
+    with pytest.raises(
+        ModelError, match=re.escape("Transition 'hit': gradient has 2 columns, but the guard")
+    ):
+        attrs.evolve(good, transitions=[attrs.evolve(transition, guard=no_time)])
+    bad = attrs.evolve(transition.reset, jacobian=lambda t, x, p: ((1.0, 0.0), (0.0, 2 * x.v)))
+    with pytest.raises(ModelError, match="Transition 'hit': jacobian: entry D_v of v"):
+        attrs.evolve(good, transitions=[attrs.evolve(transition, reset=bad)])
+
+
+def absolute(t, x, p):
+    return (x.v, -np.abs(x.q - 1.0) * x.v)
+
+
+def test_where_the_complex_step_misleads_central_differences_measure():
+    right = oscillator(
+        lambda t, x, p: ((0, 1), (-np.sign(x.q - 1.0) * x.v, -np.abs(x.q - 1.0))), field=absolute
+    )
+    assert right.dimension == 2
+    with pytest.raises(ModelError, match="the central difference of the field gives"):
+        oscillator(lambda t, x, p: ((0, 1), (0.0, -np.abs(x.q - 1.0))), field=absolute)
+
+
+def test_points_without_a_value_are_passed_over():
+    oscillator(lambda t, x, p: ((0, 1), (1 / x.q, 0)), field=lambda t, x, p: (x.v, np.log(x.q)))
+
+
+@pytest.mark.parametrize(
+    ("field", "runs"),
+    [
+        (lambda t, x, p: (x.v, np.sin(x.q)), True),
+        (lambda t, x, p: (x.v, x.q if x.q > 0 else 0.0), False),
+        (absolute, False),
+    ],
+)
+def test_whether_the_complex_step_can_be_taken(field, runs):
+    system = oscillator(field=field)
+    assert (complex_step_error(system, field_role(system, system.modes[0])) is None) is runs
+
+
+def test_storing_a_complex_number_in_a_real_array_is_not_overlooked():
+    def field(t, x, p):
+        rate = np.zeros(2)
+        rate[:] = x[::-1]
+        return rate
+
+    system = HybridSystem(state=2, modes=[Mode("a", field)])
+    assert complex_step_error(system, field_role(system, system.modes[0])) is not None
+
+
+def test_a_branch_on_an_array_entry_is_not_overlooked():
+    system = HybridSystem(state=1, modes=[Mode("a", lambda t, x, p: x if x[0] > 0 else -x)])
+    assert complex_step_error(system, field_role(system, system.modes[0])) is not None
+
+
+def test_a_derivative_rounds_as_the_function_does():
+    """3*(a - b) stays a product: 3*a - 3*b would not be exact where a - b is."""
+    symbols = model_symbols(3, 0)
+    a, b, c = symbols.x
+    [row] = symbolic_jacobian(trace(lambda t, x, p: 3.0 * (x[0] - x[1]) * x[2], 3, ()), (c,))
+    assert row[0].is_Mul
+    assert a - b in row[0].args

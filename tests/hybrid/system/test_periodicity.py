@@ -1,0 +1,90 @@
+"""A declared period is a period of every function, or the model is refused."""
+
+import numpy as np
+import pytest
+
+import models
+from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition, compile_system, simulate
+from hybrid.compiler.compiled import emitted_of
+
+
+def forced(
+    period,
+    force=lambda t, p: np.cos(p.w * t),
+    *,
+    guard=lambda t, x, p: x.q - 2,
+    when=None,
+    reset=lambda t, x, p: (x.q, -x.v),
+    state=1.0,
+):
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"w": 1.3},
+        modes=[Mode("a", lambda t, x, p: (x.v, -x.q + state * force(t, p)))],
+        transitions=[Transition("a", "a", Guard(guard, +1, when=when), Reset(reset), name="wall")],
+        period=period,
+    )
+
+
+def right(p):
+    return 2 * np.pi / p.w
+
+
+@pytest.mark.parametrize("harmonic", [1, 2, 40])
+@pytest.mark.parametrize("size", [1.0, 1e-12, 1e9])
+def test_a_right_period_is_accepted(harmonic, size):
+    forced(right, lambda t, p: np.cos(harmonic * p.w * t + 0.3), state=size)
+    forced(2 * np.pi / 1.3, lambda t, p: np.cos(harmonic * p.w * t + 0.3), state=size)
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        lambda t, p: np.sign(np.sin(p.w * t)),
+        lambda t, p: np.mod(p.w * t / (2 * np.pi), 1.0),
+        lambda t, p: np.abs(np.sin(p.w * t / 2)),
+        lambda t, p: np.exp(np.cos(p.w * t)) + np.tan(p.w * t / 2) ** 2,
+        lambda t, p: np.cos(p.w * t) ** 3 * np.cos(2 * p.w * t),
+        lambda t, p: 1.0,
+    ],
+)
+def test_periodic_functions_of_many_kinds(force):
+    forced(right, force)
+
+
+@pytest.mark.parametrize("period", [4.83, 4.8332, 2 * np.pi / 1.3 * (1 + 1e-9), 2 * np.pi, 1e-3])
+def test_a_wrong_period_is_refused_when_the_system_is_made(period):
+    with pytest.raises(ModelError, match=r"period = .* is no period of the functions. Mode 'a': field is"):
+        forced(period)
+
+
+@pytest.mark.parametrize(
+    ("name", "functions"),
+    [
+        ("guard", {"guard": lambda t, x, p: x.q - 2 - 0.1 * np.sin(t)}),
+        ("when", {"when": lambda t, x, p: np.cos(2.9 * t)}),
+        ("reset", {"reset": lambda t, x, p: (x.q, -x.v + t)}),
+    ],
+)
+def test_every_function_is_looked_at(name, functions):
+    with pytest.raises(ModelError, match=f"Transition 'wall': {name} is"):
+        forced(right, **functions)
+
+
+def test_a_period_that_is_one_at_the_declared_parameters_only():
+    system = forced(2 * np.pi / 1.3)
+    assert not emitted_of(system).proved_period
+    assert simulate(system, (0.0, 0.0), (0.0, 1.0)).status.ok
+    assert simulate(system, (0.0, 0.0), (0.0, 1.0), parameters={"w": 2.6}).status.ok
+    with pytest.raises(ModelError, match=r"no period of the functions.*w = 1\.4.*period=lambda p"):
+        simulate(system, (0.0, 0.0), (0.0, 1.0), parameters={"w": 1.4})
+
+
+@pytest.mark.parametrize("model", [models.vibroimpact, models.impact_oscillator, models.stop_oscillator])
+def test_the_period_of_the_models_is_proved_once_for_all_parameters(model):
+    system = model()
+    assert system.period is not None
+    compiled = compile_system(system)
+    assert compiled.emitted.proved_period
+    compiled.model({next(iter(system.parameters)): 0.7})
+    assert not compiled.periodic_at

@@ -1,0 +1,289 @@
+"""The library's own systems have every property, and so have systems made up by chance."""
+
+import subprocess
+import sys
+from collections import Counter
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.errors import UnsatisfiedAssumption
+
+import hybrid
+import models
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.testing import (
+    Case,
+    PropertyError,
+    PropertyReport,
+    cases,
+    check_cut,
+    check_derivatives,
+    check_jumps,
+    check_saltation,
+    check_scale,
+    check_sides,
+    check_split,
+    check_sum_rule,
+    check_system,
+    parameters,
+    small_systems,
+    states,
+)
+from hybrid.testing.crossings import CROSSINGS
+from hybrid.testing.events import JUMPS, SIDES
+from hybrid.testing.functions import PERIOD
+from hybrid.testing.invariance import ELASTIC, ORDER
+from hybrid.testing.saltation import CONTINUITY, SUM_RULE
+from tests.cases import systems
+
+BALL = models.bouncing_ball()
+
+# What is said of a system that has no such thing.
+NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC = CONTINUITY, ORDER, ELASTIC
+
+
+DOWNHILL = {"states": {"theta": (-0.3, 0.4), "omega": (0.5, 2.0)}}
+BUCK = {"states": {"v": (11.4, 12.4), "i": (0.4, 0.7), "tau": (0.0, 0.5)}, "t_span": (0.0, 1.6e-3)}
+
+
+def friction():
+    """A block on a belt, Filippov's sliding mode derived."""
+    return hybrid.filippov(
+        state=("x", "v"),
+        parameters={"belt": 0.2, "friction": 1.0},
+        below=lambda t, x, p: (x.v, p.friction - x.x),
+        above=lambda t, x, p: (x.v, -p.friction - x.x),
+        switching=lambda t, x, p: x.v - p.belt,
+    )
+
+
+def rattler():
+    """A mass between a rigid wall and a stiff buffer, forced."""
+
+    def force(t, x, p):
+        return p.A * np.cos(p.w * t) - p.c * x.v - x.q
+
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"A": 4.0, "w": 1.6, "c": 0.15, "k": 50.0, "e": 0.9},
+        modes=[
+            Mode("free", lambda t, x, p: (x.v, force(t, x, p))),
+            Mode("buffer", lambda t, x, p: (x.v, force(t, x, p) - p.k * (x.q - 1))),
+        ],
+        transitions=[
+            Transition(
+                "free",
+                "free",
+                Guard(lambda t, x, p: x.q, direction=-1),
+                Reset(lambda t, x, p: (0.0, -p.e * x.v)),
+                name="impact",
+            ),
+            Transition("free", "buffer", Guard(lambda t, x, p: x.q - 1, direction=+1), name="touch"),
+            Transition("buffer", "free", Guard(lambda t, x, p: x.q - 1, direction=-1), name="leave"),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+
+
+@pytest.mark.parametrize(
+    ("system", "options", "unchecked"),
+    [
+        (models.bouncing_ball(), {}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (
+            models.bouncing_ball(),
+            {"parameters": {"e": 1.0}, "elastic": ("v",)},
+            {NOT_CONTINUOUS, ONE_TRANSITION},
+        ),
+        (models.impact_oscillator(), {}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (
+            models.vibroimpact(),
+            {"states": {"x1": (-0.02, 0.02), "x2": (-0.01, 0.03), "v1": (-0.1, 0.1), "v2": (-0.4, 0.4)}},
+            {NOT_ELASTIC},
+        ),
+        (rattler(), {}, {NOT_ELASTIC}),
+        (models.solvable_oscillator(), {}, {CROSSINGS, SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
+        (models.rimless_wheel(), DOWNHILL, {NOT_CONTINUOUS, NOT_ELASTIC}),
+        (systems.jerk(), {}, {NOT_ELASTIC}),
+        (systems.constant_fields(), {"mode": "left"}, {NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC}),
+        (systems.switched_linear(), {}, {SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
+        (
+            systems.stick_slip(),
+            {"mode": "slip", "states": {"x": (-1.0, 1.0), "v": (-1.0, 0.1)}},
+            {SUM_RULE, NOT_ELASTIC},
+        ),
+        (
+            systems.incline(),
+            {"mode": "fall", "t_span": (0.0, 40.0)},
+            {SUM_RULE, NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC},
+        ),
+        (
+            models.buck_converter(),
+            {**BUCK, "examples": 30, "parameters": {**models.buck_converter().parameters, "E": (24.0, 26.0)}},
+            {NOT_CONTINUOUS, NOT_ELASTIC},
+        ),
+    ],
+    ids=[
+        "ball", "elastic ball", "impact oscillator", "vibro-impact", "rattler", "solvable", "wheel", "jerk",
+        "constant", "switched", "stick-slip", "incline", "buck",
+    ],
+)  # fmt: skip
+def test_ours(system, options, unchecked):
+    report = check_system(system, **{"examples": 15, **options})
+    without = set() if system.period is not None else {PERIOD}
+    assert set(report.unchecked) == unchecked | without
+    assert not report.never_seen
+
+
+CASES = small_systems().flatmap(cases)
+
+
+class TestSmallSystems:
+    """Systems made up by chance, with the properties that need no other way of writing them."""
+
+    @settings(max_examples=25)
+    @given(CASES)
+    def test_properties(self, case):
+        check_derivatives(case)
+        check_jumps(case)
+        check_sides(case)
+        check_split(case)
+        check_saltation(case)
+
+    @settings(max_examples=10)
+    @given(CASES)
+    def test_sums_of_exponents(self, case):
+        check_sum_rule(case)
+
+    @settings(max_examples=10)
+    @given(small_systems())
+    def test_crossings_are_transverse(self, system):
+        """Seen from the equations alone: ``ds/dt`` at ``|y| < 2`` is above the speed of the moving level."""
+        field = system.modes[0].field
+        p = hybrid.system.variables.parameter_view(system, system.parameter_values())
+        for corner in np.ndindex(*(2,) * (system.dimension - 1)):
+            y = [4.0 * side - 2.0 for side in corner]
+            for t in np.linspace(0.0, 6.3, 20):
+                speed = field(t, hybrid.system.variables.state_values(system, (1.0, *y)), p)[0]
+                level = p.m * p.w * np.sin(p.w * t) if system.period else 0.0
+                assert speed + level > 0.05
+
+
+class TestStrategies:
+    @given(states(models.bouncing_ball(), {"q": (0.5, 1.0)}))
+    def test_states(self, x):
+        assert 0.5 <= x[0] <= 1.0
+        assert -2.0 <= x[1] <= 2.0
+
+    @given(parameters(models.bouncing_ball(), {"e": 1.0}))
+    def test_parameters(self, p):
+        assert p["e"] == 1.0
+        assert 0.8 * 9.81 - 1e-3 <= p["g"] <= 1.2 * 9.81 + 1e-3
+
+    @given(states(BALL, st.just((1, 2))), parameters(BALL, st.just({"e": 0.5})))
+    def test_strategies_instead_of_ranges(self, x, p):
+        assert x == (1.0, 2.0)
+        assert p == {"g": 9.81, "e": 0.5}
+
+    @given(cases(models.impact_oscillator(), t_span=(1.0, 3.0)))
+    def test_spans(self, case):
+        assert 1.0 <= case.t0 <= 2.0
+        assert case.t0 < case.t1 <= 3.0
+        assert case.mode == ("flight" if case.x0[0] < case.parameters["d"] else None)
+
+    @pytest.mark.parametrize(
+        ("options", "text"),
+        [
+            ({"states": {"w": 1.0}}, "State component 'w' does not exist. State components: q, v."),
+            (
+                {"parameters": {"gg": 1.0}},
+                "Parameter 'gg' does not exist. Parameters: g, e. Did you mean 'g'?",
+            ),
+            ({"states": {"q": (2.0, 1.0)}}, "Range of 'q' must be (low, high), a number or a strategy"),
+            ({"states": {"q": "high"}}, "Range of 'q' must be a number; got 'high'"),
+            ({"t_span": (1.0, 1.0)}, "t_span must be (t0, t1) with t0 < t1; got (1.0, 1.0)"),
+            ({"mode": "fligth"}, "Mode 'fligth' does not exist. Modes: flight. Did you mean 'flight'?"),
+            ({"passable": ("bonce",)}, "Transition 'bonce' does not exist"),
+            ({"examples": 0}, "examples must be a whole number of at least 1"),
+            ({"elastic": ("w",)}, "State component 'w' does not exist"),
+        ],
+    )
+    def test_errors(self, options, text):
+        with pytest.raises(hybrid.ModelError) as caught:
+            check_system(models.bouncing_ball(), **options)
+        assert text in str(caught.value)
+
+
+class TestReport:
+    def test_what_could_not_be_judged_is_said(self):
+        """Above 0.4 the ball does not come down within the tenth of a second given."""
+        report = check_system(
+            models.bouncing_ball(), examples=5, states={"q": (0.4, 1.0), "v": 0.0}, t_span=(0.0, 0.1)
+        )
+        assert JUMPS in report.unchecked
+        assert report.never_seen == ("bounce",)
+        text = str(report)
+        assert f"NOT CHECKED: {JUMPS}: no event on the run." in text
+        assert "Never seen: bounce. Give ranges that lead there." in text
+        assert "elastic= is not given" in text
+
+    def test_hardly_checked(self):
+        found = PropertyReport("A property", 1, Counter({"no event on the run": 20}))
+        assert str(found).startswith("HARDLY CHECKED: A property: 1 examples, 20 discarded")
+        assert str(PropertyReport("A property", 3, Counter())) == "A property: 3 examples."
+
+    def test_nothing_to_judge_is_no_success(self):
+        with pytest.raises(PropertyError, match=r"bouncing ball: none of \d+ runs could be judged"):
+            check_system(models.bouncing_ball(), states={"q": (-2.0, -1.0)}, examples=5)
+
+    def test_a_wall_that_may_be_passed(self):
+        """A membrane that costs speed one way: the state goes on beyond the guard, in the same mode."""
+        membrane = HybridSystem(
+            state=("q", "v"),
+            modes=[Mode("free", lambda t, x, p: (x.v, -x.q))],
+            transitions=[
+                Transition(
+                    "free",
+                    "free",
+                    Guard(lambda t, x, p: x.q, -1),
+                    Reset(lambda t, x, p: (x.q, 0.5 * x.v)),
+                    name="membrane",
+                )
+            ],
+        )
+        with pytest.raises(PropertyError, match="say so with passable="):
+            check_system(membrane, examples=20)
+        assert not check_system(membrane, examples=20, passable=("membrane",)).never_seen
+
+
+def test_chatter_is_cut_short():
+    """From 1 m the ball comes to rest after four seconds; the run is judged up to its second impact or so."""
+    ball = models.bouncing_ball()
+    case = Case(ball, dict(ball.parameters), "flight", (1.0, 0.0), 0.0, 10.0)
+    assert len(case.run.arc.jumps) == 4
+    assert case.run.t1 < 3.0
+
+
+def test_a_function_that_cannot_be_traced():
+    def flight(t, x, p):
+        total = 0.0
+        for _ in range(3):
+            total += p.g / 3 if x.q > -100.0 else 0.0
+        return x.v, -total
+
+    def jacobian(t, x, p):
+        return (0.0, 1.0), (0.0, 0.0)
+
+    ball = attrs.evolve(BALL, modes=[Mode("flight", flight, jacobian=jacobian)])
+    case = Case(ball, dict(ball.parameters), "flight", (1.0, 0.0), 0.0, 0.7)
+    check_derivatives(case)
+    check_cut(case)
+    with pytest.raises(UnsatisfiedAssumption, match="cannot be traced"):
+        check_scale(case)
+
+
+def test_importing_the_library_leaves_hypothesis_alone():
+    program = "import sys, hybrid; assert 'hypothesis' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True)
