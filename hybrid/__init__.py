@@ -16,7 +16,8 @@ from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
-from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
 from hybrid.transform.filippov import filippov
 
 __all__ = [

@@ -10,14 +10,11 @@ import reprlib
 from collections.abc import Callable, Iterable, Mapping
 from math import inf, isfinite
 from numbers import Real
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hybrid.errors import ArgumentError, unknown_name
-
-if TYPE_CHECKING:
-    from hybrid.system.graph import HybridSystem
 
 Kind = TypeVar("Kind")
 LARGEST_COUNT = int(np.iinfo(np.int64).max)
@@ -81,30 +78,9 @@ def flag(name: str, value: object) -> bool:
 
 def numbers(name: str, value: object, wanted: str) -> np.ndarray:
     """Numbers as a new array of floats, of the shape in which they come."""
-    found = _as_floats(value)
+    found = floats(value)
     if found is None:
         raise refusal(name, wanted, value)
-    return found
-
-
-def state(name: str, value: object, system: HybridSystem) -> np.ndarray:
-    """A finite state ``(n,)`` of a system."""
-    found = _as_floats(value)
-    if found is None:
-        raise ArgumentError(
-            f"{name} must hold {system.dimension} numbers; got {shown(value)}. "
-            f"The state is {', '.join(system.state_names)}."
-        )
-    if found.shape != (system.dimension,):
-        names = ", ".join(system.state_names)
-        raise ArgumentError(
-            f"{name} has shape {found.shape}; the state needs shape ({system.dimension},): {names}."
-        )
-    values = found.tolist()
-    if not all(map(isfinite, values)):
-        pairs = zip(system.state_names, values, strict=True)
-        component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
-        raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
     return found
 
 
@@ -217,7 +193,7 @@ def _as_float(value: object) -> float | None:
         return -inf if str(value).startswith("-") else inf
 
 
-def _as_floats(value: object) -> np.ndarray | None:
+def floats(value: object) -> np.ndarray | None:
     """Real numbers as a new array of floats; None if there is anything else among them."""
     if isinstance(value, np.ndarray):
         if value.dtype.kind in "fiu" and not np.ma.is_masked(value):

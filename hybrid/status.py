@@ -11,7 +11,7 @@ import attrs
 from hybrid.kernels.types import codes
 
 if TYPE_CHECKING:
-    from hybrid.system.graph import Transition
+    from hybrid.system.elements import Transition
 
 
 class StatusCode(IntEnum):

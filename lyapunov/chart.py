@@ -165,7 +165,7 @@ def chart(
         system.mode_index(mode)
     work = _Rows(
         system=system,
-        x0=arguments.state("x0", x0, system),
+        x0=system.variables.state_values("x0", x0),
         mode=mode,
         t0=t0,
         parameters=arguments.mapping("parameters", parameters),

@@ -15,6 +15,7 @@ from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_syste
 from hybrid.compiler.cache.loader import address, entry, load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import RungeKutta
@@ -303,7 +304,7 @@ class Estimate:
             vectors[gone] = basis[:, len(kept) : len(vectors)].T
 
     def _status(self, code: int, intervals: int) -> Status:
-        status = self.trajectory.status(code)
+        status = status_of(self.trajectory, code)
         run, grazed = self.trajectory.run, int(self.trajectory.run.count[codes.ILL_CONDITIONED])
         if not status.ok or not grazed:
             return status

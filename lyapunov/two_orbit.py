@@ -14,6 +14,7 @@ from hybrid import ArgumentError, HybridSystem, Status, arguments
 from hybrid.compiler.cache.loader import address, entry, load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import RungeKutta
@@ -189,7 +190,7 @@ def two_orbit_exponents(
         bar.update(transient)
         if code != codes.DONE:
             nothing = np.empty(0)
-            return TwoOrbitExponents(nothing, nothing, separation, length, reference.status(code))
+            return TwoOrbitExponents(nothing, nothing, separation, length, status_of(reference, code))
         companions = [_companion(reference, offset, parameters, solver) for _ in range(2)]
         distances, status = _follow(reference, companions, separation, length, intervals, bar)
     free, renormalised = distances.T
@@ -288,4 +289,4 @@ def _follow(
     unfinished = (
         run for run in runs if (run.run.count[codes.CYCLE], run.run.clock[codes.PHASE]) != (*cycle, *phase)
     )
-    return np.concatenate(kept), next(unfinished, reference).status(code)
+    return np.concatenate(kept), status_of(next(unfinished, reference), code)

@@ -1,4 +1,4 @@
-"""Imports go one way, and files stay small: ``kernels <- compile <- simulate <- lyapunov``."""
+"""Imports go one way and never in a circle, and files stay small: the order of docs/architecture.md."""
 
 import ast
 import subprocess
@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import networkx as nx
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -23,6 +24,32 @@ KERNELS_MAY_IMPORT = (
     "numpy",
     "struct",
     "typing",
+)
+# Rooms from the ground up: each imports itself and those before it.
+ROOMS = (
+    "hybrid.errors",
+    "hybrid.display",
+    "hybrid.arguments",
+    "hybrid.kernels",
+    "hybrid.system",
+    "hybrid.status",
+    "hybrid.symbolic",
+    "hybrid.solvers",
+    "hybrid.transform",
+    "hybrid.compiler",
+    "hybrid.simulation",
+    "hybrid.orbits",
+    "hybrid.plot",
+    "hybrid.accuracy",
+    "hybrid.testing",
+    "hybrid.__main__",
+    "hybrid",
+    "models",
+    "lyapunov",
+)
+KERNEL_ROOMS = tuple(
+    f"hybrid.kernels.{name}"
+    for name in ("types", "arithmetic", "events", "steps", "jumps", "evaluate", "drive")
 )
 HEAVY = ("matplotlib", "networkx", "numba", "scipy", "sympy")
 MAX_LINES = 500
@@ -80,6 +107,64 @@ def test_the_walk_finds_imports_of_every_form(tmp_path, monkeypatch):
     ]
 
 
+def module_of(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def arrows(*packages):
+    """Pairs of modules, the first of which imports the second, and where."""
+    modules = {module_of(path) for package in packages for path in sources(package)}
+    for package in packages:
+        for found in imports_in(package):
+            inner = f"{found.module}.{found.name}"
+            target = inner if inner in modules else found.module
+            if target in modules and target != module_of(found.path):
+                yield module_of(found.path), target, found
+
+
+def room_of(module, rooms):
+    return max((room for room in rooms if module == room or module.startswith(f"{room}.")), key=len)
+
+
+def upward(rooms, pairs):
+    floors = {room: floor for floor, room in enumerate(rooms)}
+    return [
+        found for one, other, found in pairs if floors[room_of(one, rooms)] < floors[room_of(other, rooms)]
+    ]
+
+
+def test_imports_go_downwards():
+    offences = upward(ROOMS, arrows("hybrid", "models", "lyapunov"))
+    assert not offences, report(offences)
+
+
+def test_kernels_go_downwards():
+    inside = [
+        arrow for arrow in arrows("hybrid/kernels") if all(module.count(".") > 1 for module in arrow[:2])
+    ]
+    assert len(inside) > 50
+    offences = upward(KERNEL_ROOMS, inside)
+    assert not offences, report(offences)
+
+
+def test_an_upward_import_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
+    for name, text in (("system", "def f():\n    from hybrid.compiler import emit\n"), ("compiler", "")):
+        (tmp_path / "hybrid" / name).mkdir(parents=True)
+        (tmp_path / "hybrid" / name / "emit.py").write_text(text)
+    assert [str(found) for found in upward(ROOMS, arrows("hybrid"))] == [
+        "hybrid/system/emit.py:2: from hybrid.compiler import emit"
+    ]
+
+
+def test_no_circle_of_imports():
+    """Not even one that a late import or one for types alone would close."""
+    graph = nx.DiGraph((one, other) for one, other, _ in arrows("hybrid", "models", "lyapunov"))
+    circles = [sorted(each) for each in nx.strongly_connected_components(graph) if len(each) > 1]
+    assert not circles, circles
+
+
 def test_kernels_know_only_numpy_the_compiler_and_each_other():
     offences = [found for found in imports_in("hybrid/kernels") if not found.is_of(*KERNELS_MAY_IMPORT)]
     assert not offences, report(offences)
@@ -102,11 +187,11 @@ def test_models_use_only_what_hybrid_exports_and_its_checks_of_arguments():
     assert not offences, report(offences)
 
 
-def test_only_the_demo_of_lyapunov_knows_a_model():
+def test_only_the_study_of_lyapunov_knows_a_model():
     offences = [
         found
         for found in imports_in("lyapunov")
-        if found.is_of("models") and found.path.name != "__main__.py" and not found.path.match("demo*.py")
+        if found.is_of("models") and found.path.name != "__main__.py" and found.path.parent.name != "study"
     ]
     assert not offences, report(offences)
 

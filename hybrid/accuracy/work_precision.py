@@ -233,7 +233,7 @@ def work_precision(
     True
     """
     as_system("system", system)
-    x0 = arguments.state("x0", x0, system)
+    x0 = system.variables.state_values("x0", x0)
     t_span = arguments.time_span("t_span", t_span)
     if mode is not None:
         system.mode_index(mode)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from hybrid.compiler.emitted import Emitted
 from hybrid.compiler.opaque import OpaqueFunction
 from hybrid.errors import ModelError
 from hybrid.symbolic.values import WHERE, TraceError, values_of
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
-from hybrid.system.functions import CONDITION, Role, indexed_roles
-
-if TYPE_CHECKING:
-    from hybrid.compiler.compiled import CompiledSystem
-    from hybrid.system.graph import HybridSystem
+from hybrid.system.functions import CONDITION, ModelFunction
+from hybrid.system.graph import HybridSystem, functions_of
 
 EPSILON = float(np.finfo(float).eps)
 # Sizes of state and time at which functions are compared, besides those near 1.
@@ -30,7 +28,33 @@ ROUNDED = {True: 1e-13, False: 1e-8}
 HIDDEN = 1e-12
 
 
-def check_agreement(compiled: CompiledSystem) -> None:
+class Compiled(Protocol):
+    """What is compared: a compiled system."""
+
+    @property
+    def system(self) -> HybridSystem:
+        """The model."""
+        ...
+
+    @property
+    def emitted(self) -> Emitted:
+        """What it was compiled from."""
+        ...
+
+    def value(
+        self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+    ) -> np.ndarray:
+        """A compiled function of the mode or transition of that index, ``(rows,)``."""
+        ...
+
+    def derivative(
+        self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+    ) -> np.ndarray:
+        """Its derivative ``(rows, n + 1)``."""
+        ...
+
+
+def check_agreement(compiled: Compiled) -> None:
     """Compare every compiled function with its Python function at points of many sizes.
 
     Points at which Python raises an error, or a value is not finite, are passed over.
@@ -41,18 +65,18 @@ def check_agreement(compiled: CompiledSystem) -> None:
         If a value differs by more than rounding.
     """
     points = [*comparison_points(compiled.system)]
-    for index, role in indexed_roles(compiled.system):
+    for index, function in functions_of(compiled.system):
         for t, x, values in points:
-            fault = disagreement(compiled, role, index, t, x, values)
+            fault = disagreement(compiled, function, index, t, x, values)
             if fault is not None:
                 raise ModelError(fault)
 
 
 def compiled_value(
-    compiled: CompiledSystem, role: Role, index: int, t: float, x: np.ndarray, values: np.ndarray
+    compiled: Compiled, function: ModelFunction, index: int, t: float, x: np.ndarray, values: np.ndarray
 ) -> np.ndarray:
     """The compiled function as it runs."""
-    return compiled.value(role, index, t, x, values)
+    return compiled.value(function, index, t, x, values)
 
 
 Value = Callable[..., np.ndarray]
@@ -72,8 +96,8 @@ def comparison_points(system: HybridSystem) -> Iterator[tuple[float, np.ndarray,
 
 
 def disagreement(
-    compiled: CompiledSystem,
-    role: Role,
+    compiled: Compiled,
+    function: ModelFunction,
     index: int,
     t: float,
     x: np.ndarray,
@@ -85,34 +109,34 @@ def disagreement(
     ``value`` is what evaluates the compiled function.
     """
     system = compiled.system
-    found = value(compiled, role, index, t, x, values)
-    opaque = _is_opaque(compiled, role.function)
-    text = _difference(system, role.title, role.function, found, t, x, values, opaque)
-    if text is not None or role.name == CONDITION:
+    found = value(compiled, function, index, t, x, values)
+    opaque = _is_opaque(compiled, function.value)
+    text = _difference(system, function.title, function.value, found, t, x, values, opaque)
+    if text is not None or function.kind == CONDITION:
         return text
-    if role.derivative is not None:
-        found = compiled.derivative(role, index, t, x, values)
-        given = evaluate(system, role.derivative, t, x, values)
-        width = found.shape[1] if given is None else len(given) // role.rows
-        return _difference(
-            system, role.derivative_title, role.derivative, found[:, :width].ravel(), t, x, values, opaque
-        )
+    if function.derivative is not None:
+        found = compiled.derivative(function, index, t, x, values)
+        given = evaluate(system.variables, function.derivative, t, x, values)
+        width = found.shape[1] if given is None else len(given) // function.rows
+        given_columns = found[:, :width].ravel()
+        title = function.derivative_title
+        return _difference(system, title, function.derivative, given_columns, t, x, values, opaque)
     if not opaque:
         return None
     try:
-        wanted = complex_step(system, role, t, x, values)
+        wanted = complex_step(system.variables, function, t, x, values)
     except Exception:  # not at this point, then
         return None
-    found = compiled.derivative(role, index, t, x, values)
+    found = compiled.derivative(function, index, t, x, values)
     wrong = np.isfinite(wanted) & ~(np.abs(found - wanted) <= 1e-7 * (1.0 + np.abs(wanted)))
     if not np.any(wrong):
         return None
     i, j = (int(k) for k in np.argwhere(wrong)[0])
-    what = f"{role.title}: the derivative"
+    what = f"{function.title}: the derivative"
     return _told(system, what, found[i, j], wanted[i, j], t, x, values, "a branch on the type of a number")
 
 
-def _is_opaque(compiled: CompiledSystem, function: Callable[..., Any]) -> bool:
+def _is_opaque(compiled: Compiled, function: Callable[..., Any]) -> bool:
     return any(
         isinstance(value, OpaqueFunction) and value.function is function
         for value in compiled.emitted.opaque.values()
@@ -129,7 +153,7 @@ def _difference(
     values: np.ndarray,
     opaque: bool,
 ) -> str | None:
-    wanted = evaluate(system, function, t, x, values)
+    wanted = evaluate(system.variables, function, t, x, values)
     if wanted is None or len(wanted) != len(found):
         return None
     apart = np.abs(found - wanted)
@@ -168,7 +192,8 @@ def _told(
     cause: str,
 ) -> str:
     return (
-        f"{what} is {found:.10g} compiled and {wanted:.10g} in Python, {place_told(system, t, x, values)}. "
+        f"{what} is {found:.10g} compiled and {wanted:.10g} in Python, "
+        f"{system.variables.described(t, x, values)}. "
         f"Likely: {cause}."
     )
 
@@ -202,9 +227,8 @@ def rounding_band(
         traced = True
     except Exception:
         traced = False
-        moved = (
-            evaluate(system, function, *(_shake(each, rng) for each in (t, x, values))) for _ in range(SHAKES)
-        )
+        points = ([_shake(each, rng) for each in (t, x, values)] for _ in range(SHAKES))
+        moved = (evaluate(system.variables, function, *point) for point in points)
         shaken = [sample for sample in moved if sample is not None]
     spread = np.ptp(np.array(shaken), axis=0) if shaken else np.inf
     # Differences of large terms inside a function whose operations cannot be seen.

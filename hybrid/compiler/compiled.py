@@ -19,15 +19,15 @@ from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIAT
 from hybrid.compiler.surfaces import is_paired
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types.codes import NARROW, NO_MODE, RUNGE_KUTTA
-from hybrid.system.functions import CONDITION, Role
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.functions import CONDITION, ModelFunction
+from hybrid.system.graph import HybridSystem, as_system, functions_of
 from hybrid.system.periodicity import period_fault
 
 if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
 
 # The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
-ROLE_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
+FUNCTION_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
 GRADIENT = 3
 UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
 # Parameter vectors to remember.
@@ -37,7 +37,7 @@ UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
 
 @attrs.frozen(eq=False, repr=False)
 class CompiledSystem:
-    """A system's roles as machine code and its graph as index arrays; one for all parameter values.
+    """A system's functions as machine code and its graph as index arrays; one for all parameter values.
 
     Attributes
     ----------
@@ -84,22 +84,24 @@ class CompiledSystem:
             return "guard sampled on each step: its crossings are not proved"
         return "guard bounded on each step, its crossings are proved"
 
-    def value(self, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    def value(
+        self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+    ) -> np.ndarray:
         """A compiled function of the mode or transition of that index, ``(rows,)``; nan if it fails."""
-        out = np.full(role.rows, np.nan)
-        offset = len(self.system.transitions) if role.name == CONDITION else 0
-        self._call("vector_role", ROLE_NUMBERS[role.name], index + offset, t, x, parameters, out)
+        out = np.full(function.rows, np.nan)
+        offset = len(self.system.transitions) if function.kind == CONDITION else 0
+        self._call("vector_function", FUNCTION_NUMBERS[function.kind], index + offset, t, x, parameters, out)
         return out
 
     def derivative(
-        self, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+        self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
     ) -> np.ndarray:
         """Its derivative ``(rows, n + 1)``, that in time last."""
-        out = np.full((role.rows, self.system.dimension + 1), np.nan)
-        if role.size is None:
-            self._call("vector_role", GRADIENT, index, t, x, parameters, out[0])
+        out = np.full((function.rows, self.system.dimension + 1), np.nan)
+        if function.size is None:
+            self._call("vector_function", GRADIENT, index, t, x, parameters, out[0])
         else:
-            self._call("matrix_role", ROLE_NUMBERS[role.name], index, t, x, parameters, out)
+            self._call("matrix_function", FUNCTION_NUMBERS[function.kind], index, t, x, parameters, out)
         return out
 
     def _call(
@@ -128,10 +130,10 @@ class CompiledSystem:
         """
         if part not in self.parts:
             # What imports LLVM waits until a model is compiled.
-            from hybrid.compiler.llvm.functions import functions_of
+            from hybrid.compiler.llvm.functions import compiled_part
 
             with announced(f"hybrid: compiling {self.system.name or 'the model'} ..."):
-                self.parts[part] = functions_of(self.emitted, part, self._own)
+                self.parts[part] = compiled_part(self.emitted, part, self._own)
         found: dict[str, Any] = self.parts[part]
         return found
 
@@ -168,12 +170,10 @@ class CompiledSystem:
 
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model at parameter values."""
-        from hybrid.system.graph import period_at
-
         values = self.system.parameter_values(parameters)
         # Runs may share a model.
         values.flags.writeable = False
-        period = period_at(self.system, values) or 0.0
+        period = self.system.period_at(values) or 0.0
         if parameters and not self.emitted.proved_period:
             self._check_period(values, period)
         changes: dict[str, Any] = {"parameters": values, "period": period}
@@ -186,7 +186,9 @@ class CompiledSystem:
         key = values.tobytes()
         if key in self.periodic_at:
             return
-        fault = period_fault(self.system, values, period)
+        fault = period_fault(
+            self.system.variables, [function for _, function in functions_of(self.system)], values, period
+        )
         if fault is not None:
             raise ArgumentError(fault)
         if len(self.periodic_at) >= REMEMBERED:

@@ -1,9 +1,9 @@
-"""The Python source of a system's compiled roles.
+"""The source of the functions that are compiled for a system.
 
-Each role is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
+Each function is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
 fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
-columns, time last. The variational flow is the one role that reads all of ``x (n (1 + k),)``: the state and
-``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
+columns, time last. The variational flow is the one function that reads all of ``x (n (1 + k),)``: the state
+and ``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
 """
 
 from __future__ import annotations
@@ -28,18 +28,26 @@ from hybrid.compiler.taylor.loops import padded
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import WIDE
 from hybrid.symbolic.continuity import jumps_of, may_jump
+from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.expressions import JUMPING, ONE, ZERO, Select
 from hybrid.symbolic.nodes import forget, mentions, nodes_of
+from hybrid.symbolic.periodicity import is_periodic
 from hybrid.symbolic.printer import IMPORTS, assignments, unprintable
 from hybrid.symbolic.signs import simplified
 from hybrid.symbolic.tracing import Symbols, TraceError, model_symbols, trace
 from hybrid.system.checks import derivative_has_time_column
-from hybrid.system.derivatives import complex_step_error, symbolic_jacobian
-from hybrid.system.functions import Role, condition_role, field_role, guard_role, reset_role
-from hybrid.system.periodicity import is_periodic
+from hybrid.system.derivatives import complex_step_error
+from hybrid.system.functions import (
+    ModelFunction,
+    condition_function,
+    field_function,
+    guard_function,
+    reset_function,
+)
 
 if TYPE_CHECKING:
-    from hybrid.system.graph import HybridSystem, Transition
+    from hybrid.system.elements import Transition
+    from hybrid.system.graph import HybridSystem
 
 # A cell of a matrix in the statements for a derivative.
 _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
@@ -51,7 +59,7 @@ _INDEXED = re.compile(r"\b[xp]\[\d+\]")
 
 
 def emit(system: HybridSystem) -> Emitted:
-    """Trace and differentiate every function of a system, and write the source of its roles.
+    """Trace and differentiate every function of a system, and write the source of what is compiled.
 
     Raises
     ------
@@ -67,8 +75,8 @@ def emit(system: HybridSystem) -> Emitted:
 
 def _emitted(system: HybridSystem) -> Emitted:
     writer = _Writer(system)
-    fields = [writer.write(field_role(system, mode)) for mode in system.modes]
-    guards = [writer.write(guard_role(transition)) for transition in system.transitions]
+    fields = [writer.write(field_function(mode, system.dimension)) for mode in system.modes]
+    guards = [writer.write(guard_function(transition)) for transition in system.transitions]
     conditions = [_written_condition(writer, transition) for transition in system.transitions]
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
     boundaries = [_boundaries(system, mode.name, guards, writer.symbols) for mode in system.modes]
@@ -178,27 +186,27 @@ class _Writer:
         self.symbols: Symbols = model_symbols(system.dimension, len(system.parameters))
         self.opaque: dict[str, OpaqueFunction] = {}
 
-    def write(self, role: Role) -> _Written:
-        targets = ["out[0]"] if role.size is None else [f"out[{i}]" for i in range(role.size)]
+    def write(self, function: ModelFunction) -> _Written:
+        targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
         try:
-            expressions = self.traced(role.function)
-            jacobian = symbolic_jacobian(expressions, self.symbols.variables)
+            expressions = self.traced(function.value)
+            jacobian = jacobian_of(expressions, self.symbols.variables)
             _check_printable(entry for row in jacobian for entry in row)
         except ModelError as error:
-            return self._write_opaque(role, targets, error)
-        if role.derivative is None:
-            derivative = assignments(self._cells(role), [entry for row in jacobian for entry in row])
+            return self._write_opaque(function, targets, error)
+        if function.derivative is None:
+            derivative = assignments(self._cells(function), [entry for row in jacobian for entry in row])
         else:
-            derivative = self._given_derivative(role, role.derivative)
-        given = role.derivative is not None
+            derivative = self._given_derivative(function, function.derivative)
+        given = function.derivative is not None
         return _Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
-    def condition(self, role: Role) -> _Written:
+    def condition(self, function: ModelFunction) -> _Written:
         """Statements for the condition of a guard; a truth value becomes 1 or 0."""
         try:
-            [value] = self.traced(role.function)
+            [value] = self.traced(function.value)
         except ModelError as reason:
-            return _Written(self._opaque_value(role, ["out[0]"], reason), [])
+            return _Written(self._opaque_value(function, ["out[0]"], reason), [])
         statements = assignments(["out[0]"], [Select(value, ONE, ZERO) if value.is_Boolean else value])
         return _Written(statements, [], [value])
 
@@ -216,61 +224,66 @@ class _Writer:
         _check_printable(expressions)
         return expressions
 
-    def _write_opaque(self, role: Role, targets: Sequence[str], reason: ModelError) -> _Written:
-        value = self._opaque_value(role, targets, reason)
-        if role.derivative is not None:
-            return _Written(value, self._given_derivative(role, role.derivative))
-        error = complex_step_error(self.system, role)
+    def _write_opaque(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> _Written:
+        value = self._opaque_value(function, targets, reason)
+        if function.derivative is not None:
+            return _Written(value, self._given_derivative(function, function.derivative))
+        error = complex_step_error(self.system.variables, function)
         if error is not None:
             raise ModelError(
-                f"{role.title} cannot be differentiated. Tracing stopped: {reason}. The complex step "
+                f"{function.title} cannot be differentiated. Tracing stopped: {reason}. The complex step "
                 f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, "
-                f"np.maximum) or give its derivative as {role.derivative_name}=."
+                f"np.maximum) or give its derivative as {function.derivative_name}=."
             ) from (reason.__cause__ or error)
-        return _Written(value, self._complex_step(role, reason))
+        return _Written(value, self._complex_step(function, reason))
 
-    def _opaque_value(self, role: Role, targets: Sequence[str], reason: ModelError) -> list[str]:
-        shape = () if role.size is None else (role.size,)
-        name = self._opaque_name(role.title, role.function, reason, shape)
+    def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
+        shape = () if function.size is None else (function.size,)
+        name = self._opaque_name(function.title, function.value, reason, shape)
         return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
 
-    def _complex_step(self, role: Role, reason: ModelError) -> list[str]:
-        shape = () if role.size is None else (role.size,)
-        name, columns = self._opaque_name(role.title, role.function, reason, shape), self.system.dimension + 1
+    def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
+        shape = () if function.size is None else (function.size,)
+        name, columns = (
+            self._opaque_name(function.title, function.value, reason, shape),
+            self.system.dimension + 1,
+        )
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
         lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
-        cells = iter(self._cells(role))
-        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(role.rows) for j in range(columns)]
+        cells = iter(self._cells(function))
+        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(function.rows) for j in range(columns)]
         return lines
 
-    def _given_derivative(self, role: Role, derivative: Callable[..., Any]) -> list[str]:
-        n, cells = self.system.dimension, self._cells(role)
+    def _given_derivative(self, function: ModelFunction, derivative: Callable[..., Any]) -> list[str]:
+        n, cells = self.system.dimension, self._cells(function)
         try:
             entries = self.traced(derivative)
         except ModelError as reason:
-            return self._opaque_derivative(role, derivative, reason)
-        width = len(entries) // role.rows
+            return self._opaque_derivative(function, derivative, reason)
+        width = len(entries) // function.rows
         zeros = [ZERO] * (n + 1 - width)
-        rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(role.rows)]
+        rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(function.rows)]
         return assignments(cells, [entry for row in rows for entry in row])
 
-    def _opaque_derivative(self, role: Role, derivative: Callable[..., Any], reason: ModelError) -> list[str]:
+    def _opaque_derivative(
+        self, function: ModelFunction, derivative: Callable[..., Any], reason: ModelError
+    ) -> list[str]:
         n = self.system.dimension
-        width = n + 1 if derivative_has_time_column(self.system, role) else n
-        shape = (width,) if role.size is None else (role.size, width)
-        name = self._opaque_name(role.derivative_title, derivative, reason, shape)
-        cells = iter(self._cells(role))
+        width = n + 1 if derivative_has_time_column(self.system.variables, function) else n
+        shape = (width,) if function.size is None else (function.size, width)
+        name = self._opaque_name(function.derivative_title, derivative, reason, shape)
+        cells = iter(self._cells(function))
         lines = [f"r = {name}(t, x, p)"]
-        for i in range(role.rows):
+        for i in range(function.rows):
             entries = [*(f"r[{i * width + j}]" for j in range(width)), *["0.0"] * (n + 1 - width)]
             lines += [f"{next(cells)} = {entry}" for entry in entries]
         return lines
 
-    def _cells(self, role: Role) -> list[str]:
+    def _cells(self, function: ModelFunction) -> list[str]:
         columns = range(self.system.dimension + 1)
-        if role.size is None:
+        if function.size is None:
             return [f"out[{j}]" for j in columns]
-        return [f"out[{i}, {j}]" for i in range(role.size) for j in columns]
+        return [f"out[{i}, {j}]" for i in range(function.size) for j in columns]
 
     def _opaque_name(
         self, title: str, function: Callable[..., Any], reason: ModelError, shape: tuple[int, ...]
@@ -292,8 +305,8 @@ def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
 
 
 def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Written:
-    role = reset_role(system, system.transitions[index])
-    return writer.identity() if role is None else writer.write(role)
+    function = reset_function(system.transitions[index], system.dimension)
+    return writer.identity() if function is None else writer.write(function)
 
 
 def _boundaries(
@@ -324,9 +337,9 @@ def _where_it_jumps(
 ) -> str:
     """Where the field of a mode jumps in the state, in words; empty if it is proved to jump nowhere."""
     if field.expressions is None:
-        role = field_role(system, system.modes[index])
-        differentiable = role.derivative is None or complex_step_error(system, role) is None
-        return "it branches" if may_jump(role.function, differentiable) else ""
+        function = field_function(system.modes[index], system.dimension)
+        differentiable = function.derivative is None or complex_step_error(system.variables, function) is None
+        return "it branches" if may_jump(function.value, differentiable) else ""
     known = known_positive(boundaries)
     places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
     names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
@@ -366,12 +379,12 @@ def _ends_mode(transition: Transition) -> bool:
 
 
 def _written_condition(writer: _Writer, transition: Transition) -> _Written:
-    role = condition_role(transition)
-    return _Written([], [], []) if role is None else writer.condition(role)
+    function = condition_function(transition)
+    return _Written([], [], []) if function is None else writer.condition(function)
 
 
 def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
-    """Source of a role with one branch per index; an empty one is left out."""
+    """Source of a function with one branch per index; an empty one is left out."""
     order = "order, " if name.endswith("series") else ""
     lines = [f"def {name}(index, t, x, p, {order}out):"]
     for index, statements in enumerate(branches):

@@ -12,8 +12,8 @@ import json
 from typing import Any
 
 from hybrid.symbolic.values import TraceError, values_of
-from hybrid.system.functions import Role, roles
-from hybrid.system.graph import HybridSystem
+from hybrid.system.functions import ModelFunction
+from hybrid.system.graph import HybridSystem, functions_of
 
 
 class Operations:
@@ -45,7 +45,7 @@ def operations_of(system: HybridSystem) -> str | None:
     None if they cannot be listed: a function fails, or asks for more than the results of operations.
     """
     try:
-        functions = [_listed(system, role) for role in roles(system)]
+        functions = [_listed(system, function) for _, function in functions_of(system)]
         period = _listed_period(system)
     except Exception:
         return None
@@ -65,21 +65,21 @@ def operations_of(system: HybridSystem) -> str | None:
     return json.dumps([system.state, [*system.parameters], [*system.mode_names], graph, functions, period])
 
 
-def _listed(system: HybridSystem, role: Role) -> list[Any]:
-    """Owner and name of a role, and for its function and its derivative the operations and the results."""
+def _listed(system: HybridSystem, function: ModelFunction) -> list[Any]:
+    """Owner and kind of a function; for it and for its derivative the operations and the results."""
     names = tuple(system.parameters)
     lists: list[Any] = []
-    for function in (role.function, role.derivative):
-        if function is None:
+    for called in (function.value, function.derivative):
+        if called is None:
             lists.append(None)
             continue
         operations = Operations()
         t = operations.listed("t")
         x = [operations.listed("x", i) for i in range(system.dimension)]
         p = [operations.listed("p", i) for i in range(len(names))]
-        values = values_of(function, system.state, names, operations, (t, x, p))
+        values = values_of(called, system.state, names, operations, (t, x, p))
         lists.append([[*operations.places], values])
-    return [role.owner, role.name, *lists]
+    return [function.owner, function.kind, *lists]
 
 
 def _listed_period(system: HybridSystem) -> Any:

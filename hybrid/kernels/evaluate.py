@@ -1,4 +1,4 @@
-"""The compiled roles of a model, called from Python."""
+"""The compiled functions of a model, called from Python."""
 
 from numba import float64, int64, njit, void
 
@@ -6,22 +6,22 @@ from hybrid.kernels.types.layout import ENTRY, MATRIX, MODEL, VECTOR
 
 
 @njit(void(MODEL, int64, int64, float64, VECTOR, VECTOR), **ENTRY)
-def vector_role(model, role, index, t, x, out):
-    """Value of a field (role 0), guard (1) or reset (2), or the gradient of a guard (3), into ``out``."""
-    if role == 0:
+def vector_function(model, function, index, t, x, out):
+    """Value of a field (function 0), guard (1) or reset (2), or the gradient of a guard (3), into ``out``."""
+    if function == 0:
         model.flow(index, t, x, model.parameters, out)
-    elif role == 1:
+    elif function == 1:
         model.guard(index, t, x, model.parameters, out)
-    elif role == 2:
+    elif function == 2:
         model.reset(index, t, x, model.parameters, out)
     else:
         model.guard_gradient(index, t, x, model.parameters, out)
 
 
 @njit(void(MODEL, int64, int64, float64, VECTOR, MATRIX), **ENTRY)
-def matrix_role(model, role, index, t, x, out):
-    """Jacobian ``(n, n + 1)`` of a field (role 0) or a reset (2) into ``out``."""
-    if role == 0:
+def matrix_function(model, function, index, t, x, out):
+    """Jacobian ``(n, n + 1)`` of a field (function 0) or a reset (2) into ``out``."""
+    if function == 0:
         model.flow_jacobian(index, t, x, model.parameters, out)
     else:
         model.reset_jacobian(index, t, x, model.parameters, out)

@@ -15,6 +15,7 @@ from hybrid.kernels.types import codes
 from hybrid.orbits.factors import fundamental_factors
 from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
 from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
@@ -167,7 +168,7 @@ def periodic_orbit(
     as_system("system", system)
     periods = arguments.count("periods", periods, 1)
     max_iterations = arguments.count("max_iterations", max_iterations, 0)
-    guess = arguments.state("x0", x0, system)
+    guess = system.variables.state_values("x0", x0)
     t0 = arguments.number("t0", t0)
     tolerance = arguments.positive("tolerance", tolerance)
     method = DOP853(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
@@ -265,7 +266,7 @@ class _Shooting:
             trajectory.field(),
             np.ptp(states, axis=0),
             np.abs(states).max(axis=0),
-            trajectory.status(code),
+            status_of(trajectory, code),
         )
 
     def _trajectory(self, point: _Point, mode: str | None) -> Trajectory:

@@ -14,12 +14,14 @@ from hybrid.compiler.cache.loader import address, entry, load_kernels
 from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.memory import empty_record
 from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
 from hybrid.solvers import RungeKutta
 from hybrid.status import Status
-from hybrid.system.graph import Guard, HybridSystem, Transition, as_system
+from hybrid.system.elements import Guard, Transition
+from hybrid.system.graph import HybridSystem, as_system
 
 POINTS_AT_ONCE = 500
 # A surface that is not met within this many steps is taken to be missed for good.
@@ -123,7 +125,7 @@ def stroboscopic_section(
         x=states,
         mode=np.array(system.mode_names)[index],
         jumps=np.diff(count, prepend=before),
-        status=trajectory.status(code),
+        status=status_of(trajectory, code),
     )
 
 
@@ -259,10 +261,12 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
         bar.update(int(marked.sum()))
         record.used[:] = 0
         if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):
-            status = trajectory.status(code)
+            status = status_of(trajectory, code)
             break
     t, x, index, count = (np.concatenate(column)[: transient + points] for column in zip(*rows, strict=True))
     steps = np.diff(count, prepend=0)
     keep = slice(transient, None)
     names = np.array(trajectory.system.mode_names)
-    return Section(t[keep], x[keep], names[index[keep]], steps[keep], status or trajectory.status(codes.DONE))
+    return Section(
+        t[keep], x[keep], names[index[keep]], steps[keep], status or status_of(trajectory, codes.DONE)
+    )

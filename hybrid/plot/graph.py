@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.plot.style import axes_for, colour_of
-from hybrid.system.graph import END, HybridSystem, Transition, as_system
+from hybrid.system.elements import END, Transition
+from hybrid.system.graph import HybridSystem, as_system
 
 if TYPE_CHECKING:
     import networkx as nx

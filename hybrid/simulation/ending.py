@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import attrs
 
 from hybrid.kernels.types import codes
+from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import (
     Status,
     StatusCode,
@@ -16,9 +16,6 @@ from hybrid.status import (
     run_status,
     stuck_status,
 )
-
-if TYPE_CHECKING:
-    from hybrid.simulation.trajectory import Trajectory
 
 
 def status_of(trajectory: Trajectory, code: int) -> Status:

@@ -9,7 +9,8 @@ import numpy as np
 from hybrid.compiler.cache.loader import entry, load_kernels
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
-from hybrid.system.graph import HybridSystem, Transition
+from hybrid.system.elements import Transition
+from hybrid.system.graph import HybridSystem
 
 
 def choose_mode(

@@ -16,7 +16,8 @@ from hybrid.simulation.memory import workspace
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import kernel_method
 from hybrid.solvers import Tsit5
-from hybrid.system.graph import HybridSystem, Transition
+from hybrid.system.elements import Transition
+from hybrid.system.graph import HybridSystem
 
 
 def saltation_matrix(
@@ -63,7 +64,7 @@ def saltation_matrix(
     """
     compiled = compile_system(system)
     index = system.transition_index(transition)
-    state = arguments.state("x", x, system)
+    state = system.variables.state_values("x", x)
     model = compiled.model(parameters)
     t = arguments.number("t", t)
     check_time("t", t, model.period)

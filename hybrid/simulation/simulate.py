@@ -13,6 +13,7 @@ from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.kernels.types import codes
 from hybrid.simulation.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.memory import empty_record, record_layout
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
@@ -158,7 +159,7 @@ class _Recorder:
             mode,
             jumps,
             tuple(self.grazings),
-            trajectory.status(code),
+            status_of(trajectory, code),
             trajectory.tangent_matrix if trajectory.tangents else None,
             trajectory.plan.propagators.copy(),
             count[codes.STEPS],

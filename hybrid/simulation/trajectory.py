@@ -12,14 +12,12 @@ from hybrid import arguments
 from hybrid.compiler.cache.loader import entry, load_kernels
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.kernels.types import codes
-from hybrid.simulation.ending import status_of
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
 from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import RungeKutta
-from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
 UNLIMITED = np.iinfo(np.int64).max
@@ -43,7 +41,7 @@ def start(
     name of the argument that ``t0`` comes from, ``stop`` who may end the run early.
     """
     compiled = compile_system(system)
-    state = arguments.state("x0", x0, system)
+    state = system.variables.state_values("x0", x0)
     t0 = arguments.number(time, t0)
     solver = check_solver(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
@@ -201,7 +199,3 @@ class Trajectory:
     def no_record(self) -> Any:
         """A record that keeps nothing."""
         return empty_record(self.model.dimension, self.plan.degree)
-
-    def status(self, code: int) -> Status:
-        """Status of the run after ``advance`` returned ``code``."""
-        return status_of(self, code)

@@ -9,12 +9,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import sympy
-from sympy.core.parameters import global_parameters
+from sympy.core.parameters import distribute, global_parameters
 
-from hybrid.symbolic.expressions import ONE, ZERO, Select, product
+from hybrid.symbolic.expressions import ONE, ZERO, Select, close_gates, product
 from hybrid.symbolic.nodes import interned, once
 
 Partials = dict[sympy.Symbol, sympy.Expr]
+
+
+def jacobian_of(
+    expressions: Iterable[sympy.Expr], variables: Iterable[sympy.Symbol]
+) -> list[list[sympy.Expr]]:
+    """Rows of the derivatives of ``expressions`` with respect to ``variables`` (states, then time).
+
+    At a kink ``np.maximum`` and ``np.minimum`` take half of either slope, ``np.abs`` none; piecewise
+    constant functions have slope zero.
+    """
+    with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
+        rows = partial_derivatives(expressions, list(variables))
+        return [[close_gates(entry) for entry in row] for row in rows]
 
 
 def partial_derivatives(

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import inspect
 import numbers
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import check_derivative, evaluate, sample_points
-from hybrid.system.functions import CONDITION, Role, roles
-from hybrid.system.variables import parameter_view, state_values
-
-if TYPE_CHECKING:
-    from hybrid.system.graph import HybridSystem
+from hybrid.system.functions import CONDITION, ModelFunction
+from hybrid.system.periodicity import Period, period_at, period_fault
+from hybrid.system.variables import Variables
 
 SAMPLE_TIME = np.float64(0.7548776662466927)
 # Multiples of an irrational number modulo 1 keep the components apart, clear of kinks and symmetries.
 SAMPLE_STRIDE = 0.6180339887498949
 
 
-def probe_system(system: HybridSystem) -> None:
+def check_functions(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
     """Call every model function at a few generic points and check what comes back.
 
     Arithmetic trouble there (a logarithm of a negative number, a division by zero) is no error: the
@@ -35,83 +33,79 @@ def probe_system(system: HybridSystem) -> None:
         If a function has the wrong arity, asks for a name that does not exist, fails, is not pure, or returns
         the wrong number or kind of values; or if a given derivative or the period is wrong.
     """
-    for role in roles(system):
-        _probe_role(system, role)
-    if callable(system.period):
-        _probe_period(system)
-    _check_period(system)
+    for function in functions:
+        _check_function(variables, function)
+    if callable(period):
+        _check_period_function(variables, period)
+    _check_period(variables, functions, period)
 
 
-def sample_state(system: HybridSystem) -> np.ndarray:
+def sample_state(variables: Variables) -> np.ndarray:
     """The fixed point ``(n,)`` of the probe, in (1/2, 3/2)."""
-    fractions: np.ndarray = np.mod(SAMPLE_STRIDE * np.arange(1, system.dimension + 1), 1.0)
+    fractions: np.ndarray = np.mod(SAMPLE_STRIDE * np.arange(1, variables.dimension + 1), 1.0)
     return 0.5 + fractions
 
 
-def derivative_has_time_column(system: HybridSystem, role: Role) -> bool:
+def derivative_has_time_column(variables: Variables, function: ModelFunction) -> bool:
     """Whether a given derivative returns ``n + 1`` columns; no, if it cannot be told at the sample point."""
-    assert role.derivative is not None
-    value = _call(role.derivative_title, role.derivative, _arguments(system))
+    assert function.derivative is not None
+    value = _call(function.derivative_title, function.derivative, _arguments(variables))
     if value is None:
         return False
-    return int(np.asarray(value[0]).size) == role.rows * (system.dimension + 1)
+    return int(np.asarray(value[0]).size) == function.rows * (variables.dimension + 1)
 
 
-def _arguments(system: HybridSystem) -> tuple[Any, ...]:
-    p = parameter_view(system, system.parameter_values())
-    return SAMPLE_TIME, state_values(system, sample_state(system)), p
+def _arguments(variables: Variables) -> tuple[Any, ...]:
+    p = variables.parameter_view(variables.defaults)
+    return SAMPLE_TIME, variables.state_view(sample_state(variables)), p
 
 
-def _probe_role(system: HybridSystem, role: Role) -> None:
-    arguments = _arguments(system)
-    value = _call(role.title, role.function, arguments)
+def _check_function(variables: Variables, function: ModelFunction) -> None:
+    arguments = _arguments(variables)
+    value = _call(function.title, function.value, arguments)
     if value is not None:
-        _check_value(system, role, value[0])
-        _check_pure(system, role)
-    if role.derivative is not None:
-        _probe_derivative(system, role, arguments)
+        _check_value(variables, function, value[0])
+        _check_pure(variables, function)
+    if function.derivative is not None:
+        _check_derivative(variables, function, arguments)
 
 
-def _check_pure(system: HybridSystem, role: Role) -> None:
+def _check_pure(variables: Variables, function: ModelFunction) -> None:
     """The same arguments must give the same values, however often and in whatever order they come."""
-    values, points = system.parameter_values(), [*sample_points(system.dimension)]
-    passes = [[evaluate(system, role.function, t, x, values) for t, x in points] for _ in range(2)]
+    values, points = variables.defaults, [*sample_points(variables.dimension)]
+    passes = [[evaluate(variables, function.value, t, x, values) for t, x in points] for _ in range(2)]
     for (t, x), first, second in zip(points, *passes, strict=True):
         if first is not None and second is not None and not np.array_equal(first, second):
             raise ModelError(
-                f"{role.title} returned {first.tolist()} and, called again with the same arguments "
+                f"{function.title} returned {first.tolist()} and, called again with the same arguments "
                 f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
                 "random numbers, no counters, nothing kept between calls."
             )
 
 
-def _probe_derivative(system: HybridSystem, role: Role, arguments: tuple[Any, ...]) -> None:
-    assert role.derivative is not None
-    value = _call(role.derivative_title, role.derivative, arguments)
+def _check_derivative(variables: Variables, function: ModelFunction, arguments: tuple[Any, ...]) -> None:
+    assert function.derivative is not None
+    value = _call(function.derivative_title, function.derivative, arguments)
     if value is not None:
-        _check_derivative_shape(system, role, value[0])
-        check_derivative(system, role)
+        _check_derivative_shape(variables, function, value[0])
+        check_derivative(variables, function)
 
 
-def _probe_period(system: HybridSystem) -> None:
+def _check_period_function(variables: Variables, period: Callable[..., Any]) -> None:
     title = "HybridSystem: period"
-    assert callable(system.period)
-    value = _call(title, system.period, (parameter_view(system, system.parameter_values()),), "p")
+    value = _call(title, period, (variables.parameter_view(variables.defaults),), "p")
     if value is not None and not _is_number(value[0]):
         raise ModelError(f"{title} must return a number; got {value[0]!r}.")
 
 
-def _check_period(system: HybridSystem) -> None:
+def _check_period(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
     """A declared period must be one at the declared parameters."""
-    from hybrid.system.graph import period_at
-    from hybrid.system.periodicity import period_fault
-
-    values = system.parameter_values()
+    values = variables.defaults
     try:
-        period = period_at(system, values)
-    except (ArithmeticError, ValueError):  # told by the run at these parameters
+        declared = period_at(period, variables, values)
+    except (ArithmeticError, ValueError):  # the run reports it at these parameters
         return
-    fault = None if period is None else period_fault(system, values, period)
+    fault = None if declared is None else period_fault(variables, functions, values, declared)
     if fault is not None:
         raise ModelError(fault)
 
@@ -154,32 +148,32 @@ def _check_arity(
         raise ModelError(f"{title} must take ({signature}); got a function of {expected}: {error}.") from None
 
 
-def _check_value(system: HybridSystem, role: Role, value: Any) -> None:
-    if role.size is None:
-        if role.name == CONDITION:
+def _check_value(variables: Variables, function: ModelFunction, value: Any) -> None:
+    if function.size is None:
+        if function.kind == CONDITION:
             if not _is_number(value):
                 raise ModelError(
-                    f"{role.title} must return one number, positive where the guard may fire, or a truth "
+                    f"{function.title} must return one number, positive where the guard may fire, or a truth "
                     f"value; got {value!r}."
                 )
             return
         # A truth value has no side to cross from and no slope to cross with.
         if isinstance(value, bool | np.bool_) or not _is_number(value):
-            raise ModelError(f"{role.title} must return one number that changes sign; got {value!r}.")
+            raise ModelError(f"{function.title} must return one number that changes sign; got {value!r}.")
         return
-    values = _as_sequence(role.title, value, f"one value per state ({_names(system)})")
-    if len(values) != role.size:
-        what = "time derivative" if role.name == "field" else "value"
+    values = _as_sequence(function.title, value, f"one value per state ({_names(variables)})")
+    if len(values) != function.size:
+        what = "time derivative" if function.kind == "field" else "value"
         raise ModelError(
-            f"{role.title} returned {len(values)} values; the state has {role.size} "
-            f"({_names(system)}). Return one {what} per state."
+            f"{function.title} returned {len(values)} values; the state has {function.size} "
+            f"({_names(variables)}). Return one {what} per state."
         )
-    _check_numbers(role.title, values)
+    _check_numbers(function.title, values)
 
 
-def _check_derivative_shape(system: HybridSystem, role: Role, value: Any) -> None:
-    n, title = system.dimension, role.derivative_title
-    if role.size is None:
+def _check_derivative_shape(variables: Variables, function: ModelFunction, value: Any) -> None:
+    n, title = variables.dimension, function.derivative_title
+    if function.size is None:
         rows = [_as_sequence(title, value, f"{n} or {n + 1} values")]
     else:
         rows = [
@@ -187,13 +181,13 @@ def _check_derivative_shape(system: HybridSystem, role: Role, value: Any) -> Non
             for row in _as_sequence(title, value, f"{n} rows")
         ]
     widths = sorted({len(row) for row in rows})
-    if len(rows) != role.rows or len(widths) != 1 or widths[0] not in (n, n + 1):
-        wanted = f"{n} or {n + 1} values" if role.size is None else f"{n} rows of {n} or {n + 1} values"
+    if len(rows) != function.rows or len(widths) != 1 or widths[0] not in (n, n + 1):
+        wanted = f"{n} or {n + 1} values" if function.size is None else f"{n} rows of {n} or {n + 1} values"
         shape = " or ".join(map(str, widths))
-        got = f"{shape} values" if role.size is None else f"{len(rows)} rows of {shape} values"
+        got = f"{shape} values" if function.size is None else f"{len(rows)} rows of {shape} values"
         raise ModelError(
             f"{title} returned {got}; it must return {wanted}: "
-            f"one column per state ({_names(system)}), and D_t last if there is one more."
+            f"one column per state ({_names(variables)}), and D_t last if there is one more."
         )
     for row in rows:
         _check_numbers(title, row)
@@ -218,5 +212,5 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, numbers.Real | np.bool_)
 
 
-def _names(system: HybridSystem) -> str:
-    return ", ".join(system.state_names)
+def _names(variables: Variables) -> str:
+    return ", ".join(variables.state_names)

@@ -1,4 +1,4 @@
-"""Derivatives of model functions: symbolic ones of traced functions, and numerical ones to check against.
+"""Numerical derivatives of model functions, to check others against.
 
 Every derivative has ``n + 1`` columns, one per state and the one for time last.
 """
@@ -6,45 +6,22 @@ Every derivative has ``n + 1`` columns, one per state and the one for time last.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import attrs
 import numpy as np
 
 from hybrid.errors import ModelError
-from hybrid.system.functions import Role
-from hybrid.system.variables import parameter_view, state_values
-
-if TYPE_CHECKING:
-    import sympy
-
-    from hybrid.system.graph import HybridSystem
+from hybrid.system.functions import ModelFunction
+from hybrid.system.variables import Variables
 
 COMPLEX_STEP = 1e-30
 # A central difference carried twice, so that its own convergence gives its error.
 DIFFERENCE_STEP = 2.0**-16
 
 
-def symbolic_jacobian(
-    expressions: Iterable[sympy.Expr], variables: Iterable[sympy.Symbol]
-) -> list[list[sympy.Expr]]:
-    """Rows of the derivatives of ``expressions`` with respect to ``variables`` (states, then time).
-
-    At a kink ``np.maximum`` and ``np.minimum`` pass half of either slope, ``np.abs`` none; piecewise
-    constant functions have slope zero.
-    """
-    from sympy.core.parameters import distribute
-
-    from hybrid.symbolic.derivatives import partial_derivatives
-    from hybrid.symbolic.expressions import close_gates
-
-    with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
-        rows = partial_derivatives(expressions, list(variables))
-        return [[close_gates(entry) for entry in row] for row in rows]
-
-
-def check_derivative(system: HybridSystem, role: Role) -> None:
+def check_derivative(variables: Variables, function: ModelFunction) -> None:
     """Compare the derivative a user gives with the complex step of the function, at default parameters.
 
     The complex step is believed where central differences confirm it (``np.abs`` of a complex number,
@@ -56,31 +33,31 @@ def check_derivative(system: HybridSystem, role: Role) -> None:
     ModelError
         If an entry is wrong, or if the column for time is missing and the function depends on time.
     """
-    values = system.parameter_values()
-    for t, x in sample_points(system.dimension):
-        reference = reference_derivative(system, role, t, x, values)
-        given = evaluate(system, role.derivative, t, x, values)
+    values = variables.defaults
+    for t, x in sample_points(variables.dimension):
+        reference = reference_derivative(variables, function, t, x, values)
+        given = evaluate(variables, function.derivative, t, x, values)
         if reference is None or given is None:
             continue
-        fault = derivative_fault(system, role, given.reshape(role.rows, -1), reference)
+        fault = derivative_fault(variables, function, given.reshape(function.rows, -1), reference)
         if fault is not None:
             raise ModelError(fault)
 
 
-def complex_step_error(system: HybridSystem, role: Role) -> Exception | None:
+def complex_step_error(variables: Variables, function: ModelFunction) -> Exception | None:
     """Why the complex step cannot be taken through a function, or None if it can.
 
     It must run on complex numbers, and agree with central differences.
     """
-    values = system.parameter_values()
-    for t, x in sample_points(system.dimension):
+    values = variables.defaults
+    for t, x in sample_points(variables.dimension):
         try:
-            found = complex_step(system, role, t, x, values)
+            found = complex_step(variables, function, t, x, values)
         except ArithmeticError:
             continue
         except Exception as error:
             return error
-        reference = _central_difference(system, role, t, x, values)
+        reference = _central_difference(variables, function, t, x, values)
         if reference is not None and not reference.confirms(found):
             return ModelError("it runs on complex numbers, but is not differentiable there")
     return None
@@ -119,17 +96,17 @@ class Reference:
 
 
 def reference_derivative(
-    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+    variables: Variables, function: ModelFunction, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> Reference | None:
     """Complex step where central differences confirm it, else those; None where the function is not finite.
 
     ``parameters`` is the vector ``(m,)`` of their values.
     """
-    difference = _central_difference(system, role, t, x, parameters)
+    difference = _central_difference(variables, function, t, x, parameters)
     if difference is None:
         return None
     try:
-        values = complex_step(system, role, t, x, parameters)
+        values = complex_step(variables, function, t, x, parameters)
     except Exception:  # whatever stops it, the central difference stands in
         return difference
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
@@ -141,7 +118,7 @@ def reference_derivative(
 
 
 def evaluate(
-    system: HybridSystem,
+    variables: Variables,
     function: Callable[..., Any] | None,
     t: float,
     x: np.ndarray,
@@ -149,49 +126,51 @@ def evaluate(
 ) -> Any:
     """Values of a model function as a flat array, or None where they do not exist or are not finite."""
     assert function is not None
-    p = parameter_view(system, parameters)
+    p = variables.parameter_view(parameters)
     try:
         with np.errstate(all="ignore"):
-            values = np.ravel(np.asarray(function(np.float64(t), state_values(system, x), p), dtype=float))
+            values = np.ravel(np.asarray(function(np.float64(t), variables.state_view(x), p), dtype=float))
     except Exception:  # whatever stops it there, it has no value there
         return None
     return values if np.all(np.isfinite(values)) else None
 
 
-def derivative_fault(system: HybridSystem, role: Role, given: np.ndarray, reference: Reference) -> str | None:
+def derivative_fault(
+    variables: Variables, function: ModelFunction, given: np.ndarray, reference: Reference
+) -> str | None:
     """What is wrong with a derivative ``(rows, n)`` or ``(rows, n + 1)``, in words; None if nothing is."""
-    n = system.dimension
+    n = variables.dimension
     missing_time = given.shape[1] == n
-    full = np.column_stack([given, np.zeros(role.rows)]) if missing_time else given
+    full = np.column_stack([given, np.zeros(function.rows)]) if missing_time else given
     wrong = np.abs(full - reference.values) > reference.tolerance
     if not np.any(wrong):
         return None
     # Look at the states first: a wrong entry there tells more than a missing column.
     j, i = (int(k) for k in np.argwhere(wrong.T)[0])
     place = f"t = {reference.t:.6g}, x = ({', '.join(f'{value:.6g}' for value in reference.x)})"
-    row = "" if role.size is None else f" of {system.state_names[i]}"
+    row = "" if function.size is None else f" of {variables.state_names[i]}"
     expected = f"{reference.values[i, j]:.10g}"
     if missing_time and j == n:
         return (
-            f"{role.derivative_title} has {n} columns, but the {role.name} depends on t: D_t{row} is "
+            f"{function.derivative_title} has {n} columns, but the {function.kind} depends on t: D_t{row} is "
             f"{expected} at {place}. Return {n + 1} columns with D_t last."
         )
-    column = (*system.state_names, "t")[j]
+    column = (*variables.state_names, "t")[j]
     return (
-        f"{role.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
-        f"{reference.source} of the {role.name} gives {expected}. Fix it, or leave it out: "
+        f"{function.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
+        f"{reference.source} of the {function.kind} gives {expected}. Fix it, or leave it out: "
         "the library derives it."
     )
 
 
 def _central_difference(
-    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+    variables: Variables, function: ModelFunction, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> Reference | None:
-    here = evaluate(system, role.function, t, x, parameters)
+    here = evaluate(variables, function.value, t, x, parameters)
     if here is None:
         return None
-    coarse = _differences(system, role, t, x, parameters, here, DIFFERENCE_STEP)
-    fine = _differences(system, role, t, x, parameters, here, DIFFERENCE_STEP / 2)
+    coarse = _differences(variables, function, t, x, parameters, here, DIFFERENCE_STEP)
+    fine = _differences(variables, function, t, x, parameters, here, DIFFERENCE_STEP / 2)
     if coarse is None or fine is None:
         return None
     (central, bend), (half_central, half_bend) = coarse, fine
@@ -205,8 +184,8 @@ def _central_difference(
 
 
 def _differences(
-    system: HybridSystem,
-    role: Role,
+    variables: Variables,
+    function: ModelFunction,
     t: float,
     x: np.ndarray,
     parameters: np.ndarray,
@@ -216,8 +195,8 @@ def _differences(
     """Central differences, and how much the slopes ahead and behind differ."""
     central, bend = [], []
     for shift in h * np.eye(len(x) + 1):
-        ahead = evaluate(system, role.function, t + shift[-1], x + shift[:-1], parameters)
-        behind = evaluate(system, role.function, t - shift[-1], x - shift[:-1], parameters)
+        ahead = evaluate(variables, function.value, t + shift[-1], x + shift[:-1], parameters)
+        behind = evaluate(variables, function.value, t - shift[-1], x - shift[:-1], parameters)
         if ahead is None or behind is None:
             return None
         central.append((ahead - behind) / (2.0 * h))
@@ -234,18 +213,20 @@ class _ComplexState(np.ndarray):
 
 
 def complex_step(
-    system: HybridSystem, role: Role, t: float, x: np.ndarray, parameters: np.ndarray
+    variables: Variables, function: ModelFunction, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
     """Derivative ``(rows, n + 1)`` of a model function by the complex step, in plain Python."""
-    p = parameter_view(system, parameters)
+    p = variables.parameter_view(parameters)
     columns = []
     for shift in COMPLEX_STEP * np.eye(len(x) + 1):
         z = x + 1j * shift[:-1]
         z.flags.writeable = False
-        state = z.view(_ComplexState) if isinstance(system.state, int) else state_values(system, z.tolist())
+        state = (
+            z.view(_ComplexState) if isinstance(variables.state, int) else variables.state_view(z.tolist())
+        )
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             # Storing a complex number in a real array drops the derivative, with a mere warning.
             warnings.simplefilter("error", np.exceptions.ComplexWarning)
-            values = np.asarray(role.function(complex(t, shift[-1]), state, p), dtype=complex)
+            values = np.asarray(function.value(complex(t, shift[-1]), state, p), dtype=complex)
         columns.append(np.ravel(values).imag / COMPLEX_STEP)
     return np.column_stack(columns)

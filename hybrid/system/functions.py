@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import attrs
 
-if TYPE_CHECKING:
-    from hybrid.system.graph import HybridSystem, Mode, Transition
-
+from hybrid.system.elements import Mode, Transition
 
 CONDITION = "when"
 
 
 @attrs.frozen
-class Role:
+class ModelFunction:
     """One model function: a field, a guard, the condition of a guard, or a reset.
 
     Parameters
     ----------
     owner
         Whose it is, as an error text begins: ``"Mode 'flight'"``.
-    name, derivative_name
+    kind, derivative_name
         What the function and its derivative are called: ``"field"`` and ``"jacobian"``.
-    function, derivative
+    value, derivative
         The user's functions of ``(t, x, p)``; ``derivative`` is None where it is to be derived. A condition
         has none.
     size
@@ -32,8 +30,8 @@ class Role:
     """
 
     owner: str
-    name: str
-    function: Callable[..., Any]
+    kind: str
+    value: Callable[..., Any]
     derivative_name: str
     derivative: Callable[..., Any] | None
     size: int | None
@@ -46,7 +44,7 @@ class Role:
     @property
     def title(self) -> str:
         """How an error text about the function begins."""
-        return f"{self.owner}: {self.name}"
+        return f"{self.owner}: {self.kind}"
 
     @property
     def derivative_title(self) -> str:
@@ -54,47 +52,45 @@ class Role:
         return f"{self.owner}: {self.derivative_name}"
 
 
-def field_role(system: HybridSystem, mode: Mode) -> Role:
+def field_function(mode: Mode, dimension: int) -> ModelFunction:
     """The field of a mode."""
-    return Role(f"Mode {mode.name!r}", "field", mode.field, "jacobian", mode.jacobian, system.dimension)
+    return ModelFunction(f"Mode {mode.name!r}", "field", mode.field, "jacobian", mode.jacobian, dimension)
 
 
-def guard_role(transition: Transition) -> Role:
+def guard_function(transition: Transition) -> ModelFunction:
     """The guard of a transition."""
     guard = transition.guard
-    return Role(f"Transition {transition.name!r}", "guard", guard.function, "gradient", guard.gradient, None)
+    owner = f"Transition {transition.name!r}"
+    return ModelFunction(owner, "guard", guard.function, "gradient", guard.gradient, None)
 
 
-def condition_role(transition: Transition) -> Role | None:
+def condition_function(transition: Transition) -> ModelFunction | None:
     """The condition of a guard, None if it has none."""
     if transition.guard.when is None:
         return None
-    return Role(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
+    return ModelFunction(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
 
 
-def reset_role(system: HybridSystem, transition: Transition) -> Role | None:
+def reset_function(transition: Transition, dimension: int) -> ModelFunction | None:
     """The reset of a transition, None if that is the identity."""
     reset = transition.reset
     if reset is None:
         return None
     owner = f"Transition {transition.name!r}"
-    return Role(owner, "reset", reset.function, "jacobian", reset.jacobian, system.dimension)
+    return ModelFunction(owner, "reset", reset.function, "jacobian", reset.jacobian, dimension)
 
 
-def indexed_roles(system: HybridSystem) -> Iterator[tuple[int, Role]]:
+def functions_in(
+    modes: Sequence[Mode], transitions: Sequence[Transition], dimension: int
+) -> Iterator[tuple[int, ModelFunction]]:
     """Every model function with the index of its mode or transition, fields first."""
-    for index, mode in enumerate(system.modes):
-        yield index, field_role(system, mode)
-    for index, transition in enumerate(system.transitions):
-        yield index, guard_role(transition)
-        condition = condition_role(transition)
+    for index, mode in enumerate(modes):
+        yield index, field_function(mode, dimension)
+    for index, transition in enumerate(transitions):
+        yield index, guard_function(transition)
+        condition = condition_function(transition)
         if condition is not None:
             yield index, condition
-        reset = reset_role(system, transition)
+        reset = reset_function(transition, dimension)
         if reset is not None:
             yield index, reset
-
-
-def roles(system: HybridSystem) -> Iterator[Role]:
-    """Every model function of a system, fields first."""
-    return (role for _, role in indexed_roles(system))

@@ -2,244 +2,24 @@
 
 from __future__ import annotations
 
-import keyword
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.errors import ArgumentError, ModelError, unknown_name
-from hybrid.system.checks import probe_system
+from hybrid.errors import ModelError, unknown_name
+from hybrid.system.checks import check_functions
+from hybrid.system.elements import END, Mode, Transition
+from hybrid.system.functions import ModelFunction, functions_in
+from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
-from hybrid.system.variables import named_values
+from hybrid.system.variables import Variables, as_parameters, as_state
 
 if TYPE_CHECKING:
     import networkx as nx
-
-ModelFunction = Callable[..., Any]
-# Node of the graph that stands for the end of a run.
-END = "(end)"
-
-
-def _callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    if not callable(value):
-        raise ModelError(
-            f"{type(instance).__name__}: {attribute.name} must be a function of (t, x, p); got {value!r}."
-        )
-
-
-def _optional_callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    if value is not None:
-        _callable(instance, attribute, value)
-
-
-def _optional_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    if value is not None:
-        _nonempty_name(instance, attribute, value)
-
-
-def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    if not isinstance(value, str) or not value:
-        raise ModelError(
-            f"{type(instance).__name__}: {attribute.name} must be a non-empty string; got {value!r}."
-        )
-
-
-def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
-
-
-@attrs.frozen
-class Guard(Portable):
-    """A scalar function ``g(t, x, p)``; its transition fires when it crosses zero in its direction.
-
-    Parameters
-    ----------
-    function
-        ``g(t, x, p)``, one scalar.
-    direction
-        -1 fires from positive to negative, +1 from negative to positive, 0 both ways.
-    gradient
-        Optional ``(D_x g, D_t g)`` as a function of ``(t, x, p)`` that returns ``n + 1`` values, or
-        ``n`` if the guard does not depend on time. Derived from ``function`` when left out.
-    when
-        Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if it is positive
-        (or true) there, and is passed as if there were no guard if not. It is asked at crossings and at the
-        entry of the mode only, and need not be continuous.
-    at_start
-        True for a guard whose crossings are not looked for: its transition fires only where a run starts in
-        the mode, beyond the guard by more than rounding. ``direction`` says which side that is.
-
-    Raises
-    ------
-    ModelError
-        If a given function is not callable, ``direction`` is none of -1, 0, +1, or ``at_start`` is no bool or
-        comes without a direction.
-    """
-
-    function: ModelFunction = attrs.field(validator=_callable)
-    direction: int = attrs.field(default=0)
-    gradient: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
-    when: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
-    at_start: bool = attrs.field(default=False, kw_only=True)
-
-    @at_start.validator
-    def _check_at_start(self, attribute: attrs.Attribute[bool], value: object) -> None:
-        if not isinstance(value, bool):
-            raise ModelError(f"Guard: at_start must be True or False; got {value!r}.")
-        if value and self.direction == 0:
-            raise ModelError(
-                "Guard: at_start=True needs direction -1 or +1, the side that the mode excludes."
-            )
-
-    @direction.validator
-    def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not whole or value not in (-1, 0, 1):
-            raise ModelError(
-                f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {value!r}."
-            )
-
-
-@attrs.frozen
-class Reset(Portable):
-    """The map ``R(t, x, p)`` applied at the crossing; it returns one value per state.
-
-    Parameters
-    ----------
-    function
-        ``R(t, x, p)``, ``n`` values.
-    jacobian
-        Optional ``(t, x, p)`` function that returns the rows of ``D_x R``, each of ``n`` values, or of
-        ``n + 1`` with ``D_t R`` last. Derived from ``function`` when left out.
-
-    Raises
-    ------
-    ModelError
-        If a given function is not callable.
-    """
-
-    function: ModelFunction = attrs.field(validator=_callable)
-    jacobian: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
-
-
-@attrs.frozen
-class Mode(Portable):
-    """A smooth vector field ``f(t, x, p)``: a node of the graph.
-
-    Parameters
-    ----------
-    name
-        How transitions refer to it.
-    field
-        ``f(t, x, p)``, one value per state: the time derivative of the state.
-    jacobian
-        Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, each of ``n`` values, or of
-        ``n + 1`` with ``D_t f`` last. Derived from ``field`` when left out.
-
-    Raises
-    ------
-    ModelError
-        If the name is empty or a given function is not callable.
-    """
-
-    name: str = attrs.field(validator=_nonempty_name)
-    field: ModelFunction = attrs.field(validator=_callable)
-    jacobian: ModelFunction | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
-
-
-def _as_guard(value: Any) -> Guard:
-    if isinstance(value, Guard):
-        return value
-    raise ModelError(
-        f"Transition: guard must be a Guard; got {value!r}. Write Guard(function, direction=...)."
-    )
-
-
-def _as_reset(value: Any) -> Reset | None:
-    if value is None or isinstance(value, Reset):
-        return value
-    raise ModelError(
-        f"Transition: reset must be a Reset or None (identity); got {value!r}. Write Reset(function)."
-    )
-
-
-@attrs.frozen
-class Transition(Portable):
-    """An edge of the graph: where it leaves from, where it leads, when it fires and what it does.
-
-    A transition from a mode to itself without a reset changes nothing and only marks the crossing: a
-    section.
-
-    Parameters
-    ----------
-    source, target
-        Names of modes; without a target (``None``) the run ends where the transition fires, with the status
-        ``TERMINAL``.
-    guard
-        When it fires.
-    reset
-        What happens to the state there; ``None`` is the identity.
-    accumulates_to
-        Mode in which the state goes on after infinitely many jumps in finite time (chatter), of this
-        transition alone or of several in turn. One of those in turn is enough to name the mode. Without it a
-        run ends at the limit.
-    name
-        Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
-
-    Raises
-    ------
-    ModelError
-        If guard or reset are of the wrong type, a name is empty, or there is a reset but no target.
-    """
-
-    source: str = attrs.field(validator=_nonempty_name)
-    target: str | None = attrs.field(validator=_optional_name)
-    guard: Guard = attrs.field(converter=_as_guard)
-    reset: Reset | None = attrs.field(default=None, converter=_as_reset)
-    accumulates_to: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
-    name: str = attrs.field(kw_only=True, validator=_nonempty_name)
-
-    @reset.validator
-    def _check_reset(self, attribute: attrs.Attribute[Reset | None], value: object) -> None:
-        if value is not None and self.target is None:
-            raise ModelError(
-                f"Transition {self.source}->{END}: nothing follows a reset where there is no target. "
-                "Leave the reset out, or name a target mode."
-            )
-
-    @accumulates_to.validator
-    def _check_limit(self, attribute: attrs.Attribute[str | None], value: object) -> None:
-        if value is not None and self.target is None:
-            raise ModelError(
-                f"Transition {self.source}->{END}: accumulates_to={value!r} is for transitions whose jumps "
-                "may accumulate, and this one ends the run. Leave it out, or name a target mode."
-            )
-
-    @name.default
-    def _default_name(self) -> str:
-        return f"{self.source}->{END if self.target is None else self.target}"
-
-    @property
-    def is_marker(self) -> bool:
-        """Whether it changes neither mode nor state, and so only marks a crossing."""
-        return self.source == self.target and self.reset is None
-
-
-def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
-    for name in names:
-        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name[0] == "_":
-            raise ModelError(
-                f"HybridSystem: {kind} name {name!r} cannot be written as an attribute. Use a Python "
-                "identifier that is no keyword and does not begin with an underscore."
-            )
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ModelError(f"HybridSystem: {kind} names must differ; given twice: {', '.join(twice)}.")
 
 
 def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
@@ -250,40 +30,14 @@ def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
     return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
 
 
-def as_state(value: Any) -> tuple[str, ...] | int:
-    """Names of the components of a state, or their number."""
-    if isinstance(value, bool | str):
-        raise ModelError(
-            f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
-            f"Write state=({value!r},) for one component."
-        )
-    if isinstance(value, int | np.integer):
-        if value < 1:
-            raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
-        return int(value)
-    # A set has no order.
-    if not isinstance(value, Sequence | np.ndarray) or np.ndim(value) != 1:
-        raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)
-    names = tuple(value)
-    if not names:
-        raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
-    _check_identifiers(names, "state")
-    return names
-
-
-def as_parameters(value: Any) -> Mapping[str, float]:
-    """Default values of parameters by name, read-only."""
-    given = arguments.mapping("HybridSystem: parameters", value)
-    _check_identifiers(tuple(given), "parameter")
-    return MappingProxyType(
-        {name: arguments.number(f"HybridSystem: parameter {name!r}", each) for name, each in given.items()}
-    )
-
-
 def _as_period(value: Any) -> Any:
     if value is None or callable(value):
         return value
     return arguments.positive("HybridSystem: period", value, "be a positive time or a function of p")
+
+
+def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
 
 
 @attrs.frozen(eq=False)
@@ -319,24 +73,30 @@ class HybridSystem(Portable):
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
-    period: float | ModelFunction | None = attrs.field(default=None, kw_only=True, converter=_as_period)
+    period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
     # What compile_system makes of the system: it lives as long as the system, and is not part of it.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
         self._check_graph()
-        probe_system(self)
+        functions = [function for _, function in functions_of(self)]
+        check_functions(self.variables, functions, self.period)
+
+    @cached_property
+    def variables(self) -> Variables:
+        """The state and the parameters, with the views of them that model functions get."""
+        return Variables(self.state, self.parameters)
 
     @property
     def dimension(self) -> int:
         """Number of state components ``n``."""
-        return self.state if isinstance(self.state, int) else len(self.state)
+        return self.variables.dimension
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the components; ``x0, x1, ...`` if only their number was given."""
-        return tuple(f"x{i}" for i in range(self.state)) if isinstance(self.state, int) else self.state
+        return self.variables.state_names
 
     @cached_property
     def mode_names(self) -> tuple[str, ...]:
@@ -383,15 +143,15 @@ class HybridSystem(Portable):
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the given overrides; ArgumentError for unknown names."""
-        values = dict(self.parameters)
-        for name, number in arguments.mapping("parameters", overrides).items():
-            arguments.known("parameters: Parameter", name, values, "Parameters")
-            values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
-        return np.array(list(values.values()), dtype=float)
+        return self.variables.parameter_values(overrides)
 
     def forcing_period(self, overrides: Mapping[str, float] | None = None) -> float | None:
         """Forcing period at the given parameters, or None if the system declares none."""
-        return None if self.period is None else period_at(self, self.parameter_values(overrides))
+        return None if self.period is None else self.period_at(self.parameter_values(overrides))
+
+    def period_at(self, values: np.ndarray) -> float | None:
+        """Forcing period at a parameter vector ``(m,)``, or None if the system declares none."""
+        return period_at(self.period, self.variables, values)
 
     def _check_graph(self) -> None:
         if not self.modes:
@@ -433,17 +193,9 @@ class HybridSystem(Portable):
             )
 
 
-def period_at(system: HybridSystem, values: np.ndarray) -> float | None:
-    """Forcing period of a system at a parameter vector ``(m,)``, or None if it declares none."""
-    value: Any = system.period
-    if value is None:
-        return None
-    if callable(value):
-        value = value(named_values("Parameters", tuple(system.parameters), values))
-    period = arguments.number("HybridSystem: period", value)
-    if period <= 0:
-        raise ArgumentError(f"HybridSystem: period must be positive; got {period}. Check the parameters.")
-    return period
+def functions_of(system: HybridSystem) -> Iterator[tuple[int, ModelFunction]]:
+    """Every model function with the index of its mode or transition, fields first."""
+    return functions_in(system.modes, system.transitions, system.dimension)
 
 
 def as_system(name: str, value: object) -> HybridSystem:

@@ -1,18 +1,20 @@
-"""States and parameters by name: ``x.q``, ``p.e``, and an answer for a name that does not exist."""
+"""States and parameters: their names and number, and the views of them that model functions get."""
 
 from __future__ import annotations
 
+import keyword
 from collections import namedtuple
-from collections.abc import Iterable
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property, lru_cache
+from math import isfinite
+from types import MappingProxyType
+from typing import Any
 
+import attrs
 import numpy as np
 
-from hybrid.errors import ModelError, unknown_name
-
-if TYPE_CHECKING:
-    from hybrid.system.graph import HybridSystem
+from hybrid import arguments
+from hybrid.errors import ArgumentError, ModelError, unknown_name
 
 STATE = "State components"
 PARAMETERS = "Parameters"
@@ -60,15 +62,146 @@ def named_values(kind: str, names: tuple[str, ...], values: Iterable[Any]) -> An
     return _explaining_class(kind, names)._make(values)
 
 
-def state_values(system: HybridSystem, values: Any) -> Any:
-    """The state as model functions see it: by name, or read-only if the system only has a dimension."""
-    if not isinstance(system.state, int):
-        return named_values(STATE, system.state, values)
-    view = np.asarray(values).view()
-    view.flags.writeable = False
-    return view
+@attrs.frozen(eq=False)
+class Variables:
+    """The state and the parameters of a system.
+
+    Attributes
+    ----------
+    state
+        Names of the components, or their number.
+    parameters
+        Default values by name.
+    """
+
+    state: tuple[str, ...] | int
+    parameters: Mapping[str, float]
+
+    @property
+    def dimension(self) -> int:
+        """Number of state components ``n``."""
+        return self.state if isinstance(self.state, int) else len(self.state)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the components; ``x0, x1, ...`` if only their number was given."""
+        return tuple(f"x{i}" for i in range(self.state)) if isinstance(self.state, int) else self.state
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of their values."""
+        return tuple(self.parameters)
+
+    @cached_property
+    def defaults(self) -> np.ndarray:
+        """Default parameter vector ``(m,)``, read-only."""
+        values = np.array(list(self.parameters.values()), dtype=float)
+        values.flags.writeable = False
+        return values
+
+    def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
+        """Parameter vector ``(m,)`` with the given overrides; ArgumentError for unknown names."""
+        values = dict(self.parameters)
+        for name, number in arguments.mapping("parameters", overrides).items():
+            arguments.known("parameters: Parameter", name, values, "Parameters")
+            values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
+        return np.array(list(values.values()), dtype=float)
+
+    def state_values(self, name: str, value: object) -> np.ndarray:
+        """A finite state ``(n,)`` from the argument of that name: numbers in order, or by name.
+
+        Raises
+        ------
+        ArgumentError
+            If it has another shape, a component is missing or unknown, or one is not finite.
+        """
+        names = self.state_names
+        if isinstance(value, Mapping):
+            for component in value:
+                arguments.known(f"{name}: State component", component, names, "State components")
+            missing = [component for component in names if component not in value]
+            if missing:
+                raise ArgumentError(
+                    f"{name} lacks {', '.join(missing)}. The state is {', '.join(names)}; give each a number."
+                )
+            value = [value[component] for component in names]
+        found = arguments.floats(value)
+        if found is None:
+            raise ArgumentError(
+                f"{name} must hold {self.dimension} numbers; got {arguments.shown(value)}. "
+                f"The state is {', '.join(names)}."
+            )
+        if found.shape != (self.dimension,):
+            raise ArgumentError(
+                f"{name} has shape {found.shape}; the state needs shape ({self.dimension},): "
+                f"{', '.join(names)}."
+            )
+        values = found.tolist()
+        if not all(map(isfinite, values)):
+            pairs = zip(names, values, strict=True)
+            component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
+            raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
+        return found
+
+    def state_view(self, values: Any) -> Any:
+        """The state as model functions get it: by name, or a read-only array if it has no names."""
+        if not isinstance(self.state, int):
+            return named_values(STATE, self.state, values)
+        view = np.asarray(values).view()
+        view.flags.writeable = False
+        return view
+
+    def parameter_view(self, values: Iterable[Any]) -> Any:
+        """The parameters as model functions get them, by name."""
+        return named_values(PARAMETERS, self.parameter_names, values)
+
+    def described(self, t: float, x: np.ndarray, values: np.ndarray) -> str:
+        """A point in words, with the parameters that differ from their defaults."""
+        changed = "".join(
+            f", {name} = {value:.10g}"
+            for (name, declared), value in zip(self.parameters.items(), values, strict=True)
+            if value != declared
+        )
+        return f"at t = {t:.6g}, x = ({', '.join(f'{value:.6g}' for value in x)}){changed}"
 
 
-def parameter_view(system: HybridSystem, values: Iterable[Any]) -> Any:
-    """The parameters as model functions see them, by name."""
-    return named_values(PARAMETERS, tuple(system.parameters), values)
+def as_state(value: Any) -> tuple[str, ...] | int:
+    """Names of the components of a state, or their number."""
+    if isinstance(value, bool | str):
+        raise ModelError(
+            f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
+            f"Write state=({value!r},) for one component."
+        )
+    if isinstance(value, int | np.integer):
+        if value < 1:
+            raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
+        return int(value)
+    # A set has no order.
+    if not isinstance(value, Sequence | np.ndarray) or np.ndim(value) != 1:
+        raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)
+    names = tuple(value)
+    if not names:
+        raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
+    _check_identifiers(names, "state")
+    return names
+
+
+def as_parameters(value: Any) -> Mapping[str, float]:
+    """Default values of parameters by name, read-only."""
+    given = arguments.mapping("HybridSystem: parameters", value)
+    _check_identifiers(tuple(given), "parameter")
+    return MappingProxyType(
+        {name: arguments.number(f"HybridSystem: parameter {name!r}", each) for name, each in given.items()}
+    )
+
+
+def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
+    for name in names:
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name[0] == "_":
+            raise ModelError(
+                f"HybridSystem: {kind} name {name!r} cannot be written as an attribute. Use a Python "
+                "identifier that is no keyword and does not begin with an underscore."
+            )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ModelError(f"HybridSystem: {kind} names must differ; given twice: {', '.join(twice)}.")

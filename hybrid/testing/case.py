@@ -20,8 +20,9 @@ from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RungeKutta
 from hybrid.status import StatusCode
 from hybrid.system.derivatives import evaluate
-from hybrid.system.functions import Role
-from hybrid.system.graph import HybridSystem, Transition
+from hybrid.system.elements import Transition
+from hybrid.system.functions import ModelFunction
+from hybrid.system.graph import HybridSystem
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
 # The same run with tolerances this much looser tells how far its end can be trusted.
@@ -62,22 +63,28 @@ class Engine:
         return saltation_matrix(system, transition, t, x, parameters=parameters)
 
     def derivative(
-        self, system: HybridSystem, role: Role, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+        self,
+        system: HybridSystem,
+        function: ModelFunction,
+        index: int,
+        t: float,
+        x: np.ndarray,
+        parameters: np.ndarray,
     ) -> np.ndarray:
         """The derivative ``(rows, n + 1)`` that runs use of the field of a mode, a guard or a reset."""
-        return compile_system(system).derivative(role, index, t, x, parameters)
+        return compile_system(system).derivative(function, index, t, x, parameters)
 
     def value(
         self,
         compiled: CompiledSystem,
-        role: Role,
+        function: ModelFunction,
         index: int,
         t: float,
         x: np.ndarray,
         parameters: np.ndarray,
     ) -> np.ndarray:
         """The values ``(rows,)`` that runs use of a field, a guard, its condition or a reset."""
-        return compiled_value(compiled, role, index, t, x, parameters)
+        return compiled_value(compiled, function, index, t, x, parameters)
 
 
 LIBRARY = Engine()
@@ -175,16 +182,16 @@ class Case:
 
     def evaluate(self, function: Any, t: float, x: Any) -> np.ndarray:
         """A model function in plain Python, as a flat array; discards the example where it is not finite."""
-        values = evaluate(self.system, function, t, np.asarray(x, dtype=float), self.values)
+        values = evaluate(self.system.variables, function, t, np.asarray(x, dtype=float), self.values)
         if values is None:
             discard("a model function is not finite")
         return np.asarray(values)
 
-    def slope(self, role: Role, owner: str, t: float, x: np.ndarray) -> np.ndarray:
+    def slope(self, function: ModelFunction, owner: str, t: float, x: np.ndarray) -> np.ndarray:
         """The derivative ``(rows, n + 1)`` that runs use of a function of the mode or transition named."""
         system = self.system
-        index = system.mode_index(owner) if role.name == "field" else system.transition_index(owner)
-        slope = self.engine.derivative(system, role, index, t, x, self.values)
+        index = system.mode_index(owner) if function.kind == "field" else system.transition_index(owner)
+        slope = self.engine.derivative(system, function, index, t, x, self.values)
         if not np.all(np.isfinite(slope)):
             discard("a derivative is not finite at the event")
         return slope
@@ -311,7 +318,9 @@ def guard_beyond(case: Case, transition: Transition, t: float, x: Any) -> float:
     direction = transition.guard.direction
     if direction == 0 or transition.is_marker:
         return -np.inf
-    values = evaluate(case.system, transition.guard.function, t, np.asarray(x, dtype=float), case.values)
+    values = evaluate(
+        case.system.variables, transition.guard.function, t, np.asarray(x, dtype=float), case.values
+    )
     return np.nan if values is None else float(direction * values[0])
 
 

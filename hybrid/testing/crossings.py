@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.system.graph import Transition
+from hybrid.system.elements import Transition
 from hybrid.testing.case import Case, as_case, discard, stretches
 
 CROSSINGS = "Each change of sign of a guard in its direction fires once"

@@ -6,7 +6,8 @@ import numpy as np
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.system.derivatives import derivative_fault, evaluate, reference_derivative
-from hybrid.system.functions import CONDITION, indexed_roles
+from hybrid.system.functions import CONDITION
+from hybrid.system.graph import functions_of
 from hybrid.testing.case import Case, as_case, discard
 
 DERIVATIVES = "Given, traced and numerical derivatives agree"
@@ -26,21 +27,21 @@ def check_derivatives(case: Case) -> None:
     as_case(case)
     compile_system(case.system)
     x, seen = np.array(case.x0), 0
-    for index, role in indexed_roles(case.system):
-        if role.name == CONDITION:
+    for index, function in functions_of(case.system):
+        if function.kind == CONDITION:
             continue
-        reference = reference_derivative(case.system, role, case.t0, x, case.values)
+        reference = reference_derivative(case.system.variables, function, case.t0, x, case.values)
         if reference is None:
             continue
         seen += 1
-        used = case.engine.derivative(case.system, role, index, case.t0, x, case.values)
+        used = case.engine.derivative(case.system, function, index, case.t0, x, case.values)
         found = {"the library's derivative": np.where(np.isfinite(used), used, np.inf)}
-        if role.derivative is not None:
-            given = evaluate(case.system, role.derivative, case.t0, x, case.values)
+        if function.derivative is not None:
+            given = evaluate(case.system.variables, function.derivative, case.t0, x, case.values)
             if given is not None:
-                found = {"the derivative given": given.reshape(role.rows, -1), **found}
+                found = {"the derivative given": given.reshape(function.rows, -1), **found}
         for whose, matrix in found.items():
-            fault = derivative_fault(case.system, role, matrix, reference)
+            fault = derivative_fault(case.system.variables, function, matrix, reference)
             if fault is not None:
                 case.fail(
                     DERIVATIVES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.simulation.arc import Jump
-from hybrid.system.functions import guard_role
+from hybrid.system.functions import guard_function
 from hybrid.testing.case import Case, as_case, discard, guard_beyond, mode_after, stretches
 from hybrid.testing.saltation import event_told
 
@@ -35,7 +35,7 @@ def check_jumps(case: Case) -> None:
         if jump.source != mode:
             case.fail(JUMPS, told, f"the mode was {mode!r}", hint="events that fire out of turn.")
         mode = mode_after(jump)
-        slope = case.slope(guard_role(transition), jump.transition, jump.t, jump.x_minus)
+        slope = case.slope(guard_function(transition), jump.transition, jump.t, jump.x_minus)
         value = float(case.evaluate(transition.guard.function, jump.t, jump.x_minus)[0])
         band = np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1] * jump.t)
         # What the guard passes in the time to which that of an event can be known.
@@ -104,7 +104,7 @@ def check_sides(case: Case) -> None:
                 beyond = guard_beyond(case, transition, t, x)
                 if not beyond > 0.0:
                     continue
-                slope = case.slope(guard_role(transition), transition.name, t, x)
+                slope = case.slope(guard_function(transition), transition.name, t, x)
                 if not beyond > 1e-7 * float(np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1]) * length):
                     continue
                 side = "above" if transition.guard.direction > 0 else "below"

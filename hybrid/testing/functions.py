@@ -6,7 +6,7 @@ import numpy as np
 
 from hybrid.compiler.agreement import disagreement
 from hybrid.compiler.compiled import compile_system
-from hybrid.system.functions import indexed_roles
+from hybrid.system.graph import functions_of
 from hybrid.system.periodicity import period_fault_at
 from hybrid.testing.case import Case, as_case, discard
 
@@ -25,9 +25,9 @@ def check_compiled(case: Case) -> None:
     as_case(case)
     compiled = compile_system(case.system)
     x = np.array(case.x0)
-    for index, role in indexed_roles(case.system):
+    for index, function in functions_of(case.system):
         value = case.engine.value
-        fault = disagreement(compiled, role, index, case.t0, x, case.values, value)
+        fault = disagreement(compiled, function, index, case.t0, x, case.values, value)
         if fault is not None:
             case.fail(
                 COMPILED,
@@ -50,8 +50,8 @@ def check_period(case: Case) -> None:
     if period is None:
         discard("no period is declared")
     phase = case.t0 % period
-    for _, role in indexed_roles(system):
-        fault = period_fault_at(system, role, phase, x, case.values, period)
+    for _, function in functions_of(system):
+        fault = period_fault_at(system.variables, function, phase, x, case.values, period)
         if fault is not None:
             case.fail(
                 PERIOD,

@@ -7,7 +7,7 @@ import numpy as np
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import Jump
-from hybrid.system.functions import field_role, guard_role, reset_role
+from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.testing.case import Case, as_case, discard, matrix_told, mode_after
 from hybrid.testing.variants import altered
 
@@ -159,9 +159,11 @@ def check_flow_direction(case: Case) -> None:
     looked_at = 0
     for jump in case.run.arc.jumps:
         transition = case.transition(jump)
-        roles = [guard_role(transition), reset_role(case.system, transition)]
+        felt = [guard_function(transition), reset_function(transition, case.system.dimension)]
         slopes = [
-            case.slope(role, jump.transition, jump.t, jump.x_minus) for role in roles if role is not None
+            case.slope(function, jump.transition, jump.t, jump.x_minus)
+            for function in felt
+            if function is not None
         ]
         if any(np.any(slope[:, -1] != 0.0) for slope in slopes):
             continue
@@ -224,10 +226,10 @@ def _divergence(case: Case) -> tuple[float, float]:
         if arc.j[i] != arc.j[i + 1] or h <= 0.0:
             continue
         mode = system.mode_index(str(arc.mode[i]))
-        role = field_role(system, system.modes[mode])
+        function = field_function(system.modes[mode], system.dimension)
         times = arc.t[i] + 0.5 * h * (1.0 + GAUSS_NODES)
         for t, x, weight in zip(times, arc(times), GAUSS_WEIGHTS, strict=True):
-            term = 0.5 * h * weight * np.trace(compiled.derivative(role, mode, t, x, parameters))
+            term = 0.5 * h * weight * np.trace(compiled.derivative(function, mode, t, x, parameters))
             total += term
             size += abs(term)
     return float(total), float(size)
@@ -344,13 +346,13 @@ def _saltation(case: Case, jump: Jump) -> np.ndarray:
 
 
 def _guard_slope(case: Case, jump: Jump) -> np.ndarray:
-    role = guard_role(case.transition(jump))
-    return case.slope(role, jump.transition, jump.t, jump.x_minus)[0, :-1]
+    function = guard_function(case.transition(jump))
+    return case.slope(function, jump.transition, jump.t, jump.x_minus)[0, :-1]
 
 
 def _field_slope(case: Case, mode: str, t: float, x: np.ndarray) -> np.ndarray:
-    role = field_role(case.system, case.system.modes[case.system.mode_index(mode)])
-    return case.slope(role, mode, t, x)[:, :-1]
+    function = field_function(case.system.modes[case.system.mode_index(mode)], case.system.dimension)
+    return case.slope(function, mode, t, x)[:, :-1]
 
 
 def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
 
 # Coefficients are hundredths, so that a failing system can be written down.
 HUNDREDTHS = 100

@@ -176,7 +176,7 @@ def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float
     times: list[float] = []
     for mode in system.modes:
         for x in rng.uniform(-2.0, 2.0, (8, system.dimension)):
-            f = evaluate(system, mode.field, 0.0, x, vector)
+            f = evaluate(system.variables, mode.field, 0.0, x, vector)
             if f is not None:
                 times += [2.0 / abs(rate) for rate in f if rate != 0.0]
     return 10.0 * float(np.median(times)) if times else 10.0

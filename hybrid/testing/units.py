@@ -9,7 +9,8 @@ from weakref import WeakKeyDictionary
 import attrs
 
 from hybrid.compiler.compiled import compile_system
-from hybrid.system.graph import Guard, HybridSystem, Reset
+from hybrid.system.elements import Guard, Reset
+from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 from hybrid.testing.case import Case, as_case, discard
 from hybrid.testing.invariance import compare

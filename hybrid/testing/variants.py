@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 
 from hybrid.compiler.compiled import compile_system
-from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, named_values
 
 AGAIN = " (copy)"

@@ -9,16 +9,9 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ModelError
-from hybrid.system.graph import (
-    Guard,
-    HybridSystem,
-    Mode,
-    ModelFunction,
-    Reset,
-    Transition,
-    as_parameters,
-    as_state,
-)
+from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
+from hybrid.system.variables import as_parameters, as_state
 
 # A start in the sliding mode that is further from the surface than this share of the state does not slide.
 # What the integration lets the state drift while it slides is far less, so that a run can be taken up again.
@@ -32,11 +25,11 @@ TOUCH = 3e-8
 def filippov(
     state: tuple[str, ...] | int,
     parameters: Mapping[str, float],
-    below: ModelFunction,
-    above: ModelFunction,
-    switching: ModelFunction,
+    below: Function,
+    above: Function,
+    switching: Function,
     *,
-    period: float | ModelFunction | None = None,
+    period: float | Function | None = None,
     name: str = "",
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
@@ -151,9 +144,9 @@ def filippov(
 
 
 def _surface(
-    below: ModelFunction,
-    above: ModelFunction,
-    switching: ModelFunction,
+    below: Function,
+    above: Function,
+    switching: Function,
     state: tuple[str, ...] | int,
     parameters: tuple[str, ...],
 ) -> _Surface:
@@ -173,14 +166,14 @@ def _surface(
 class _Surface:
     """The model functions that follow from two fields and a switching function."""
 
-    below: ModelFunction
-    above: ModelFunction
-    switching: ModelFunction
-    gradient: ModelFunction  # (D_x h, D_t h)
-    speed_below: ModelFunction  # L_b and L_a, the rates of h along the fields
-    speed_above: ModelFunction
-    turn_below: ModelFunction  # the rate of L_b along the field below, of L_a along that above
-    turn_above: ModelFunction
+    below: Function
+    above: Function
+    switching: Function
+    gradient: Function  # (D_x h, D_t h)
+    speed_below: Function  # L_b and L_a, the rates of h along the fields
+    speed_above: Function
+    turn_below: Function  # the rate of L_b along the field below, of L_a along that above
+    turn_above: Function
 
     def may_attract(self, state: tuple[str, ...] | int, parameters: tuple[str, ...]) -> bool:
         """Whether the two speeds are not proved to be the same everywhere."""
@@ -260,7 +253,7 @@ class _Surface:
 
 
 def _check_traceable(
-    functions: Iterable[tuple[str, ModelFunction, int]],
+    functions: Iterable[tuple[str, Function, int]],
     state: tuple[str, ...] | int,
     parameters: tuple[str, ...],
 ) -> None:
@@ -280,19 +273,19 @@ def _check_traceable(
 
 
 def _derived_gradient(
-    function: ModelFunction, state: tuple[str, ...] | int, parameters: tuple[str, ...]
-) -> ModelFunction:
+    function: Function, state: tuple[str, ...] | int, parameters: tuple[str, ...]
+) -> Function:
     """``(D_x, D_t)`` of a scalar function as a model function, which can be traced in turn."""
     # SymPy is slow to import, and importing the library must not wait for it.
     from sympy.core.parameters import distribute
 
+    from hybrid.symbolic.derivatives import jacobian_of
     from hybrid.symbolic.nodes import replaced
     from hybrid.symbolic.printer import IMPORTS, assignments
     from hybrid.symbolic.tracing import Traced, model_symbols, trace
-    from hybrid.system.derivatives import symbolic_jacobian
 
     symbols = model_symbols(state if isinstance(state, int) else len(state), len(parameters))
-    [row] = symbolic_jacobian(trace(function, state, parameters), symbols.variables)
+    [row] = jacobian_of(trace(function, state, parameters), symbols.variables)
     statements = assignments([f"out[{i}]" for i in range(len(row))], row)
     namespace: dict[str, Any] = {}
     exec("\n    ".join((f"{IMPORTS}\ndef gradient(t, x, p, out):", *statements)), namespace)
@@ -310,7 +303,7 @@ def _derived_gradient(
     return gradient
 
 
-def _rate(gradient: ModelFunction, field: ModelFunction) -> ModelFunction:
+def _rate(gradient: Function, field: Function) -> Function:
     """``D_t g + D_x g f``, the rate of a function along a field, as a model function."""
 
     def rate(t: Any, x: Any, p: Any) -> Any:
@@ -320,9 +313,7 @@ def _rate(gradient: ModelFunction, field: ModelFunction) -> ModelFunction:
     return rate
 
 
-def _entered(
-    source: str, target: str, switching: ModelFunction, when: ModelFunction | None = None
-) -> Transition:
+def _entered(source: str, target: str, switching: Function, when: Function | None = None) -> Transition:
     """Where a start off the surface goes that names a mode which does not belong there."""
     direction, place = (+1, "high") if target == "above" else (-1, "low")
     guard = Guard(switching, direction, at_start=True, when=when)

@@ -13,12 +13,12 @@ SIGNATURES = (VECTOR_ROLE, MATRIX_ROLE, SERIES_ROLE)
 
 def both(lines, kind=SERIES_ROLE, *, fused=False):
     """Functions of the same arguments that run a text as Python, and as machine code."""
-    head = f"def role({', '.join(kind.names)}):\n"
+    head = f"def function({', '.join(kind.names)}):\n"
     source = head + "".join(f"    {line}\n" for line in lines)
     scope = {}
     exec(IMPORTS + source, scope)
-    code = machine_code([(parsed(source)["role"], kind, fused)])
-    return scope["role"], called(load(code, ["role"])["role"])
+    code = machine_code([(parsed(source)["function"], kind, fused)])
+    return scope["function"], called(load(code, ["function"])["function"])
 
 
 def called(compiled):

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 import hybrid
 import lyapunov
 import models
+from hybrid.simulation.ending import status_of
 from tests.cases import systems
 
 ORBIT_740 = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
@@ -378,6 +379,6 @@ def test_vectors_that_only_rounding_tells_apart_are_reported():
     system = models.impact_oscillator()
     trajectory = hybrid.simulation.trajectory.start(system, (0.0, 0.0), 0.0, tangent=np.eye(2))
     trajectory.run.count[hybrid.kernels.types.codes.INDISTINCT] = 2
-    status = trajectory.status(hybrid.kernels.types.codes.DONE)
+    status = status_of(trajectory, hybrid.kernels.types.codes.DONE)
     assert status.code == hybrid.StatusCode.INDISTINCT_TANGENTS
     assert "2 times only rounding was left" in status.message

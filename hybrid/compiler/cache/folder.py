@@ -19,7 +19,6 @@ from pathlib import Path
 
 # Folder of this package.
 PACKAGE = Path(__file__).parents[2]
-_LOCK = threading.RLock()
 _SAID: set[str] = set()
 
 
@@ -116,29 +115,6 @@ def kept(path: Path) -> bytes | None:
         return path.read_bytes()
     except OSError:
         return None
-
-
-@contextmanager
-def compiled_into(folder: Path) -> Iterator[None]:
-    """Let numba keep what is decorated inside this block in ``folder``, and nothing decorated elsewhere.
-
-    Numba stamps a compiled function with the age of its own file only. Kernels call one another across
-    files, so the folder must be named after all the sources that go into them.
-    """
-    from numba import config
-
-    from hybrid.compiler.cache.checked import checked_contents
-    from hybrid.kernels.types.options import INTO_FOLDER
-
-    with _LOCK:
-        before, outside = vars(config)["CACHE_DIR"], INTO_FOLDER.set(True)
-        vars(config)["CACHE_DIR"] = str(folder)
-        try:
-            with checked_contents():
-                yield
-        finally:
-            vars(config)["CACHE_DIR"] = before
-            INTO_FOLDER.reset(outside)
 
 
 def say(message: str) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import ast
 import importlib
 import importlib.util
-from contextlib import nullcontext
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from hybrid.compiler.cache import second_process
-from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, compiled_into, source_key
+from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, source_key
 
 DRIVER = "hybrid.kernels.drive"
 # What every run needs besides: a second process compiles them meanwhile.
@@ -48,6 +50,33 @@ def load_kernels(module: str = DRIVER) -> ModuleType:
         _import_numba()
         with compiled_into(_folder(module)):
             return importlib.import_module(module)
+
+
+# Numba is told by a setting of the whole process where to keep what it compiles.
+_LOCK = threading.RLock()
+
+
+@contextmanager
+def compiled_into(folder: Path) -> Iterator[None]:
+    """Let numba keep what is decorated inside this block in ``folder``, and nothing decorated elsewhere.
+
+    Numba stamps a compiled function with the age of its own file only. Kernels call one another across
+    files, so the folder must be named after all the sources that go into them.
+    """
+    from numba import config
+
+    from hybrid.compiler.cache.checked import checked_contents
+    from hybrid.kernels.types.options import INTO_FOLDER
+
+    with _LOCK:
+        before, outside = vars(config)["CACHE_DIR"], INTO_FOLDER.set(True)
+        vars(config)["CACHE_DIR"] = str(folder)
+        try:
+            with checked_contents():
+                yield
+        finally:
+            vars(config)["CACHE_DIR"] = before
+            INTO_FOLDER.reset(outside)
 
 
 @cache

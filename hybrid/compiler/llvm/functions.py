@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.compiler.cache.folder import keep, kept, say, source_key
 from hybrid.compiler.cache.store import models_folder
-from hybrid.compiler.llvm.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, OwnFunction, parsed
+from hybrid.compiler.llvm.lowering import (
+    MATRIX_SIGNATURE,
+    SERIES_SIGNATURE,
+    VECTOR_SIGNATURE,
+    OwnFunction,
+    parsed,
+)
 from hybrid.compiler.llvm.machine import load, machine_code, processor
 from hybrid.compiler.opaque import compiled_functions
 from hybrid.compiler.parts import PARTS
@@ -22,10 +28,10 @@ if TYPE_CHECKING:
 # Texts whose machine code stays in memory after their systems are gone.
 MOST_SOURCES = 128
 SIGNATURES = {
-    "flow_jacobian": MATRIX_ROLE,
-    "reset_jacobian": MATRIX_ROLE,
-    "series": SERIES_ROLE,
-    "tangent_series": SERIES_ROLE,
+    "flow_jacobian": MATRIX_SIGNATURE,
+    "reset_jacobian": MATRIX_SIGNATURE,
+    "series": SERIES_SIGNATURE,
+    "tangent_series": SERIES_SIGNATURE,
 }
 # The products of series may be fused into their sums; in a guard that could make a difference of equal terms
 # differ from zero.
@@ -46,10 +52,10 @@ def own_functions(emitted: Emitted) -> dict[str, tuple[Any, int]]:
     return own
 
 
-def functions_of(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]]) -> dict[str, Compiled]:
+def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]]) -> dict[str, Compiled]:
     """The compiled functions of a part of ``PARTS`` by name; ``own`` are those of ``own_functions``."""
     if not own:
-        return roles_of(emitted.texts[part], part)
+        return shared_functions(emitted.texts[part], part)
     # Their addresses are of this process, so what calls them is not kept.
     calls = {name: OwnFunction(code.address, size) for name, (code, size) in own.items()}
     code = _code(emitted.texts[part], PARTS[part], calls)
@@ -57,7 +63,7 @@ def functions_of(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]]
 
 
 @lru_cache(maxsize=MOST_SOURCES)
-def roles_of(source: str, part: str) -> dict[str, Compiled]:
+def shared_functions(source: str, part: str) -> dict[str, Compiled]:
     """The compiled functions of a text that calls no function of the user's, shared by all who have it."""
     path = models_folder() / f"model_{source_key(source, processor())}.o"
     code = _checked(path)
@@ -69,8 +75,8 @@ def roles_of(source: str, part: str) -> dict[str, Compiled]:
 
 def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction]) -> bytes:
     functions = parsed(source)
-    roles = [(functions[name], SIGNATURES.get(name, VECTOR_ROLE), name in FUSED) for name in names]
-    return machine_code(roles, calls)
+    wanted = [(functions[name], SIGNATURES.get(name, VECTOR_SIGNATURE), name in FUSED) for name in names]
+    return machine_code(wanted, calls)
 
 
 def _checked(path: Path) -> bytes | None:

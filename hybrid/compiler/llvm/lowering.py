@@ -1,8 +1,8 @@
-"""Generated roles as LLVM's instructions, straight from their text.
+"""Generated functions as LLVM's instructions, straight from their text.
 
 The text is Python on numbers: assignments, sums and products, choices, loops over ranges, entries of arrays,
 and calls of ``CALLS``. A value is what its text says: a float, a whole number of 64 bits, a truth value, or
-four numbers in a register; so nothing has to be inferred, and a role is ready in milliseconds.
+four numbers in a register; so nothing has to be inferred, and a function is ready in milliseconds.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "
 
 
 class LoweringError(Exception):
-    """A text is not one of those that generated roles are made of."""
+    """A text is not one of those that generated functions are made of."""
 
 
 @attrs.frozen
@@ -67,32 +67,32 @@ NO_CALLS: Mapping[str, OwnFunction] = {}
 
 @attrs.frozen
 class Signature:
-    """Names and types of the arguments of a role; an array is told by the number of its axes."""
+    """Names and types of the arguments of a function; an array is told by the number of its axes."""
 
     names: tuple[str, ...]
     types: tuple[Any, ...]
 
 
-VECTOR_ROLE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 1))
-MATRIX_ROLE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 2))
-SERIES_ROLE = Signature(("index", "t", "x", "p", "order", "out"), (WHOLE, NUMBER, 1, 1, WHOLE, 2))
+VECTOR_SIGNATURE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 1))
+MATRIX_SIGNATURE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 2))
+SERIES_SIGNATURE = Signature(("index", "t", "x", "p", "order", "out"), (WHOLE, NUMBER, 1, 1, WHOLE, 2))
 
 
 def lower(
     module: Any,
-    role: ast.FunctionDef,
+    written: ast.FunctionDef,
     signature: Signature,
     *,
     fused: bool,
     calls: Mapping[str, OwnFunction] = NO_CALLS,
 ) -> None:
-    """Add a role to a module of LLVM's.
+    """Add a function to a module of LLVM's.
 
     Parameters
     ----------
     module
         The module, an ``llvmlite.ir.Module``.
-    role
+    written
         The function, parsed.
     signature
         Types of its arguments.
@@ -106,13 +106,13 @@ def lower(
     LoweringError
         If the function is not one that generated text has.
     """
-    names = tuple(argument.arg for argument in role.args.args)
+    names = tuple(argument.arg for argument in written.args.args)
     if names != signature.names:
-        raise LoweringError(f"{role.name} takes {names}; a role of its kind takes {signature.names}")
+        raise LoweringError(f"{written.name} takes {names}; a function of its kind takes {signature.names}")
     kinds = [ARRAYS.get(kind, kind) for kind in signature.types]
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), role.name)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), written.name)
     function.attributes.add("nounwind")
-    _Body(function, signature, ("contract",) if fused else (), calls).write(role.body)
+    _Body(function, signature, ("contract",) if fused else (), calls).write(written.body)
 
 
 class _Body:
@@ -197,7 +197,7 @@ class _Body:
         self.value(node.value)
 
     def _if(self, node: ast.If) -> None:
-        """A chain of choices, as long as it may be: roles have one branch for each mode or transition."""
+        """A chain of choices, as long as it may be: functions have one branch for each mode or transition."""
         builder, before, made = self.builder, dict(self.variables), dict(self.variables)
         end = builder.append_basic_block("end")
         rest: list[ast.stmt] = [node]

@@ -49,7 +49,7 @@ def processor() -> str:
 
 
 def machine_code(
-    roles: Sequence[tuple[ast.FunctionDef, Signature, bool]], calls: Mapping[str, OwnFunction] = NO_CALLS
+    functions: Sequence[tuple[ast.FunctionDef, Signature, bool]], calls: Mapping[str, OwnFunction] = NO_CALLS
 ) -> bytes:
     """The contents of an object file with these functions.
 
@@ -58,8 +58,8 @@ def machine_code(
     module = ir.Module("model")
     module.triple = binding.get_default_triple()
     module.data_layout = str(_target().target_data)
-    for role, signature, fused in roles:
-        lower(module, role, signature, fused=fused, calls=calls)
+    for written, signature, fused in functions:
+        lower(module, written, signature, fused=fused, calls=calls)
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
     tuning = binding.create_pipeline_tuning_options(speed_level=SPEED)

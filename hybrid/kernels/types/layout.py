@@ -47,7 +47,7 @@ SPREAD = types.FunctionType(float64(PROGRAMS, int64, float64, VECTOR, VECTOR, fl
 
 
 class Model(Structure):
-    """The roles of a compiled system, its parameters and its graph as index arrays.
+    """The functions of a compiled system, its parameters and its graph as index arrays.
 
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
     which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the

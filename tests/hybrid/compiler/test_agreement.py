@@ -21,7 +21,8 @@ from hybrid import (
 from hybrid.compiler.agreement import comparison_points, disagreement, rounding_band
 from hybrid.compiler.emit import emit
 from hybrid.system.derivatives import evaluate
-from hybrid.system.functions import condition_role, field_role, indexed_roles
+from hybrid.system.functions import condition_function, field_function
+from hybrid.system.graph import functions_of
 
 R = 7_000_000_000
 TEN, MINUS_TWO = 10, -2
@@ -113,8 +114,8 @@ class TestPurity:
         compiled = compile_system(changed)
         spring["k"] = 2.0
         t, x, values = next(comparison_points(changed))
-        [(index, role)] = indexed_roles(changed)
-        assert "a global that has changed" in disagreement(compiled, role, index, t, x, values)
+        [(index, function)] = functions_of(changed)
+        assert "a global that has changed" in disagreement(compiled, function, index, t, x, values)
 
     def test_a_write_into_the_state(self):
         def field(t, x, p):
@@ -198,9 +199,9 @@ class TestWholeNumbers:
             system(field)
         cubed = HybridSystem(state=("q", "v"), parameters={"k": 1.0, "n": 3.0}, modes=[Mode("a", field)])
         compiled = compile_system(cubed)
-        [(index, role)] = indexed_roles(cubed)
+        [(index, function)] = functions_of(cubed)
         x = np.array([-1.25, 1.0])
-        found = compiled.derivative(role, index, 0.0, x, cubed.parameter_values())
+        found = compiled.derivative(function, index, 0.0, x, cubed.parameter_values())
         np.testing.assert_allclose(found[:, 0], [-3 * 1.25**2, 3 * 1.25**2 + 2 * (-1.25) ** -3], rtol=1e-14)
 
 
@@ -254,7 +255,7 @@ class TestTheCompilersErrors:
             assert "Mode 'a': field" in refusal
             return
         x = np.array([0.3, -0.4])
-        found = compiled.value(field_role(solved, solved.modes[0]), 0, 0.0, x, np.ones(1))
+        found = compiled.value(field_function(solved.modes[0], solved.dimension), 0, 0.0, x, np.ones(1))
         np.testing.assert_allclose(found, field(0.0, x, None), rtol=1e-14)
 
     def test_select_and_piecewise_are_traced(self):
@@ -274,7 +275,7 @@ def test_rounding_is_no_difference():
 
     compiled = compile_system(system(field))
     t, x, values = next(comparison_points(compiled.system))
-    wanted = evaluate(compiled.system, field, t, x, values)
+    wanted = evaluate(compiled.system.variables, field, t, x, values)
     band = rounding_band(compiled.system, field, t, x, values, wanted)
     assert band[0] < 1e-12
     assert 1e-8 < band[1] < 1e-3
@@ -315,14 +316,14 @@ def runs_as_written(seeds):
         except ModelError:
             continue
         ran += 1
-        rng, role = np.random.default_rng(seed), condition_role(decay.transitions[0])
+        rng, function = np.random.default_rng(seed), condition_function(decay.transitions[0])
         for _ in range(40):
             x = rng.choice([-1.0, 1.0], 2) * 10.0 ** rng.uniform(-4, 6, 2)
             t, values = 10.0 ** rng.uniform(-3, 5), 10.0 ** rng.uniform(-2, 2, 1)
-            wanted = evaluate(decay, function, t, x, values)
+            wanted = evaluate(decay.variables, function, t, x, values)
             if wanted is None:
                 continue
-            found = compiled.value(role, 0, t, x, values)
+            found = compiled.value(function, 0, t, x, values)
             # nan, which no condition is true of, is no number that comes back wrong.
             band = 1e-7 * np.abs(wanted) + rounding_band(decay, function, t, x, values, wanted)
             assert np.isnan(found) or abs(found - wanted) <= band, (text, t, x, values, found, wanted)

@@ -9,21 +9,22 @@ import pytest
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.compiler.emit import emit
-from hybrid.compiler.llvm.functions import functions_of, own_functions
+from hybrid.compiler.llvm.functions import compiled_part, own_functions
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import sample_points
-from hybrid.system.functions import field_role, guard_role, reset_role
-from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.system.variables import PARAMETERS, STATE, named_values, parameter_view, state_values
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.functions import field_function, guard_function, reset_function
+from hybrid.system.graph import HybridSystem
+from hybrid.system.variables import PARAMETERS, STATE, named_values
 from tests.hybrid.text import called
 
 
 def load(emitted, *, compiled):
-    """The six roles as functions."""
+    """The six compiled functions."""
     if compiled:
         own = own_functions(emitted)
-        functions = functions_of(emitted, FIELDS, own) | functions_of(emitted, EVENTS, own)
+        functions = compiled_part(emitted, FIELDS, own) | compiled_part(emitted, EVENTS, own)
         return {name: called(function) for name, function in functions.items()}
     scope = {}
     for name, own in emitted.opaque.items():
@@ -66,9 +67,9 @@ def run(function, shape, index, t, x, p):
 
 
 def plain(system, function, t, x):
-    p = parameter_view(system, system.parameter_values())
+    p = system.variables.parameter_view(system.parameter_values())
     with np.errstate(all="ignore"):
-        return np.ravel(np.asarray(function(t, state_values(system, x), p), dtype=float))
+        return np.ravel(np.asarray(function(t, system.variables.state_view(x), p), dtype=float))
 
 
 def central_difference(system, function, t, x, h=1e-5):
@@ -174,23 +175,26 @@ def opaque_chain():
 
 @pytest.mark.parametrize("compiled", [False, True], ids=["plain", "compiled"])
 @pytest.mark.parametrize("model", [ball, hertz, chain, two_modes, opaque, opaque_chain])
-def test_every_role_agrees_with_the_model(model, compiled):
+def test_every_function_agrees_with_the_model(model, compiled):
     system = model()
     n, p = system.dimension, system.parameter_values()
     functions = load(emit(system), compiled=compiled)
-    roles = [("flow", "flow_jacobian", k, field_role(system, mode)) for k, mode in enumerate(system.modes)]
+    pairs = [
+        ("flow", "flow_jacobian", k, field_function(mode, system.dimension))
+        for k, mode in enumerate(system.modes)
+    ]
     for k, transition in enumerate(system.transitions):
-        roles.append(("guard", "guard_gradient", k, guard_role(transition)))
+        pairs.append(("guard", "guard_gradient", k, guard_function(transition)))
         if transition.reset is not None:
-            roles.append(("reset", "reset_jacobian", k, reset_role(system, transition)))
-    for value, derivative, index, role in roles:
+            pairs.append(("reset", "reset_jacobian", k, reset_function(transition, system.dimension)))
+    for value, derivative, index, function in pairs:
         for t, x in sample_points(n):
-            expected = plain(system, role.function, t, x)
-            result = run(functions[value], (role.rows,), index, t, x, p)
+            expected = plain(system, function.value, t, x)
+            result = run(functions[value], (function.rows,), index, t, x, p)
             np.testing.assert_allclose(result, expected, rtol=1e-14, atol=1e-15)
-            shape = (n + 1,) if role.size is None else (n, n + 1)
+            shape = (n + 1,) if function.size is None else (n, n + 1)
             result = run(functions[derivative], shape, index, t, x, p)
-            expected = central_difference(system, role.function, t, x).reshape(shape)
+            expected = central_difference(system, function.value, t, x).reshape(shape)
             np.testing.assert_allclose(result, expected, rtol=1e-6, atol=1e-7)
 
 

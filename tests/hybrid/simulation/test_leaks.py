@@ -8,8 +8,8 @@ import numpy as np
 import hybrid
 import lyapunov
 import models
-from hybrid.compiler.llvm.functions import roles_of
-from hybrid.simulation import trajectory
+from hybrid.compiler.llvm.functions import shared_functions
+from hybrid.simulation import memory, plan
 from hybrid.testing import variants
 
 
@@ -40,10 +40,10 @@ def test_so_do_those_that_other_calls_made():
 
 def test_tolerances_do_not_pile_up():
     system = models.bouncing_ball()
-    for rtol in np.geomspace(1e-12, 1e-3, 3 * trajectory.MOST_LAYOUTS):
+    for rtol in np.geomspace(1e-12, 1e-3, 3 * memory.MOST_LAYOUTS):
         hybrid.simulate(system, (1.0, 0.0), (0.0, 0.1), solver=hybrid.DOP853(rtol=rtol))
-    assert len(hybrid.compile_system(system).plans) <= trajectory.MOST_LAYOUTS
-    for cached in (trajectory.kernel_method, trajectory.work_layout, trajectory.record_layout, roles_of):
+    assert len(hybrid.compile_system(system).plans) <= memory.MOST_LAYOUTS
+    for cached in (plan.kernel_method, memory.work_layout, memory.record_layout, shared_functions):
         found = cached.cache_info()
         assert found.maxsize is not None
         assert found.currsize <= found.maxsize

@@ -135,11 +135,12 @@ class TestIdentities:
         (index,) = (i for i, tr in enumerate(system.transitions) if tr.name == transition)
         tr = system.transitions[index]
         matrix = saltation_matrix(system, transition, 0.0, x)
-        from hybrid.system.variables import parameter_view, state_values
 
-        p = parameter_view(system, system.parameter_values())
-        x_minus = state_values(system, x)
-        x_plus = x_minus if tr.reset is None else state_values(system, tr.reset.function(0.0, x_minus, p))
+        p = system.variables.parameter_view(system.parameter_values())
+        x_minus = system.variables.state_view(x)
+        x_plus = (
+            x_minus if tr.reset is None else system.variables.state_view(tr.reset.function(0.0, x_minus, p))
+        )
         f_minus = system.modes[system.mode_index(tr.source)].field(0.0, x_minus, p)
         f_plus = system.modes[system.mode_index(tr.target)].field(0.0, x_plus, p)
         np.testing.assert_allclose(matrix @ f_minus, f_plus, rtol=1e-12, atol=1e-12)

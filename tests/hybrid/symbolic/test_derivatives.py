@@ -7,7 +7,7 @@ import sympy
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, compile_system
 from hybrid.symbolic.derivatives import directional, partial_derivatives
 from hybrid.symbolic.expressions import Absolute, Maximum, Select, Sign
-from hybrid.system.functions import field_role, reset_role
+from hybrid.system.functions import field_function, reset_function
 
 a, b, c = sympy.symbols("a b c", real=True)
 EXPRESSIONS = [
@@ -49,7 +49,7 @@ def test_along_a_vector_it_is_the_sum_of_the_partial_ones(expression):
 
 
 def test_large_blocks_share_what_they_use_twice(monkeypatch):
-    from hybrid.symbolic.expressions import printer
+    from hybrid.symbolic import printer
 
     shared = sympy.exp(a * b) + c
     expressions = [shared**2 / (1 + shared), sympy.sin(shared) * a, 1 / shared + b / shared, shared * c**1.5]
@@ -80,7 +80,7 @@ def test_matrices_of_zeros():
         ],
     )
     compiled, x = compile_system(system), np.linspace(0.5, 1.5, n)
-    field = compiled.derivative(field_role(system, system.modes[0]), 0, 0.3, x, np.zeros(0))
+    field = compiled.derivative(field_function(system.modes[0], system.dimension), 0, 0.3, x, np.zeros(0))
     expected = -np.eye(n, n + 1)
     for i in range(0, n, 5):
         expected[i] = 0.0
@@ -88,5 +88,7 @@ def test_matrices_of_zeros():
         expected[i, 0] += x[i]
         expected[i, n] = -1.0
     np.testing.assert_allclose(field, expected, atol=1e-15)
-    reset = compiled.derivative(reset_role(system, system.transitions[0]), 0, 0.3, x, np.zeros(0))
+    reset = compiled.derivative(
+        reset_function(system.transitions[0], system.dimension), 0, 0.3, x, np.zeros(0)
+    )
     np.testing.assert_array_equal(reset, np.diag([0.5] + [1.0] * (n - 1) + [0.0])[:n])

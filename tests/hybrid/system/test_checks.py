@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from hybrid.errors import ModelError
-from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
 
 
 def system(

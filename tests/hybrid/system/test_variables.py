@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from hybrid.errors import ModelError
-from hybrid.system.graph import HybridSystem, Mode
+from hybrid.system.elements import Mode
+from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, named_values, parameter_view, plain_class, state_values
 
 

@@ -162,11 +162,11 @@ class TestSmallSystems:
     def test_crossings_are_transverse(self, system):
         """Seen from the equations alone: ``ds/dt`` at ``|y| < 2`` is above the speed of the moving level."""
         field = system.modes[0].field
-        p = hybrid.system.variables.parameter_view(system, system.parameter_values())
+        p = system.variables.parameter_view(system.parameter_values())
         for corner in np.ndindex(*(2,) * (system.dimension - 1)):
             y = [4.0 * side - 2.0 for side in corner]
             for t in np.linspace(0.0, 6.3, 20):
-                speed = field(t, hybrid.system.variables.state_values(system, (1.0, *y)), p)[0]
+                speed = field(t, system.variables.state_view((1.0, *y)), p)[0]
                 level = p.m * p.w * np.sin(p.w * t) if system.period else 0.0
                 assert speed + level > 0.05
 

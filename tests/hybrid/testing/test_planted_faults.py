@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 import hybrid
 import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.system.functions import guard_role, reset_role
+from hybrid.system.functions import guard_function, reset_function
 from hybrid.testing import (
     Engine,
     PropertyError,
@@ -109,16 +109,16 @@ class Saltation(Engine):
     def saltation_matrix(self, system, transition, t, x, parameters):
         index = system.transition_index(transition)
         edge, values = system.transitions[index], system.parameter_values(parameters)
-        guard = self.derivative(system, guard_role(edge), index, t, x, values)[0]
+        guard = self.derivative(system, guard_function(edge), index, t, x, values)[0]
         reset = np.eye(len(x), len(x) + 1)
         x_plus = x
-        p = hybrid.system.variables.parameter_view(system, values)
-        before = hybrid.system.variables.state_values(system, x)
+        p = system.variables.parameter_view(values)
+        before = system.variables.state_view(x)
         if edge.reset is not None:
-            reset = self.derivative(system, reset_role(system, edge), index, t, x, values)
+            reset = self.derivative(system, reset_function(edge, system.dimension), index, t, x, values)
             x_plus = edge.reset.function(t, before, p)
         f_minus = np.array(system.modes[system.mode_index(edge.source)].field(t, before, p), dtype=float)
-        after = hybrid.system.variables.state_values(system, x_plus)
+        after = system.variables.state_view(x_plus)
         f_plus = np.array(system.modes[system.mode_index(edge.target)].field(t, after, p), dtype=float)
         return self.formula(reset[:, :-1], reset[:, -1], guard[:-1], guard[-1], f_minus, f_plus)
 
@@ -276,9 +276,9 @@ class ValuesOff(Engine):
     def __init__(self, name):
         self.name = name
 
-    def value(self, compiled, role, index, t, x, parameters):
-        found = super().value(compiled, role, index, t, x, parameters)
-        return found + 1e-9 * (role.name == self.name and x[0] < 0)
+    def value(self, compiled, function, index, t, x, parameters):
+        found = super().value(compiled, function, index, t, x, parameters)
+        return found + 1e-9 * (function.kind == self.name and x[0] < 0)
 
 
 def test_the_formula_that_the_faults_are_made_from_is_right():

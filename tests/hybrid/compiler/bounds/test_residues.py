@@ -9,7 +9,8 @@ import hybrid
 from hybrid.compiler.bounds.residues import residue_of_guard
 from hybrid.compiler.compiled import compile_system
 from hybrid.symbolic.tracing import model_symbols, trace
-from hybrid.system.graph import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
 
 
 def block():

@@ -17,12 +17,11 @@ from hybrid.compiler.cache.folder import (
     announced,
     cache_directory,
     cache_folder,
-    compiled_into,
     keep,
     source_key,
 )
-from hybrid.compiler.cache.loader import kernels_key, load_kernels
-from hybrid.compiler.llvm.functions import roles_of
+from hybrid.compiler.cache.loader import compiled_into, kernels_key, load_kernels
+from hybrid.compiler.llvm.functions import shared_functions
 
 ROOT = Path(__file__).parents[4]
 PROGRAM = """
@@ -130,7 +129,7 @@ def new_process(monkeypatch, tmp_path):
     monkeypatch.setattr(folder, "_SAID", set())
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
-    known = (folder._usable, folder._private_folder, roles_of)
+    known = (folder._usable, folder._private_folder, shared_functions)
     for each in known:
         each.cache_clear()
     yield tmp_path
@@ -245,13 +244,13 @@ def test_what_is_damaged_is_made_again(new_process, monkeypatch, capsys, damage,
     before = {path: path.read_bytes() for path in files}
     for path in files:
         damage(path)
-    roles_of.cache_clear()
+    shared_functions.cache_clear()
     capsys.readouterr()
     assert ends_well(decay(0.7))
     said = [line for line in capsys.readouterr().err.splitlines() if "compiling" not in line]
     assert len(said) <= 1
     assert all(path.read_bytes() == before[path] for path in files)
-    roles_of.cache_clear()
+    shared_functions.cache_clear()
     assert ends_well(decay(0.7))
     assert capsys.readouterr().err == ""
 

@@ -9,7 +9,7 @@ from llvmlite import binding, ir
 
 from hybrid.compiler.llvm.builder import Builder
 from hybrid.compiler.llvm.calls import NUMBER, WHOLE
-from hybrid.compiler.llvm.lowering import MATRIX_ROLE, VECTOR_ROLE, LoweringError, parsed
+from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, VECTOR_SIGNATURE, LoweringError, parsed
 from hybrid.compiler.llvm.machine import machine_code
 from hybrid.symbolic import expressions as sym
 from hybrid.symbolic.printer import MATH_FUNCTIONS, assignments, power_text
@@ -19,11 +19,11 @@ X = np.array([0.7, -1.3, 0.0, 2.5])
 P = np.array([0.3])
 
 
-def results(lines, x=X, kind=VECTOR_ROLE, index=0, size=4):
+def results(lines, x=X, kind=VECTOR_SIGNATURE, index=0, size=4):
     """What both leave in ``out``."""
     found = []
     for run in both(lines, kind):
-        out = np.full(size if kind is VECTOR_ROLE else (size, size), 7.0)
+        out = np.full(size if kind is VECTOR_SIGNATURE else (size, size), 7.0)
         with np.errstate(all="ignore"):
             run(index, 0.25, np.array(x, dtype=float), P, out)
         found.append(out)
@@ -109,7 +109,7 @@ def test_loops_count_as_python_does():
 
 def test_matrices():
     lines = ["r = len(x) - 2", "out[r, 1] = x[0]", "out[1, r + 1] = out[r, 1]*2.0"]
-    np.testing.assert_array_equal(*results(lines, kind=MATRIX_ROLE))
+    np.testing.assert_array_equal(*results(lines, kind=MATRIX_SIGNATURE))
 
 
 @pytest.mark.parametrize("index", [0, 1, -1])
@@ -123,7 +123,7 @@ def test_branches(index):
 def test_as_many_branches_as_a_model_has_transitions():
     """A chain of choices is no nest: it may be longer than Python goes down."""
     lines = [f"{'if' if i == 0 else 'elif'} index == {i}:\n        out[0] = {i}.0" for i in range(300)]
-    _, run = both(lines, VECTOR_ROLE)
+    _, run = both(lines, VECTOR_SIGNATURE)
     for index in (0, 150, 299):
         out = np.zeros(1)
         run(index, 0.0, X, P, out)
@@ -146,16 +146,16 @@ def test_as_many_branches_as_a_model_has_transitions():
 )
 def test_other_text_is_refused(line, told):
     with pytest.raises(LoweringError) as error:
-        both([line], VECTOR_ROLE)
+        both([line], VECTOR_SIGNATURE)
     assert told in str(error.value)
 
 
 def test_a_variable_keeps_its_type():
     with pytest.raises(LoweringError, match="n is i64 in one place and double in another"):
-        both(["n = 1", "n = x[0]"], VECTOR_ROLE)
-    role = parsed("def role(a, b):\n    pass")["role"]
-    with pytest.raises(LoweringError, match=r"takes \('a', 'b'\); a role of its kind takes \('index'"):
-        machine_code([(role, VECTOR_ROLE, False)])
+        both(["n = 1", "n = x[0]"], VECTOR_SIGNATURE)
+    written = parsed("def written(a, b):\n    pass")["written"]
+    with pytest.raises(LoweringError, match=r"takes \('a', 'b'\); a function of its kind takes \('index'"):
+        machine_code([(written, VECTOR_SIGNATURE, False)])
 
 
 def grown(rng, depth):
@@ -195,7 +195,7 @@ def test_any_expression(seed):
     lines = []
     for i, each in enumerate(written):
         lines += [f"{'elif' if i else 'if'} index == {i}:", *(f"    {line}" for line in each)]
-    as_python, as_machine_code = both(lines, VECTOR_ROLE)
+    as_python, as_machine_code = both(lines, VECTOR_SIGNATURE)
     compared = 0
     for i in range(len(written)):
         expected, found = np.full(1, 7.0), np.full(1, 7.0)

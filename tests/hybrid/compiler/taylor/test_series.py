@@ -56,7 +56,7 @@ FUNCTIONS = {
 
 
 def series_of(system, x, *, t=0.0, mode=0, tangents=0, vectors=None, parameters=()):
-    """The role ``series`` of a system: of the state and what follows it, and of each tangent vector.
+    """The function ``series`` of a system: of the state and what follows it, and of each tangent vector.
 
     Matrices ``(ORDER + 1, columns)``, and ``(ORDER + 1, n)`` a vector.
     """

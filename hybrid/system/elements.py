@@ -1,0 +1,217 @@
+"""What a graph is made of: guards, resets, modes and transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.errors import ModelError
+from hybrid.system.portable import Portable
+
+Function = Callable[..., Any]
+# Node of the graph that stands for the end of a run.
+END = "(end)"
+
+
+def _callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if not callable(value):
+        raise ModelError(
+            f"{type(instance).__name__}: {attribute.name} must be a function of (t, x, p); got {value!r}."
+        )
+
+
+def _optional_callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if value is not None:
+        _callable(instance, attribute, value)
+
+
+def _optional_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if value is not None:
+        _nonempty_name(instance, attribute, value)
+
+
+def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if not isinstance(value, str) or not value:
+        raise ModelError(
+            f"{type(instance).__name__}: {attribute.name} must be a non-empty string; got {value!r}."
+        )
+
+
+@attrs.frozen
+class Guard(Portable):
+    """A scalar function ``g(t, x, p)``; its transition fires when it crosses zero in its direction.
+
+    Parameters
+    ----------
+    function
+        ``g(t, x, p)``, one scalar.
+    direction
+        -1 fires from positive to negative, +1 from negative to positive, 0 both ways.
+    gradient
+        Optional ``(D_x g, D_t g)`` as a function of ``(t, x, p)`` that returns ``n + 1`` values, or
+        ``n`` if the guard does not depend on time. Derived from ``function`` when left out.
+    when
+        Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if it is positive
+        (or true) there, and is passed as if there were no guard if not. It is asked at crossings and at the
+        entry of the mode only, and need not be continuous.
+    at_start
+        True for a guard whose crossings are not looked for: its transition fires only where a run starts in
+        the mode, beyond the guard by more than rounding. ``direction`` says which side that is.
+
+    Raises
+    ------
+    ModelError
+        If a given function is not callable, ``direction`` is none of -1, 0, +1, or ``at_start`` is no bool or
+        comes without a direction.
+    """
+
+    function: Function = attrs.field(validator=_callable)
+    direction: int = attrs.field(default=0)
+    gradient: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+    when: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+    at_start: bool = attrs.field(default=False, kw_only=True)
+
+    @at_start.validator
+    def _check_at_start(self, attribute: attrs.Attribute[bool], value: object) -> None:
+        if not isinstance(value, bool):
+            raise ModelError(f"Guard: at_start must be True or False; got {value!r}.")
+        if value and self.direction == 0:
+            raise ModelError(
+                "Guard: at_start=True needs direction -1 or +1, the side that the mode excludes."
+            )
+
+    @direction.validator
+    def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not whole or value not in (-1, 0, 1):
+            raise ModelError(
+                f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {value!r}."
+            )
+
+
+@attrs.frozen
+class Reset(Portable):
+    """The map ``R(t, x, p)`` applied at the crossing; it returns one value per state.
+
+    Parameters
+    ----------
+    function
+        ``R(t, x, p)``, ``n`` values.
+    jacobian
+        Optional ``(t, x, p)`` function that returns the rows of ``D_x R``, each of ``n`` values, or of
+        ``n + 1`` with ``D_t R`` last. Derived from ``function`` when left out.
+
+    Raises
+    ------
+    ModelError
+        If a given function is not callable.
+    """
+
+    function: Function = attrs.field(validator=_callable)
+    jacobian: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+
+
+@attrs.frozen
+class Mode(Portable):
+    """A smooth vector field ``f(t, x, p)``: a node of the graph.
+
+    Parameters
+    ----------
+    name
+        How transitions refer to it.
+    field
+        ``f(t, x, p)``, one value per state: the time derivative of the state.
+    jacobian
+        Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, each of ``n`` values, or of
+        ``n + 1`` with ``D_t f`` last. Derived from ``field`` when left out.
+
+    Raises
+    ------
+    ModelError
+        If the name is empty or a given function is not callable.
+    """
+
+    name: str = attrs.field(validator=_nonempty_name)
+    field: Function = attrs.field(validator=_callable)
+    jacobian: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+
+
+def _as_guard(value: Any) -> Guard:
+    if isinstance(value, Guard):
+        return value
+    raise ModelError(
+        f"Transition: guard must be a Guard; got {value!r}. Write Guard(function, direction=...)."
+    )
+
+
+def _as_reset(value: Any) -> Reset | None:
+    if value is None or isinstance(value, Reset):
+        return value
+    raise ModelError(
+        f"Transition: reset must be a Reset or None (identity); got {value!r}. Write Reset(function)."
+    )
+
+
+@attrs.frozen
+class Transition(Portable):
+    """An edge of the graph: where it leaves from, where it leads, when it fires and what it does.
+
+    A transition from a mode to itself without a reset changes nothing and only marks the crossing: a
+    section.
+
+    Parameters
+    ----------
+    source, target
+        Names of modes; without a target (``None``) the run ends where the transition fires, with the status
+        ``TERMINAL``.
+    guard
+        When it fires.
+    reset
+        What happens to the state there; ``None`` is the identity.
+    accumulates_to
+        Mode in which the state goes on after infinitely many jumps in finite time (chatter), of this
+        transition alone or of several in turn. One of those in turn is enough to name the mode. Without it a
+        run ends at the limit.
+    name
+        Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
+
+    Raises
+    ------
+    ModelError
+        If guard or reset are of the wrong type, a name is empty, or there is a reset but no target.
+    """
+
+    source: str = attrs.field(validator=_nonempty_name)
+    target: str | None = attrs.field(validator=_optional_name)
+    guard: Guard = attrs.field(converter=_as_guard)
+    reset: Reset | None = attrs.field(default=None, converter=_as_reset)
+    accumulates_to: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
+    name: str = attrs.field(kw_only=True, validator=_nonempty_name)
+
+    @reset.validator
+    def _check_reset(self, attribute: attrs.Attribute[Reset | None], value: object) -> None:
+        if value is not None and self.target is None:
+            raise ModelError(
+                f"Transition {self.source}->{END}: nothing follows a reset where there is no target. "
+                "Leave the reset out, or name a target mode."
+            )
+
+    @accumulates_to.validator
+    def _check_limit(self, attribute: attrs.Attribute[str | None], value: object) -> None:
+        if value is not None and self.target is None:
+            raise ModelError(
+                f"Transition {self.source}->{END}: accumulates_to={value!r} is for transitions whose jumps "
+                "may accumulate, and this one ends the run. Leave it out, or name a target mode."
+            )
+
+    @name.default
+    def _default_name(self) -> str:
+        return f"{self.source}->{END if self.target is None else self.target}"
+
+    @property
+    def is_marker(self) -> bool:
+        """Whether it changes neither mode nor state, and so only marks a crossing."""
+        return self.source == self.target and self.reset is None
