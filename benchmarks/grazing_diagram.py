@@ -20,7 +20,6 @@ import models
 from benchmarks.common import ROOT, heading, table
 from hybrid import DOP853, simulate, stroboscopic_section
 from hybrid.plot import COLOURS
-from hybrid.simulation.arc import KINDS
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from models.one_impact import one_impact_orbits
 
@@ -85,7 +84,7 @@ def point(beyond: float, transient: int = 20_000, intervals: int = 1000, shown: 
         beyond,
         settled.x[:, 0],
         jumps.x_minus[:, 1],
-        jumps.kind == KINDS.index("grazing"),
+        jumps.kind == "grazing",
         float(spectrum.exponents[0]),
         float(spectrum.standard_error[0]),
         exact,

@@ -17,7 +17,7 @@ from benchmarks.common import heading, table
 from hybrid import HybridSystem, Taylor
 from hybrid.kernels.types import codes
 from hybrid.simulation.trajectory import start
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from models.one_impact import one_impact_orbits
 
 # Elastic, undamped and unforced; the period only counts the time.
@@ -35,7 +35,7 @@ def energy(p: dict[str, float], x: np.ndarray) -> float:
     return motion + 0.5 * (k1 * x1**2 + k2 * stretched**2) + 0.4 * p["K"] * max(x1 - x2, 0.0) ** 2.5
 
 
-def energy_drift(solver: RungeKutta, counts: np.ndarray) -> tuple[np.ndarray, int]:
+def energy_drift(solver: Solver, counts: np.ndarray) -> tuple[np.ndarray, int]:
     """Largest relative change of the energy up to each number of periods, and the impacts on the way."""
     system = models.vibroimpact()
     trajectory = start(system, START, 0.0, parameters=CONSERVATIVE, solver=solver)
@@ -48,7 +48,7 @@ def energy_drift(solver: RungeKutta, counts: np.ndarray) -> tuple[np.ndarray, in
     return np.maximum.accumulate(drift), trajectory.jumps // 2
 
 
-def phase_error(system: HybridSystem, periods: int, solver: RungeKutta) -> float:
+def phase_error(system: HybridSystem, periods: int, solver: Solver) -> float:
     """Largest error of the phase of an impact of the stable orbit, at some sixty of ``periods``."""
     p = dict(models.impact_oscillator().parameters)
     (orbit,) = one_impact_orbits(**p)

@@ -14,11 +14,13 @@ from hybrid.orbits.sections import Section, poincare_section, stroboscopic_secti
 from hybrid.simulation.arc import Grazing, HybridArc, Jump
 from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
-from hybrid.solvers import DOP853, RadauIIA, Taylor, Tsit5
+from hybrid.solvers import DOP853, RadauIIA, Solver, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.filippov import filippov
+
+__version__ = "0.1.0"
 
 __all__ = [
     "DOP853",
@@ -38,6 +40,7 @@ __all__ = [
     "RadauIIA",
     "Reset",
     "Section",
+    "Solver",
     "Status",
     "StatusCode",
     "Taylor",
@@ -54,3 +57,7 @@ __all__ = [
     "stroboscopic_section",
     "work_precision",
 ]
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__", "plot", "testing"]

@@ -1,5 +1,6 @@
 """Lyapunov and Floquet exponents of hybrid systems."""
 
+from lyapunov import plot
 from lyapunov.chart import Chart, chart
 from lyapunov.compare import ModelComparison, compare_models
 from lyapunov.floquet import floquet_exponents
@@ -15,5 +16,6 @@ __all__ = [
     "compare_models",
     "floquet_exponents",
     "lyapunov_spectrum",
+    "plot",
     "two_orbit_exponents",
 ]

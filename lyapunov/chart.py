@@ -22,7 +22,7 @@ from hybrid.orbits.sections import strobe
 from hybrid.simulation.interrupt import Told
 from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from lyapunov.spectrum import Estimate, first_vectors, interval_length
 
@@ -87,7 +87,7 @@ def chart(
     interval: float | None = None,
     transient: int = 200,
     t0: float = 0.0,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     section: int = 0,
     continue_from: Literal["previous"] | None = None,
     threads: int | None = None,
@@ -227,7 +227,7 @@ class _Rows:
     intervals: int
     interval: float | None
     transient: int
-    solver: RungeKutta
+    solver: Solver
     points: int
     stop: Told = attrs.field(factory=Told)
 

@@ -12,7 +12,7 @@ from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_syste
 from hybrid.display.progress import progress_bar
 from hybrid.display.tables import table
 from hybrid.simulation.interrupt import CTRL_C
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.status import SUCCESS
 from hybrid.system.graph import as_system
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
@@ -105,7 +105,7 @@ class ModelComparison:
                 ]
             )
         headings = ["model", "steps", "jumps", "median distance", "largest distance", "failed"]
-        return table(headings, rows)
+        return table(headings, rows, numbers=True)
 
 
 def compare_models(
@@ -119,7 +119,7 @@ def compare_models(
     intervals: int = 300,
     interval: float | None = None,
     transient: int = 200,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     progress: bool = False,
 ) -> ModelComparison:
     """Exponents and cost of several models of the same thing, over a range of parameters.

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
-import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridArc, arguments
-from hybrid.plot.style import as_axes, as_component
+from hybrid.plot import drawn
+from hybrid.plot.style import as_component, axes_for, check_axes, dot_area
 from lyapunov.chart import Chart
+from lyapunov.spectrum import LyapunovSpectrum
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,6 +45,7 @@ STYLE: Any = {
 
 POINTS_OF_A_LINE = 1500
 POINTS_OF_A_PORTRAIT = 40_000
+FIGURE = (6.4, 3.8)
 
 
 def style() -> AbstractContextManager[None]:
@@ -54,20 +56,18 @@ def style() -> AbstractContextManager[None]:
 
 
 def plot_convergence(
-    ax: Axes,
     estimates: Mapping[str, ArrayLike],
     *,
     points: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     points_label: str = "published",
     truth: float | None = None,
     truth_label: str = "exact",
+    ax: Axes | None = None,
 ) -> Axes:
     """Estimates of an exponent against the number of intervals.
 
     Parameters
     ----------
-    ax
-        Where to draw.
     estimates
         Label to history ``(M,)`` over 1, 2, ..., M intervals.
     points
@@ -76,8 +76,9 @@ def plot_convergence(
         Value to converge to, drawn as a line.
     points_label, truth_label
         What the legend calls them.
+    ax
+        Axes to draw into; by default those of a new figure.
     """
-    as_axes("ax", ax)
     histories = {
         label: _numbers(f"estimates[{label!r}]", estimate, 1)
         for label, estimate in arguments.mapping("estimates", estimates, "map labels to histories").items()
@@ -89,6 +90,7 @@ def plot_convergence(
     for name, text in (("points_label", points_label), ("truth_label", truth_label)):
         arguments.instance(name, text, str)
     truth = None if truth is None else arguments.number("truth", truth)
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
     # What comes later is drawn thinner, so that of two lines that coincide both are seen.
     widths = (2.2, 0.9) if len(histories) > 1 else (1.3,)
     if truth is not None:
@@ -111,20 +113,18 @@ def plot_convergence(
 
 
 def plot_phase_portrait(
-    ax: Axes,
     arc: HybridArc,
     x: str,
     y: str,
     *,
     section: ArrayLike | None = None,
     labels: tuple[str, str] | None = None,
+    ax: Axes | None = None,
 ) -> Axes:
     """Orbit in the plane of two components of the state, jumps as straight lines, with points of a section.
 
     Parameters
     ----------
-    ax
-        Where to draw.
     arc
         With dense output, that is, simulated without ``samples``.
     x, y
@@ -133,12 +133,14 @@ def plot_phase_portrait(
         Points ``(N, n)`` to mark.
     labels
         Texts at the axes; by default the names.
+    ax
+        Axes to draw into; by default those of a new figure.
     """
-    as_axes("ax", ax)
     system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
-    i, j = as_component("x", system, x), as_component("y", system, y)
+    i, j = as_component("x", system.state_names, x), as_component("y", system.state_names, y)
     marks = None if section is None else _numbers("section", section, 2)
-    across, up = _labels(labels, system.state_names[i], system.state_names[j])
+    across, up = axis_labels(labels, system.state_names[i], system.state_names[j])
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
     orbit = _dense(arc)
     ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
     if marks is not None:
@@ -173,7 +175,7 @@ def _pair(name: str, value: object) -> tuple[np.ndarray, np.ndarray]:
     return at, values
 
 
-def _labels(labels: object, *names: str) -> tuple[str, str]:
+def axis_labels(labels: object, *names: str) -> tuple[str, str]:
     """Texts at two axes."""
     if labels is None:
         return names[0], names[1]
@@ -195,80 +197,59 @@ def _dense(arc: HybridArc) -> np.ndarray:
     return np.concatenate([arc.x, arc(times)])[order]
 
 
-@attrs.frozen(eq=False)
-class Panel:
-    """One column of :func:`plot_regimes`.
+def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes:
+    """Estimates of the exponents against the number of intervals, with two standard errors at the end.
 
-    Attributes
+    Parameters
     ----------
-    title
-        Text over the column.
-    arc, section
-        An orbit, and points ``(N, n)`` of its section.
-    history, spread
-        First exponent ``(M,)`` over the intervals, and how far above and below its end the axis reaches.
+    spectrum
+        From :func:`lyapunov.lyapunov_spectrum`, with its history.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Raises
+    ------
+    ArgumentError
+        If the spectrum has no history.
     """
-
-    title: str
-    arc: HybridArc
-    section: np.ndarray
-    history: np.ndarray
-    spread: float
-
-
-def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, str] | None = None) -> Figure:
-    """Small multiples, a column a regime: phase portrait, section, first exponent over the intervals."""
-    import matplotlib.pyplot as plt
-
-    for i, panel in enumerate(arguments.items("panels", panels, "be a list of Panel objects")):
-        system = arguments.instance(f"panels[{i}]", panel, Panel).arc.system
-        x, y = (system.state_names[as_component(name, system, c)] for name, c in (("x", x), ("y", y)))
-    labels = _labels(labels, x, y)
-    figure, axes = plt.subplots(3, len(panels), figsize=(3.2 * len(panels), 7.6), squeeze=False)
-    for column, panel in zip(axes.T, panels, strict=True):
-        plot_phase_portrait(column[0], panel.arc, x, y, section=panel.section, labels=labels)
-        _plot_section(column[1], panel, x, y, labels)
-        plot_convergence(column[2], {"first exponent": panel.history}, truth=0.0)
-        column[2].get_legend().remove()
-        final = float(panel.history[-1]) if len(panel.history) else 0.0
-        # The start of a history is far off; what it settles to is the news.
-        column[2].set_ylim(final - panel.spread, final + panel.spread)
-        column[0].set_title(panel.title)
-    for row in axes:
-        for ax in row[1:]:
-            ax.set_ylabel("")
-    for ax, title in zip(axes[1:, 0], ("Section, once a period", "First exponent"), strict=True):
-        ax.set_title(title)
-    return figure
+    arguments.instance("spectrum", spectrum, LyapunovSpectrum, "Make one with lyapunov.lyapunov_spectrum.")
+    if not len(spectrum.growths):
+        raise ArgumentError("This spectrum has no history. Make it with history=True.")
+    labels = [f"$\\lambda_{{{i + 1}}}$ = {value:.5g}" for i, value in enumerate(spectrum.exponents)]
+    history = {label: spectrum.history[:, i] for i, label in enumerate(labels)}
+    ax = plot_convergence(history, truth=0.0, truth_label="zero", ax=ax)
+    values, errors = spectrum.exponents, 2 * spectrum.standard_error
+    shown = np.isfinite(values)
+    for i in np.flatnonzero(shown):
+        ax.errorbar(
+            len(spectrum.growths),
+            values[i],
+            errors[i],
+            color=COLOURS[i % len(COLOURS)],
+            capsize=3,
+            linewidth=1,
+        )
+    # The first intervals are far off; what the estimates settle to is the news.
+    low, high = (values - errors)[shown], (values + errors)[shown]
+    late = spectrum.history[len(spectrum.growths) // 10 :, shown]
+    bottom, top = min(*low, late.min(), 0.0), max(*high, late.max(), 0.0)
+    margin = 0.1 * (top - bottom) or 1.0
+    ax.set_ylim(bottom - margin, top + margin)
+    return ax
 
 
-def _plot_section(ax: Axes, panel: Panel, x: str, y: str, labels: tuple[str, str]) -> None:
-    names = panel.arc.system.state_names
-    points = panel.section[:, [names.index(x), names.index(y)]]
-    fixed = np.ptp(points, axis=0).max() <= 1e-6
-    ax.scatter(
-        points[:, 0], points[:, 1], s=26.0 if fixed else 2.0, color=COLOURS[1], linewidths=0, rasterized=True
-    )
-    if fixed:
-        (a, b), radius = points.mean(axis=0), np.maximum(np.abs(points.mean(axis=0)), 1e-3) * 0.2
-        ax.set_xlim(a - radius[0], a + radius[0])
-        ax.set_ylim(b - radius[1], b + radius[1])
-    ax.set_xlabel(labels[0])
-    ax.set_ylabel(labels[1])
-
-
-def plot_exponents(ax: Axes, chart: Chart) -> Axes:
+def plot_exponents(chart: Chart, *, ax: Axes | None = None) -> Axes:
     """Exponents of a chart over one parameter, with a band of two standard errors, and the line of zero.
 
     Parameters
     ----------
-    ax
-        Where to draw.
     chart
         From :func:`lyapunov.chart`, over one parameter.
+    ax
+        Axes to draw into; by default those of a new figure.
     """
-    as_axes("ax", ax)
     name, values = _only_axis(_as_chart(chart))
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
     ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     order = np.argsort(values)
     for i in range(chart.exponents.shape[-1]):
@@ -286,54 +267,55 @@ def plot_exponents(ax: Axes, chart: Chart) -> Axes:
     return ax
 
 
-def plot_bifurcation(ax: Axes, chart: Chart, component: str | None = None) -> Axes:
+def plot_bifurcation(chart: Chart, component: str | None = None, *, ax: Axes | None = None) -> Axes:
     """Points of the section over the parameter: a bifurcation diagram.
 
     Parameters
     ----------
-    ax
-        Where to draw.
     chart
         From :func:`lyapunov.chart`, over one parameter and with ``section=``.
     component
         Name of the state's component to show, by default the first.
+    ax
+        Axes to draw into; by default those of a new figure.
 
     Raises
     ------
     ArgumentError
         If the chart is over two parameters or has no section.
     """
-    as_axes("ax", ax)
     name, values = _only_axis(_as_chart(chart))
     points = chart.section.shape[1]
     if points == 0:
         raise ArgumentError("This chart has no points of a section. Make it with section=100, for instance.")
     names = chart.system.state_names
-    i = 0 if component is None else as_component("component", chart.system, component)
-    ax.plot(np.repeat(values, points), chart.section[:, :, i].ravel(), ",", color=COLOURS[0], rasterized=True)
+    i = 0 if component is None else as_component("component", chart.system.state_names, component)
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    across, up = np.repeat(values, points), chart.section[:, :, i].ravel()
+    ax.scatter(across, up, s=dot_area(len(up)), color=COLOURS[0], linewidths=0, rasterized=True)
     ax.set_xlabel(name)
     ax.set_ylabel(names[i])
     return ax
 
 
-def plot_map(ax: Axes, chart: Chart, exponent: int = 0) -> Axes:
+def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
     """Map of an exponent over two parameters, red where it is positive, blue where negative, grey where not.
 
     Parameters
     ----------
-    ax
-        Where to draw; a colour bar is set beside it.
     chart
         From :func:`lyapunov.chart`, over two parameters.
     exponent
         Which exponent, 0 for the largest.
+    ax
+        Axes to draw into; by default those of a new figure.
 
     Raises
     ------
     ArgumentError
         If the chart is over one parameter.
     """
-    as_axes("ax", ax)
+    check_axes(ax)
     exponent = arguments.count("exponent", exponent, 0, _as_chart(chart).exponents.shape[-1] - 1)
     if len(chart.over) != 2:
         raise ArgumentError("A map needs a chart over two parameters. Use plot_exponents for one.")
@@ -342,6 +324,7 @@ def plot_map(ax: Axes, chart: Chart, exponent: int = 0) -> Axes:
     finite = np.abs(values[np.isfinite(values)])
     # A few extremes would leave the rest pale.
     limit = float(np.quantile(finite, 0.98)) if finite.size and finite.max() > 0 else 1.0
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
     ax.set_facecolor("0.75")
     mesh = ax.pcolormesh(
         columns,
@@ -372,18 +355,18 @@ def plot_chart(chart: Chart, component: str | None = None) -> Figure:
     import matplotlib.pyplot as plt
 
     if component is not None:
-        as_component("component", _as_chart(chart).system, component)
+        as_component("component", _as_chart(chart).system.state_names, component)
     if len(_as_chart(chart).over) == 2:
         figure, ax = plt.subplots(figsize=(5.6, 4.4), layout="constrained")
-        plot_map(ax, chart)
+        plot_map(chart, ax=ax)
         return figure
     if chart.section.shape[1] == 0:
         figure, ax = plt.subplots(figsize=(7.2, 3.2), layout="constrained")
-        plot_exponents(ax, chart)
+        plot_exponents(chart, ax=ax)
         return figure
     figure, (above, below) = plt.subplots(2, figsize=(7.2, 5.4), sharex=True, layout="constrained")
-    plot_bifurcation(above, chart, component).set_xlabel("")
-    plot_exponents(below, chart)
+    plot_bifurcation(chart, component, ax=above).set_xlabel("")
+    plot_exponents(chart, ax=below)
     return figure
 
 
@@ -409,3 +392,7 @@ def _mark_failures(ax: Axes, chart: Chart) -> None:
             label="not to be trusted",
             clip_on=False,
         )
+
+
+drawn.register(LyapunovSpectrum, plot_spectrum)
+drawn.register(Chart, plot_chart)

@@ -18,7 +18,7 @@ from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from lyapunov.statistics import (
     TaperedMean,
     closed_batch_means,
@@ -106,7 +106,7 @@ def lyapunov_spectrum(
     interval: float | None = None,
     transient: int = 200,
     t0: float = 0.0,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     history: bool = True,
     progress: bool = False,
 ) -> LyapunovSpectrum:

@@ -17,7 +17,7 @@ from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
 from lyapunov.statistics import running_tapered_mean
@@ -128,7 +128,7 @@ def two_orbit_exponents(
     interval: float | None = None,
     transient: int = 0,
     t0: float = 0.0,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     progress: bool = False,
 ) -> TwoOrbitExponents:
     """Estimates of the largest exponent from two neighbouring orbits, without derivatives.
@@ -229,7 +229,7 @@ def _companion(
     reference: Trajectory,
     offset: np.ndarray,
     parameters: Mapping[str, float] | None,
-    solver: RungeKutta | None,
+    solver: Solver | None,
 ) -> Trajectory:
     """A trajectory beside the current point of the reference, at exactly its time."""
     place = (reference.system, reference.x + offset, reference.t)

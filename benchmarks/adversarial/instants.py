@@ -247,7 +247,7 @@ def difference(made: Instant, drawn: Case, solver: Any) -> tuple[str, str]:
     )
     truth = drawn.truth
     ending = ENDINGS.get(arc.status.code.name, arc.status.code.name)
-    fired = arc.jumps.transition.tolist()
+    fired = arc.jumps.transition_index.tolist()
     expected = [i for _, i in truth.fired]
     times = [float(t) for t, _ in truth.fired]
     if truth.ending == ending == "stuck":

@@ -136,7 +136,7 @@ def our_runs(
             solver=SOLVERS[method],
             max_jumps=MOST_JUMPS,
         )
-        fired, times, states = arc.jumps.transition, arc.jumps.t, arc.jumps.x_minus[:, :n]
+        fired, times, states = arc.jumps.transition_index, arc.jumps.t, arc.jumps.x_minus[:, :n]
         for i, one in enumerate(found):
             which = fired == i
             one.add(k, times[which], states[which])

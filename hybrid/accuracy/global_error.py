@@ -14,7 +14,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
@@ -62,7 +62,7 @@ def global_error(
     *,
     mode: str | None = None,
     parameters: Mapping[str, float] | None = None,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     max_jumps: int = 100_000,
 ) -> GlobalError:
     r"""Simulate, and estimate the global error by a ladder of tolerances.
@@ -114,7 +114,7 @@ def global_error(
             f"{10 * LEAST_RTOL:.0e}; got {solver.rtol:.0e}."
         )
 
-    def run(at: RungeKutta, start: ArrayLike, mode: str | None) -> HybridArc:
+    def run(at: Solver, start: ArrayLike, mode: str | None) -> HybridArc:
         return simulate(
             system, start, t_span, mode=mode, parameters=parameters, solver=at, max_jumps=max_jumps
         )
@@ -125,7 +125,7 @@ def global_error(
 
 
 def _estimated(
-    system: HybridSystem, solver: RungeKutta, run: Callable[..., HybridArc], x0: ArrayLike, mode: str | None
+    system: HybridSystem, solver: Solver, run: Callable[..., HybridArc], x0: ArrayLike, mode: str | None
 ) -> GlobalError:
     arc = run(solver, x0, mode)
     rungs = [_tightened(solver, factor) for factor in TIGHTER]
@@ -134,7 +134,7 @@ def _estimated(
     signs = np.ones(system.dimension), (-1.0) ** np.arange(system.dimension)
     begin = str(arc.mode[0])
 
-    def moved(rung: RungeKutta, sign: np.ndarray) -> HybridArc:
+    def moved(rung: Solver, sign: np.ndarray) -> HybridArc:
         # A start on a guard may lie beyond it if it is moved, or off the surface that its mode keeps to.
         others = []
         for side in (sign, -sign):
@@ -150,7 +150,7 @@ def _estimated(
     return attrs.evolve(found, status=interrupted_status("the run as far as it came, and no estimate"))
 
 
-def _tightened(solver: RungeKutta, factor: float) -> RungeKutta:
+def _tightened(solver: Solver, factor: float) -> Solver:
     rtol = max(solver.rtol / factor, LEAST_RTOL)
     return attrs.evolve(solver, rtol=rtol, atol=solver.atol * rtol / solver.rtol)
 
@@ -160,12 +160,12 @@ def _starts_alike(one: HybridArc, other: HybridArc) -> bool:
     if not (len(one.jumps) and len(other.jumps)):
         return len(one.jumps) == len(other.jumps)
     near = abs(one.jumps.t[0] - other.jumps.t[0]) <= 1e-6 * (one.t[-1] - one.t[0])
-    return bool(near and one.jumps.transition[0] == other.jumps.transition[0])
+    return bool(near and one.jumps.transition_index[0] == other.jumps.transition_index[0])
 
 
 def _alike(one: HybridArc, other: HybridArc) -> bool:
     """Whether two runs made the same jumps and ended alike."""
-    same = np.array_equal(one.jumps.transition, other.jumps.transition)
+    same = np.array_equal(one.jumps.transition_index, other.jumps.transition_index)
     return same and one.status.code == other.status.code
 
 
@@ -197,5 +197,5 @@ def _bound(value: np.ndarray, tighter: np.ndarray, tightest: np.ndarray) -> np.n
 def _agreement(one: HybridArc, other: HybridArc) -> int:
     """How many jumps from the first on are the same transitions."""
     length = min(len(one.jumps), len(other.jumps))
-    differ = np.flatnonzero(one.jumps.transition[:length] != other.jumps.transition[:length])
+    differ = np.flatnonzero(one.jumps.transition_index[:length] != other.jumps.transition_index[:length])
     return int(differ[0]) if len(differ) else length

@@ -17,7 +17,7 @@ from hybrid.display.tables import table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
-from hybrid.solvers import DOP853, RungeKutta, Taylor, Tsit5
+from hybrid.solvers import DOP853, Solver, Taylor, Tsit5
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-METHODS: Mapping[str, RungeKutta] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5()}
+METHODS: Mapping[str, Solver] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5()}
 # The default reference, and the run of another method that its own error is taken from.
 REFERENCE = Taylor(rtol=1e-14, atol=1e-16)
 CHECK = DOP853(rtol=1e-13, atol=1e-15)
@@ -33,7 +33,7 @@ CHECK = DOP853(rtol=1e-13, atol=1e-15)
 SETTLED = 0.05
 MOST_REPEATS = 1000
 
-Method = RungeKutta | Callable[[float], Any]
+Method = Solver | Callable[[float], Any]
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -163,7 +163,7 @@ class WorkPrecision:
         ]
         floor = [_figure(self.reference_error[quantity], ".1e") for quantity in self.error]
         rows.append(["the reference", "", *floor, *[""] * 5])
-        return table(headings, rows)
+        return table(headings, rows, numbers=True)
 
 
 def work_precision(
@@ -309,7 +309,7 @@ class _Row:
 
 def _run(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
     """The method as a function of the tolerance."""
-    if isinstance(method, RungeKutta):
+    if isinstance(method, Solver):
         ratio = method.atol / method.rtol
         return lambda rtol: _own(attrs.evolve(method, rtol=rtol, atol=rtol * ratio), *problem)
     if isinstance(method, type) or not callable(method):
@@ -320,7 +320,7 @@ def _run(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
 
 
 def _own(
-    solver: RungeKutta,
+    solver: Solver,
     system: HybridSystem,
     x0: ArrayLike,
     t_span: tuple[float, float],

@@ -163,10 +163,9 @@ class CompiledSystem:
         """What the kernels are given: functions at a point, parameter values, graph."""
         return self.at(parameters, self._model)
 
-    def moved_by(self, moving: Mapping[str, Any], propagator: np.ndarray | None) -> Any:
-        """A model at its default parameters, with what ``moving`` returned, and with other propagators."""
-        changes = dict(moving) if propagator is None else {**moving, "propagator": propagator}
-        return self.at(None, self._model.replace(**changes))
+    def moved_by(self, moving: Mapping[str, Any], propagator: np.ndarray) -> Any:
+        """A model at its default parameters, with what ``moving`` returned, and with these propagators."""
+        return self.at(None, self._model.replace(**moving, propagator=propagator))
 
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model at parameter values."""

@@ -1,16 +1,28 @@
-"""Tables as plain text."""
+"""Tables as plain text, and as HTML for notebooks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from html import escape
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Columns of text, the first to the left, the others to the right."""
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = False) -> str:
+    """Columns of text; with ``numbers`` all but the first are set to the right."""
     cells = [list(headings), *map(list, rows)]
     widths = [max(len(row[column]) for row in cells) for column in range(len(headings))]
     lines = []
     for row in cells:
-        first, rest = row[0].ljust(widths[0]), [c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True)]
-        lines.append("  ".join([first, *rest]).rstrip())
+        first, *others = zip(row, widths, strict=True)
+        aligned = [text.rjust(width) if numbers else text.ljust(width) for text, width in others]
+        lines.append("  ".join([first[0].ljust(first[1]), *aligned]).rstrip())
     return "\n".join(lines)
+
+
+def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """The same columns as an HTML table."""
+
+    def row_of(tag: str, cells: Sequence[str]) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(text)}</{tag}>" for text in cells) + "</tr>"
+
+    body = "".join(row_of("td", row) for row in rows)
+    return f"<table><thead>{row_of('th', headings)}</thead><tbody>{body}</tbody></table>"

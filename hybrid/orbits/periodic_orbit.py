@@ -20,7 +20,7 @@ from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import DOP853, RungeKutta
+from hybrid.solvers import DOP853, Solver
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
@@ -53,7 +53,7 @@ class PeriodicOrbit:
     Attributes
     ----------
     system, parameters
-        The model, and the overriding parameter values.
+        The model, and the values of all its parameters, by name.
     x0, mode, t0
         A point of the orbit ``(n,)``, its mode, and the time there.
     period
@@ -99,7 +99,7 @@ class PeriodicOrbit:
             f"residual {self.residual:.1e}, {self.status.code.name}>"
         )
 
-    def arc(self, solver: RungeKutta | None = None) -> HybridArc:
+    def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period."""
         span = (self.t0, self.t0 + self.period)
         return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
@@ -114,7 +114,7 @@ def periodic_orbit(
     t0: float = 0.0,
     periods: int = 1,
     period: float | None = None,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     tolerance: float = 1e-10,
     max_iterations: int = 30,
 ) -> PeriodicOrbit:
@@ -248,7 +248,7 @@ class _Shooting:
     system: HybridSystem
     mode: str | None
     parameters: Mapping[str, float] | None
-    solver: RungeKutta
+    solver: Solver
 
     def shoot(self, point: _Point) -> _Shot:
         trajectory = self._trajectory(point, self.mode)
@@ -364,7 +364,7 @@ class _Shooting:
         eigenvalues = self._eigenvalues(shot)
         return PeriodicOrbit(
             system=self.system,
-            parameters=dict(self.parameters or {}),
+            parameters=self._all_parameters(),
             x0=shot.point.x,
             mode=shot.mode,
             t0=shot.point.t,
@@ -377,6 +377,10 @@ class _Shooting:
             signature=self._signature(shot),
             status=status,
         )
+
+    def _all_parameters(self) -> dict[str, float]:
+        values = self.system.parameter_values(self.parameters).tolist()
+        return dict(zip(self.system.parameters, values, strict=True))
 
     def _eigenvalues(self, shot: _Shot) -> ProductEigenvalues:
         """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""

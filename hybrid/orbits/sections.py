@@ -18,7 +18,7 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.memory import empty_record
 from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.status import Status
 from hybrid.system.elements import Guard, Transition
 from hybrid.system.graph import HybridSystem, as_system
@@ -35,6 +35,8 @@ class Section:
 
     Attributes
     ----------
+    state_names, mode_names
+        Those of the system, for reports and pictures.
     t
         Times ``(N,)``.
     x
@@ -47,6 +49,8 @@ class Section:
         How the run ended.
     """
 
+    state_names: tuple[str, ...]
+    mode_names: tuple[str, ...]
     t: np.ndarray
     x: np.ndarray
     mode: np.ndarray
@@ -69,7 +73,7 @@ def stroboscopic_section(
     parameters: Mapping[str, float] | None = None,
     transient: int = 0,
     t0: float = 0.0,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     progress: bool = False,
 ) -> Section:
     """State once a forcing period, at the phase of ``t0``.
@@ -121,6 +125,8 @@ def stroboscopic_section(
     states, places = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
     cycle, index, count = places.T
     return Section(
+        state_names=system.state_names,
+        mode_names=system.mode_names,
         t=cycle * trajectory.model.period + trajectory.phase0,
         x=states,
         mode=np.array(system.mode_names)[index],
@@ -179,7 +185,7 @@ def poincare_section(
     parameters: Mapping[str, float] | None = None,
     transient: int = 0,
     t0: float = 0.0,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     progress: bool = False,
 ) -> Section:
     """State at each crossing of a surface, located as exactly as any event.
@@ -266,7 +272,13 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
     t, x, index, count = (np.concatenate(column)[: transient + points] for column in zip(*rows, strict=True))
     steps = np.diff(count, prepend=0)
     keep = slice(transient, None)
-    names = np.array(trajectory.system.mode_names)
+    system = trajectory.system
     return Section(
-        t[keep], x[keep], names[index[keep]], steps[keep], status or status_of(trajectory, codes.DONE)
+        state_names=system.state_names,
+        mode_names=system.mode_names,
+        t=t[keep],
+        x=x[keep],
+        mode=np.array(system.mode_names)[index[keep]],
+        jumps=steps[keep],
+        status=status or status_of(trajectory, codes.DONE),
     )

@@ -1,8 +1,68 @@
-"""Pictures: arcs over time, phase portraits, graphs of modes, work against precision."""
+"""Pictures: arcs over time, phase portraits, sections, orbits, graphs of modes, work against precision."""
 
+from functools import singledispatch
+from typing import Any
+
+from hybrid import arguments
+from hybrid.orbits.periodic_orbit import PeriodicOrbit
+from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
 from hybrid.plot.graph import plot_graph
+from hybrid.plot.orbits import plot_orbit, plot_section
 from hybrid.plot.style import COLOURS
 from hybrid.plot.work_precision import plot_work_precision
+from hybrid.simulation.arc import HybridArc
+from hybrid.system.graph import HybridSystem
 
-__all__ = ["COLOURS", "plot_arc", "plot_graph", "plot_phase", "plot_work_precision"]
+__all__ = [
+    "COLOURS",
+    "drawn",
+    "plot",
+    "plot_arc",
+    "plot_graph",
+    "plot_orbit",
+    "plot_phase",
+    "plot_section",
+    "plot_work_precision",
+]
+
+
+@singledispatch
+def drawn(result: Any, **options: Any) -> Any:
+    """The picture of a result; register the function that draws a class of results, as below."""
+    if callable(getattr(result, "plot", None)):
+        return result.plot(**options)
+    wanted = "be a system, an arc, a section, an orbit, a spectrum or a chart"
+    raise arguments.refusal("result", wanted, result)
+
+
+drawn.register(HybridArc, plot_arc)
+drawn.register(HybridSystem, plot_graph)
+drawn.register(Section, plot_section)
+drawn.register(PeriodicOrbit, plot_orbit)
+
+
+def plot(result: Any, **options: Any) -> Any:
+    """Draw a system or a result by the function that fits it.
+
+    An arc is drawn by :func:`plot_arc`, a system by :func:`plot_graph`, a section by :func:`plot_section`,
+    a periodic orbit by :func:`plot_orbit`; a spectrum or a chart by those of ``lyapunov.plot``; anything else
+    that has a method ``plot`` by that.
+
+    Parameters
+    ----------
+    result
+        What to draw.
+    **options
+        Those of the function that draws it, such as ``ax=``.
+
+    Returns
+    -------
+    matplotlib.axes.Axes, or an array of them for an arc, or a figure for a chart
+
+    Raises
+    ------
+    ArgumentError
+        If there is no picture of such a thing.
+    """
+    return drawn(result, **options)

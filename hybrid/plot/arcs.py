@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -12,14 +12,14 @@ import numpy as np
 from hybrid import arguments
 from hybrid.plot.style import as_component, axes_for, colour_of, legend, plain
 from hybrid.simulation.arc import HybridArc
-from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 JUMP_COLOUR = "0.35"
-# Points drawn within each step of the solver, from the dense output.
-POINTS_A_STEP = 8
+# Each step of the solver is drawn in this many parts at first, which are halved as often as this while their
+# middles lie off the straight line by more than this share of the picture.
+FIRST_PARTS, MOST_HALVINGS, SMOOTH = 4, 8, 1e-3
 
 
 def plot_arc(
@@ -28,7 +28,7 @@ def plot_arc(
     *,
     ax: Axes | Iterable[Axes] | None = None,
 ) -> np.ndarray:
-    """Draw an arc over time: a row a component, a colour a mode, a dotted line where the state is reset.
+    """Draw an arc over time: one row per component, one colour per mode, dotted lines for resets.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ def plot_arc(
     components
         Names or indices of the state's components, all by default.
     ax
-        Axes to draw into, one a component; by default those of a new figure.
+        Axes to draw into, one per component; by default those of a new figure.
 
     Returns
     -------
     numpy.ndarray
-        The axes, one a component.
+        The axes, one per component.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def plot_arc(
         If a component does not exist, or the number of axes differs from that of components.
     """
     names = _as_arc(arc).system.state_names
-    chosen = range(len(names)) if components is None else _components(arc.system, components)
+    chosen = range(len(names)) if components is None else _components(names, components)
     axes = axes_for(ax, len(chosen))
     lines = _lines(arc)
     for row, i in zip(axes, chosen, strict=True):
@@ -65,12 +65,12 @@ def plot_arc(
         plain(row)
     if len(axes):
         axes[-1].set_xlabel("t")
-        legend(axes[0], arc.system, lines)
+        legend(axes[0], arc.system.mode_names, lines)
     return axes
 
 
 def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = None) -> Axes:
-    """Draw one component of an arc over another: a colour a mode, jumps dashed, a dot at the start.
+    """Draw one component of an arc over another: one colour per mode, jumps dashed, a dot at the start.
 
     Parameters
     ----------
@@ -90,8 +90,8 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
     ArgumentError
         If a component does not exist.
     """
-    system = _as_arc(arc).system
-    i, j = as_component("x", system, x), as_component("y", system, y)
+    names = _as_arc(arc).system.state_names
+    i, j = as_component("x", names, x), as_component("y", names, y)
     (ax,) = axes_for(ax, 1, figsize=(5.0, 4.2))
     lines = _lines(arc)
     for mode, (_, states) in lines.items():
@@ -107,10 +107,10 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
     )
     if len(arc.x):
         ax.plot(arc.x[0, i], arc.x[0, j], "o", color="black", markersize=4)
-    ax.set_xlabel(arc.system.state_names[i])
-    ax.set_ylabel(arc.system.state_names[j])
+    ax.set_xlabel(names[i])
+    ax.set_ylabel(names[j])
     plain(ax)
-    legend(ax, arc.system, lines)
+    legend(ax, arc.system.mode_names, lines)
     return ax
 
 
@@ -118,9 +118,9 @@ def _as_arc(arc: object) -> HybridArc:
     return arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.")
 
 
-def _components(system: HybridSystem, components: object) -> list[int]:
+def _components(names: Sequence[str], components: object) -> list[int]:
     given = arguments.items("components", components, "be names or indices of components of the state")
-    return [as_component("components", system, each) for each in given]
+    return [as_component("components", names, each) for each in given]
 
 
 def _lines(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -139,14 +139,31 @@ def _lines(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
 
 
 def _refined(arc: HybridArc, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same points, with more between them where the arc has dense output."""
+    """The same points, with more between them where the dense output bends away from the straight line."""
     if arc._pieces is None or len(t) < 2:
         return t, x
-    part = np.linspace(0, 1, POINTS_A_STEP + 1)[:-1]
-    times = (t[:-1, None] + np.diff(t)[:, None] * part).ravel()
+    part = np.linspace(0, 1, FIRST_PARTS + 1)[:-1]
+    times = np.append((t[:-1, None] + np.diff(t)[:, None] * part).ravel(), t[-1])
     states = arc(times)
-    states[::POINTS_A_STEP] = x[:-1]
-    return np.append(times, t[-1]), np.vstack([states, x[-1]])
+    # The dense output gives the state after a jump, and the last point is that before it.
+    states[::FIRST_PARTS] = x
+    size = np.ptp(arc.x, axis=0)
+    size[size == 0.0] = np.inf
+    bent = np.ones(len(times) - 1, dtype=bool)
+    for _ in range(MOST_HALVINGS):
+        middles = 0.5 * (times[:-1] + times[1:])[bent]
+        found = arc(middles)
+        straight = 0.5 * (states[:-1] + states[1:])[bent]
+        off = np.max(np.abs(found - straight) / size, axis=1) > SMOOTH
+        where = np.flatnonzero(bent)[off]
+        if not len(where):
+            break
+        times = np.insert(times, where + 1, middles[off])
+        states = np.insert(states, where + 1, found[off], axis=0)
+        bent = np.zeros(len(times) - 1, dtype=bool)
+        halves = where + np.arange(len(where))
+        bent[halves] = bent[halves + 1] = True
+    return times, states
 
 
 def _with_gaps(before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
-from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,23 +17,29 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 
-def as_component(name: str, system: HybridSystem, component: object) -> int:
+def as_component(name: str, names: Sequence[str], component: object) -> int:
     """Index of a component of the state, given by name or index in the argument ``name``."""
-    names = system.state_names
     if isinstance(component, int | np.integer) and not isinstance(component, bool):
         if not -len(names) <= component < len(names):
             raise ArgumentError(
                 f"{name}: State component {component} does not exist; the state has {len(names)}."
             )
         return int(component) % len(names)
-    return names.index(arguments.known(f"{name}: State component", component, names, "State components"))
+    return list(names).index(
+        arguments.known(f"{name}: State component", component, names, "State components")
+    )
 
 
-def as_axes(name: str, value: object) -> Axes:
-    """Axes of matplotlib, or an ArgumentError."""
+def check_axes(value: object) -> None:
+    """ArgumentError if an argument ``ax`` is neither None nor axes of matplotlib."""
+    if value is not None:
+        _as_axes(value)
+
+
+def _as_axes(value: object) -> Axes:
     from matplotlib.axes import Axes
 
-    return arguments.instance(name, value, Axes, "Make them with matplotlib.pyplot.subplots.")
+    return arguments.instance("ax", value, Axes, "Make them with matplotlib.pyplot.subplots.")
 
 
 def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) -> np.ndarray:
@@ -46,7 +51,7 @@ def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) ->
         return plt.subplots(count, 1, sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
     axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
     for each in axes:
-        as_axes("ax", each)
+        _as_axes(each)
     if len(axes) != count:
         raise ArgumentError(f"ax must hold {count} axes, one per component; got {len(axes)}.")
     return axes
@@ -62,13 +67,13 @@ def plain(ax: Axes) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
-def legend(ax: Axes, system: HybridSystem, modes: Iterable[int]) -> None:
-    """Name the modes above the axes, if the system has more than one."""
-    if len(system.modes) < 2:
+def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
+    """Name the modes above the axes, if there is more than one."""
+    if len(names) < 2:
         return
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], color=colour_of(mode), label=system.mode_names[mode]) for mode in modes]
+    handles = [Line2D([], [], color=colour_of(mode), label=names[mode]) for mode in modes]
     ax.legend(
         handles=handles,
         loc="lower left",
@@ -77,3 +82,8 @@ def legend(ax: Axes, system: HybridSystem, modes: Iterable[int]) -> None:
         frameon=False,
         borderaxespad=0.2,
     )
+
+
+def dot_area(count: int) -> float:
+    """Area of each of so many dots in square points: a few can be seen, and many do not merge."""
+    return float(np.clip(4000 / max(count, 1), 0.6, 20.0))

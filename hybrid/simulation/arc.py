@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any, overload
 
@@ -37,6 +37,9 @@ class Jump:
     transversality
         ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the
         saltation matrix grows without bound, unless the jump was set off by another.
+    kind
+        ``"transverse"``, ``"grazing"`` for a crossing so shallow that the tolerances cannot tell it from a
+        touch, ``"limit"`` for the end of a chatter.
     """
 
     t: float
@@ -87,7 +90,10 @@ class Grazing:
 
 @attrs.frozen(eq=False, repr=False)
 class Jumps(Sequence[Jump]):
-    """The jumps of an arc in order, each made when looked at; the arrays hold all of them."""
+    """The jumps of an arc in order; ``jumps["impact"]`` are those of one transition.
+
+    Each :class:`Jump` is made when it is looked at; the arrays hold all of them.
+    """
 
     system: HybridSystem
     _parameters: np.ndarray
@@ -108,14 +114,19 @@ class Jumps(Sequence[Jump]):
         return self._time[:, 1]
 
     @property
-    def transition(self) -> np.ndarray:
-        """Indices ``(jumps,)`` into the system's transitions."""
+    def transition_index(self) -> np.ndarray:
+        """Indices ``(jumps,)`` of the transitions in the system."""
         return self._place[:, 1]
 
-    @property
+    @cached_property
+    def transition(self) -> np.ndarray:
+        """Names of the transitions, ``(jumps,)``."""
+        return np.array(self.system.transition_names, dtype=str)[self.transition_index]
+
+    @cached_property
     def kind(self) -> np.ndarray:
-        """Indices ``(jumps,)`` into ``KINDS``."""
-        return self._place[:, 2]
+        """As in :class:`Jump`, ``(jumps,)``."""
+        return np.array(KINDS)[self._place[:, 2]]
 
     @property
     def x_minus(self) -> np.ndarray:
@@ -133,7 +144,7 @@ class Jumps(Sequence[Jump]):
         missing = np.flatnonzero(self._place[:, 3] == 0)
         if not missing.size:
             return self._recorded
-        fired, phases = self.transition[missing].tolist(), self._time[missing, 0].tolist()
+        fired, phases = self.transition_index[missing].tolist(), self._time[missing, 0].tolist()
         parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
         model = compile_system(self.system).model(parameters)
         matrices = np.empty((len(self), *self._recorded.shape[1:]))
@@ -152,8 +163,11 @@ class Jumps(Sequence[Jump]):
     @overload
     def __getitem__(self, index: int) -> Jump: ...
     @overload
-    def __getitem__(self, index: slice) -> list[Jump]: ...
-    def __getitem__(self, index: int | slice) -> Jump | list[Jump]:
+    def __getitem__(self, index: slice | str) -> list[Jump]: ...
+    def __getitem__(self, index: int | slice | str) -> Jump | list[Jump]:
+        if isinstance(index, str):
+            fired = self.system.transition_index(index)
+            return [self._jump(i) for i in np.flatnonzero(self.transition_index == fired).tolist()]
         if isinstance(index, slice):
             return [self._jump(i) for i in range(*index.indices(len(self)))]
         if not -len(self) <= index < len(self):
@@ -164,8 +178,8 @@ class Jumps(Sequence[Jump]):
         return (self._jump(i) for i in range(len(self)))
 
     def _jump(self, i: int) -> Jump:
-        transition = self.system.transitions[self.transition[i]]
-        kind = KINDS[self.kind[i]]
+        transition = self.system.transitions[self.transition_index[i]]
+        kind = KINDS[self._place[i, 2]]
         target = transition.accumulates_to if kind == "limit" else transition.target
         return Jump(
             float(self.t[i]),
@@ -214,7 +228,7 @@ class Pieces:
 
 @attrs.frozen(eq=False, repr=False)
 class HybridArc:
-    """A solution over hybrid time ``(t, j)``.
+    """A solution over hybrid time ``(t, j)``; ``arc["q"]`` is one component of the state over it.
 
     Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step.
     With ``samples`` they are the states at those times, at a jump the state after it.
@@ -222,7 +236,7 @@ class HybridArc:
     Attributes
     ----------
     system, parameters
-        The model and the parameter values ``(m,)`` of the run.
+        The model, and the values of all its parameters in the run, by name.
     t, j, x
         Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``.
     jumps
@@ -243,7 +257,7 @@ class HybridArc:
     """
 
     system: HybridSystem
-    parameters: np.ndarray
+    parameters: Mapping[str, float]
     t: np.ndarray
     j: np.ndarray
     x: np.ndarray
@@ -265,6 +279,19 @@ class HybridArc:
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
         return f"<HybridArc {span}, {len(self.jumps)} jumps, {self.status.code.name}>"
+
+    def __getitem__(self, component: str) -> np.ndarray:
+        """A component of the state at the points of the arc, ``(N,)``.
+
+        Raises
+        ------
+        ArgumentError
+            If the state has no component of that name.
+        """
+        names = self.system.state_names
+        return self.x[
+            :, names.index(arguments.known("State component", component, names, "State components"))
+        ]
 
     def __call__(self, t: ArrayLike) -> np.ndarray:
         """State at time ``t``, a scalar or an array, from the dense output: ``t.shape + (n,)``.
@@ -315,7 +342,7 @@ def hybrid_points(
         in_order(pieces.t, jumps.t, t_end),
         in_order(pieces.j, count, len(jumps)),
         in_order(pieces.coefficients[:, 0, :-1], jumps.x_minus, x_end),
-        in_order(pieces.mode, sources[jumps.transition], mode_end),
+        in_order(pieces.mode, sources[jumps.transition_index], mode_end),
     )
 
 

@@ -14,17 +14,17 @@ from hybrid.compiler.compiled import CompiledSystem
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.simulation.memory import MOST_LAYOUTS, run_layout, work_layout
-from hybrid.solvers import RungeKutta, Taylor
+from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 
 DEFAULT_SOLVER = Taylor()
 
 
-def check_solver(solver: object) -> RungeKutta:
+def check_solver(solver: object) -> Solver:
     """The solver, or the default one; ArgumentError for anything else."""
     if solver is None:
         return DEFAULT_SOLVER
-    if isinstance(solver, RungeKutta) and hasattr(solver, "tableau"):
+    if isinstance(solver, Solver) and hasattr(solver, "tableau"):
         return solver
     raise ArgumentError(
         f"solver must be a solver object; got {arguments.shown(solver)}. "
@@ -49,24 +49,22 @@ class Plan:
     work_layout: Any
 
 
-def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan:
+def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int) -> Plan:
     """The plan of a run, made once; kernels that the run needs are loaded."""
     plan = compiled.plans.get((solver, tangents))
     if plan is None:
         system, method = compiled.system, kernel_method(solver)
         load_kernels("hybrid.kernels.events.initial_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
-        kinds, is_taylor = propagator_kinds(compiled, solver), isinstance(solver, Taylor)
+        kinds = propagator_kinds(compiled, solver)
         plan = Plan(
             method,
             driver_parts(
                 codes.RUNGE_KUTTA not in kinds,
-                bool(solver.tableau.implicit),
+                solver.attempt,
                 bool(compiled.emitted.forcing_component),
             ),
-            compiled.moved_by(
-                compiled.moving(kinds, tangents), None if is_taylor else np.array(kinds, dtype=np.int64)
-            ),
+            compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64)),
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),
             run_layout(n, tangents, modes, transitions),
@@ -81,7 +79,7 @@ def plan_of(compiled: CompiledSystem, solver: RungeKutta, tangents: int) -> Plan
 
 
 @lru_cache(MOST_LAYOUTS)
-def kernel_method(solver: RungeKutta) -> Any:
+def kernel_method(solver: Solver) -> Any:
     """The kernel's view of a solver: tableau and tolerances."""
     from hybrid.kernels.types.layout import Method
 
@@ -99,7 +97,7 @@ def kernel_method(solver: RungeKutta) -> Any:
         series_nodes=SERIES_NODES,
         series_weights=SERIES_WEIGHTS,
         implicit=int(tableau.implicit),
-        order=solver.order if isinstance(solver, Taylor) else 0,
+        order=solver.series_order,
         exponent=1.0 / tableau.error_order,
         rtol=solver.rtol,
         atol=solver.atol,
@@ -108,15 +106,12 @@ def kernel_method(solver: RungeKutta) -> Any:
 
 
 @cache
-def driver_parts(series_only: bool, implicit: bool, forced: bool) -> Any:
+def driver_parts(series_only: bool, attempt: tuple[str, str], forced: bool) -> Any:
     """The pieces that the driver is handed; what the run does not need is not loaded."""
     from hybrid.kernels.types.layout import Attempts, Parts
 
     jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
-    if implicit:
-        attempt = load_kernels("hybrid.kernels.steps.radau").attempt_radau
-    else:
-        attempt = load_kernels("hybrid.kernels.steps.step").no_attempt
+    module, name = attempt
     if series_only and not forced:
         step = load_kernels("hybrid.kernels.steps.step").no_step
     else:
@@ -127,7 +122,7 @@ def driver_parts(series_only: bool, implicit: bool, forced: bool) -> Any:
         explained_step, explained_series = map(address, (forcing.explained_step, forcing.explained_series))
     return Parts(
         attempts=Attempts(
-            attempt_implicit=address(attempt),
+            attempt_implicit=address(vars(load_kernels(module))[name]),
             explained_step=explained_step,
             explained_series=explained_series,
         ),
@@ -140,10 +135,10 @@ def driver_parts(series_only: bool, implicit: bool, forced: bool) -> Any:
     )
 
 
-def propagator_kinds(compiled: CompiledSystem, solver: RungeKutta) -> list[int]:
-    """How each mode is advanced: only Taylor takes series from the model."""
+def propagator_kinds(compiled: CompiledSystem, solver: Solver) -> list[int]:
+    """How each mode is advanced: by the series of the model only if the solver has an order for them."""
     modes = compiled.emitted.propagators
-    return [each.kind for each in modes] if isinstance(solver, Taylor) else [codes.RUNGE_KUTTA] * len(modes)
+    return [each.kind for each in modes] if solver.series_order else [codes.RUNGE_KUTTA] * len(modes)
 
 
 def dense_degree(compiled: CompiledSystem, method: Any, kinds: list[int]) -> int:

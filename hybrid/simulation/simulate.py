@@ -17,7 +17,7 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.memory import empty_record, record_layout
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
@@ -33,7 +33,7 @@ def simulate(
     *,
     mode: str | None = None,
     parameters: Mapping[str, float] | None = None,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     tangent: ArrayLike | bool | None = None,
     samples: ArrayLike | None = None,
     max_jumps: int = 100_000,
@@ -152,7 +152,7 @@ class _Recorder:
             mode, j = self.places[:, : self.sampled]
         return HybridArc(
             system,
-            model.parameters.copy(),
+            dict(zip(system.parameters, model.parameters.tolist(), strict=True)),
             t,
             j,
             x,

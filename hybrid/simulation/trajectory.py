@@ -17,7 +17,7 @@ from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
 from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem
 
 UNLIMITED = np.iinfo(np.int64).max
@@ -30,7 +30,7 @@ def start(
     *,
     mode: str | None = None,
     parameters: Mapping[str, float] | None = None,
-    solver: RungeKutta | None = None,
+    solver: Solver | None = None,
     tangent: np.ndarray | None = None,
     time: str = "t0",
     stop: Stop = CTRL_C,

@@ -7,7 +7,7 @@ from typing import ClassVar
 import attrs
 import numpy as np
 
-from hybrid.solvers.runge_kutta import RungeKutta
+from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Row, Tableau, dense, times_one_minus_theta, times_theta
 
 _STEP_STAGES = 12
@@ -226,7 +226,7 @@ def _interpolant(b: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 
 @attrs.frozen
-class DOP853(RungeKutta):
+class DOP853(Solver):
     """Explicit pair of order 8(5,3) by Dormand and Prince, with dense output of order 7.
 
     References

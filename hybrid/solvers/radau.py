@@ -7,7 +7,7 @@ from typing import ClassVar
 import attrs
 import numpy as np
 
-from hybrid.solvers.runge_kutta import RungeKutta
+from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Tableau, bernstein_from_powers
 
 _ROOT = 6**0.5
@@ -37,7 +37,7 @@ def _integrals() -> np.ndarray:
 
 
 @attrs.frozen
-class RadauIIA(RungeKutta):
+class RadauIIA(Solver):
     r"""Implicit method of order 5 for stiff modes: three-stage Radau IIA collocation.
 
     .. math::
@@ -60,6 +60,7 @@ class RadauIIA(RungeKutta):
     estimate (eqs. 8.18, 8.19).
     """
 
+    attempt: ClassVar[tuple[str, str]] = ("hybrid.kernels.steps.radau", "attempt_radau")
     tableau: ClassVar[Tableau] = Tableau(
         order=5,
         error_order=4,

@@ -8,7 +8,7 @@ from typing import ClassVar
 import attrs
 
 from hybrid.solvers.dop853 import DOP853
-from hybrid.solvers.runge_kutta import RungeKutta
+from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Tableau
 
 LOWEST_ORDER = 12
@@ -19,7 +19,7 @@ BEYOND = 6
 
 
 @attrs.frozen
-class Taylor(RungeKutta):
+class Taylor(Solver):
     r"""The default: each mode is advanced by what fits it.
 
     - A mode whose field is affine in the state, with constant coefficients and polynomial, harmonic or
@@ -49,7 +49,7 @@ class Taylor(RungeKutta):
     tableau: ClassVar[Tableau] = DOP853.tableau
 
     @property
-    def order(self) -> int:
+    def series_order(self) -> int:
         """Order of the series in nonlinear modes.
 
         Where a step of length 1/e of the convergence radius would meet the tolerance, the series alone would

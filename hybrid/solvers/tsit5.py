@@ -7,7 +7,7 @@ from typing import ClassVar
 import attrs
 import numpy as np
 
-from hybrid.solvers.runge_kutta import RungeKutta
+from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Row, Tableau, bernstein_from_powers, dense
 
 _C = (0.0, 0.161, 0.327, 0.9, 0.9800255409045097, 1.0, 1.0)
@@ -56,7 +56,7 @@ _POWERS = (
 
 
 @attrs.frozen
-class Tsit5(RungeKutta):
+class Tsit5(Solver):
     """Explicit pair of order 5(4) by Tsitouras, whose last stage is the first of the next step.
 
     References

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
+from html import escape
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.display.tables import html_table, table
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_functions
 from hybrid.system.elements import END, Mode, Transition
@@ -20,6 +23,12 @@ from hybrid.system.variables import Variables, as_parameters, as_state
 
 if TYPE_CHECKING:
     import networkx as nx
+
+
+TRANSITION_COLUMNS = ("transition", "from", "to", "guard", "condition", "reset", "limit of chatter")
+# Columns of text in a terminal.
+WIDTH = 100
+GUARD_SIDES = {-1: "falls", 0: "either way", 1: "rises"}
 
 
 def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
@@ -40,7 +49,7 @@ def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None
     arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class HybridSystem(Portable):
     """A hybrid (piecewise-smooth) dynamical system: modes joined by transitions.
 
@@ -82,6 +91,46 @@ class HybridSystem(Portable):
         self._check_graph()
         functions = [function for _, function in functions_of(self)]
         check_functions(self.variables, functions, self.period)
+
+    def __repr__(self) -> str:
+        """The system in one table: state, parameters, modes and transitions."""
+        rows = self._transition_rows()
+        heading = [fill(line, WIDTH, subsequent_indent="    ") for line in self._heading()]
+        return "\n".join([*heading, "", table(TRANSITION_COLUMNS, rows) if rows else "no transitions"])
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook."""
+        heading = "<br>".join(map(escape, self._heading()))
+        return f"<p>{heading}</p>\n{html_table(TRANSITION_COLUMNS, self._transition_rows())}"
+
+    def _heading(self) -> list[str]:
+        state = f"{self.state} components" if isinstance(self.state, int) else ", ".join(self.state)
+        parameters = ", ".join(f"{name} = {value:.6g}" for name, value in self.parameters.items())
+        lines = [
+            f"HybridSystem {self.name}".rstrip(),
+            f"state: {state}",
+            f"parameters: {parameters or 'none'}",
+            f"modes: {', '.join(self.mode_names)}",
+        ]
+        if self.period is not None:
+            period = "a function of the parameters" if callable(self.period) else f"{self.period:.6g}"
+            lines.append(f"period: {period}")
+        return lines
+
+    def _transition_rows(self) -> list[list[str]]:
+        return [
+            [
+                transition.name,
+                transition.source,
+                END if transition.target is None else transition.target,
+                GUARD_SIDES[transition.guard.direction]
+                + (", at the start" if transition.guard.at_start else ""),
+                "" if transition.guard.when is None else "yes",
+                "" if transition.reset is None else "yes",
+                transition.accumulates_to or "",
+            ]
+            for transition in self.transitions
+        ]
 
     @cached_property
     def variables(self) -> Variables:

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
 from hybrid.testing.crossings import CROSSINGS, check_crossings
@@ -158,7 +158,7 @@ def check_system(
     elastic: Iterable[str] | Callable[[np.ndarray], np.ndarray] | None = None,
     passable: Iterable[str] = (),
     examples: int = 50,
-    solver: RungeKutta = TIGHT,
+    solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
 ) -> SystemReport:
     """Check on drawn runs every property that a hybrid system has, and report the smallest failure in words.

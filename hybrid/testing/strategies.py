@@ -13,7 +13,7 @@ from hypothesis.strategies import SearchStrategy
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.simulation.plan import check_solver
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from hybrid.system.derivatives import evaluate
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
@@ -108,7 +108,7 @@ def cases(
     t_span: tuple[float, float] | None = None,
     mode: str | None = None,
     passable: Iterable[str] = (),
-    solver: RungeKutta = TIGHT,
+    solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
 ) -> SearchStrategy[Case]:
     """Runs of a system to check properties on, each from a mode whose guards allow its start.

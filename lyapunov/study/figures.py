@@ -13,7 +13,8 @@ from lyapunov.study.report import histories, paper_columns
 from lyapunov.study.runs import Regime
 from lyapunov.study.tangents import Trap
 from lyapunov.floquet import floquet_exponents
-from lyapunov.plot import COLOURS, INK, Panel, plot_convergence, plot_phase_portrait, plot_regimes, style
+from lyapunov.plot import COLOURS, INK, plot_convergence, plot_phase_portrait, style
+from lyapunov.study.regimes import Panel, plot_regimes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +63,7 @@ def portrait(regime: Regime) -> Figure:
 
     figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.8))
     for ax, (body, x, v, labels) in zip(axes, BODIES, strict=True):
-        plot_phase_portrait(ax, regime.arc, x, v, section=regime.section.x, labels=labels)
+        plot_phase_portrait(regime.arc, x, v, section=regime.section.x, labels=labels, ax=ax)
         ax.set_title(body)
     figure.suptitle(f"{_title(regime)}: orbit, and section once a period", x=0.01, ha="left", fontsize=10.5)
     return figure
@@ -79,7 +80,9 @@ def convergence(regime: Regime) -> Figure:
         points = {name: _printed(theirs[name]) for name in names if name in theirs}
         points = {name: point for name, point in points.items() if len(point[0])}
         shown = {name: ours[name] for name in names}
-        plot_convergence(ax, shown, points=points, points_label="paper", truth=truth, truth_label=label)
+        plot_convergence(
+            shown, points=points, points_label="paper", truth=truth, truth_label=label, ax=ax
+        )
         if names != ("(9)",):
             _fit_height(ax, list(shown.values()), [point[1] for point in points.values()], truth)
         ax.set_title(title)

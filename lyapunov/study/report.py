@@ -64,7 +64,7 @@ def regime_text(regime: Regime) -> str:
                 row.append(number(theirs[name][ROWS.index(M)] if M in ROWS else None))
     expected = f"; the paper: {PAPER[regime.omega].regime}, {PAPER[regime.omega].expected}" if theirs else ""
     title = f"omega = {regime.omega:.2f} rad/s: {regime.kind}{expected}"
-    parts = [title, "-" * len(title), table(headings, rows), "", *_starts(regime), *_spectrum(regime)]
+    parts = [title, "-" * len(title), table(headings, rows, numbers=True), "", *_starts(regime), *_spectrum(regime)]
     parts += _orbit(regime) + _trouble(regime)
     return "\n".join(parts)
 
@@ -128,7 +128,7 @@ def tolerance_text(trap: Trap) -> str:
         [
             title,
             "-" * len(title),
-            table(headings, [*cells, exact]),
+            table(headings, [*cells, exact], numbers=True),
             "",
             "Outside, the exponents are wrong where their sum is right: the sum rule does not see it.",
         ]
@@ -143,7 +143,7 @@ def explanation_text(found: Sequence[Explanation]) -> str:
     cells += [[e.text, *(number(e.exponents[omega]) for omega in omegas), number(e.misfit)] for e in found]
     title = "Where the paper's Benettin column ends, and why"
     headings = ["", *(f"{omega:.2f}" for omega in omegas), "off by"]
-    return "\n".join([title, "-" * len(title), table(headings, cells), "", verdict(found)])
+    return "\n".join([title, "-" * len(title), table(headings, cells, numbers=True), "", verdict(found)])
 
 
 def verdict(found: Sequence[Explanation]) -> str:

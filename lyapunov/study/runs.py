@@ -15,7 +15,7 @@ from hybrid import (
     stroboscopic_section,
 )
 from hybrid.orbits.sections import Section
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
 from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
 
@@ -47,11 +47,11 @@ class Settings:
 
     intervals: int = 10_000
     transient: int = 1_000
-    solver: RungeKutta = attrs.field(factory=lambda: Taylor(rtol=1e-9, atol=1e-11))
+    solver: Solver = attrs.field(factory=lambda: Taylor(rtol=1e-9, atol=1e-11))
     progress: bool = False
 
     @property
-    def two_orbit_solver(self) -> RungeKutta:
+    def two_orbit_solver(self) -> Solver:
         """The method for two neighbouring orbits, whose small distance must stand out of the error."""
         rtol, atol = self.solver.rtol * TWO_ORBIT_TIGHTER, self.solver.atol * TWO_ORBIT_TIGHTER
         return attrs.evolve(self.solver, rtol=max(rtol, 1e-13), atol=max(atol, 1e-16))

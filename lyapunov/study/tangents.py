@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid import DOP853, HybridSystem, Mode, Taylor, Tsit5, periodic_orbit, simulate
-from hybrid.solvers import RungeKutta
+from hybrid.solvers import Solver
 from lyapunov.study.paper import DOUBTFUL
 from lyapunov.study.runs import STARTS, Settings
 from lyapunov.floquet import floquet_exponents
@@ -114,7 +114,7 @@ def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
 
 
 def _uncontrolled_exponents(
-    extended: HybridSystem, omega: float, solver: RungeKutta, periods: int
+    extended: HybridSystem, omega: float, solver: Solver, periods: int
 ) -> np.ndarray:
     """Exponents ``(4,)`` by QR of tangent vectors that the error control does not see, from start I.
 
@@ -151,7 +151,7 @@ class Candidate:
     text: str
     system: HybridSystem
     x0: tuple[float, ...]
-    solver: RungeKutta
+    solver: Solver
     parameters: dict[str, float] = attrs.field(factory=dict)
     index: int = 0
 
@@ -185,7 +185,7 @@ class Explanation:
         return max(abs(self.exponents[omega] - value) for omega, value in DOUBTFUL.items())
 
 
-def candidates(system: HybridSystem, solver: RungeKutta) -> list[Candidate]:
+def candidates(system: HybridSystem, solver: Solver) -> list[Candidate]:
     """The exponent as it is, then with each of the faults that might explain the paper's."""
     first, other = STARTS[0].x0, STARTS[2].x0
     loose = [

@@ -16,6 +16,7 @@ import hybrid.plot
 import hybrid.testing
 import lyapunov
 import lyapunov.plot
+import lyapunov.study.regimes
 import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.errors import HybridError
@@ -137,7 +138,8 @@ def made():
         "work": hybrid.work_precision(
             BALL, (1.0, 0.0), (0.0, 0.3), methods={"T": hybrid.Taylor()}, tolerances=[1e-6], repeats=1
         ),
-        "ax": plt.subplots()[1],
+        "section": hybrid.stroboscopic_section(OSCILLATOR, (0.0, 0.0), periods=3),
+        "spectrum": lyapunov.lyapunov_spectrum(OSCILLATOR, (0.0, 0.0), intervals=5),
     }
 
 
@@ -150,7 +152,7 @@ def table(made):
     """By public function: a call that works, and what each argument must refuse."""
     start = (OSCILLATOR, (0.0, 0.0))
     ball = (BALL, (1.0, 0.0))
-    arc, ax, chart = made["arc"], made["ax"], made["chart"]
+    arc, chart = made["arc"], made["chart"]
     case = hybrid.testing.Case(BALL, dict(BALL.parameters), "flight", (1.0, 0.0), 0.0, 0.3)
     section = Guard(lambda t, x, p: x.v, -1)
     solvers = {"rtol": [*POSITIVE, 1e-16, 1e300], "atol": POSITIVE, "max_steps": [0, *COUNT]}
@@ -341,7 +343,7 @@ def table(made):
         ),
         *(
             (call(solver), solvers)
-            for solver in (hybrid.DOP853, hybrid.Tsit5, hybrid.Taylor, hybrid.RadauIIA)
+            for solver in (hybrid.Solver, hybrid.DOP853, hybrid.Tsit5, hybrid.Taylor, hybrid.RadauIIA)
         ),
         (call(lyapunov.lyapunov_spectrum, *start), exponents),
         (
@@ -406,6 +408,15 @@ def table(made):
             },
         ),
         (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, "ax": AXES}),
+        (call(hybrid.plot.plot, BALL), {"result": [None, "a", 3]}),
+        (
+            call(hybrid.plot.plot_section, made["section"]),
+            {"section": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES},
+        ),
+        (
+            call(hybrid.plot.plot_orbit, made["orbit"]),
+            {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES},
+        ),
         (
             call(hybrid.plot.plot_work_precision, made["work"]),
             {
@@ -415,9 +426,9 @@ def table(made):
             },
         ),
         (
-            call(lyapunov.plot.plot_convergence, ax, {"a": [1.0, 2.0]}),
+            call(lyapunov.plot.plot_convergence, {"a": [1.0, 2.0]}),
             {
-                "ax": [None, *AXES],
+                "ax": AXES,
                 "estimates": [[1], "a", {"a": "b"}, {"a": 1.0}, {"a": [[1.0]]}, {"a": [True]}],
                 "points": [[1], "a", {"a": 1.0}, {"a": ([1.0], [1.0, 2.0])}, {"a": ("a", "b")}],
                 "points_label": TEXT,
@@ -426,9 +437,9 @@ def table(made):
             },
         ),
         (
-            call(lyapunov.plot.plot_phase_portrait, ax, arc, "q", "v"),
+            call(lyapunov.plot.plot_phase_portrait, arc, "q", "v"),
             {
-                "ax": [None, *AXES],
+                "ax": AXES,
                 "arc": [None, "a", 3, BALL],
                 "x": COMPONENT,
                 "y": COMPONENT,
@@ -438,7 +449,10 @@ def table(made):
         ),
         (
             call(
-                lyapunov.plot.plot_regimes, [lyapunov.plot.Panel("a", arc, arc.x, np.ones(3), 1.0)], "q", "v"
+                lyapunov.study.regimes.plot_regimes,
+                [lyapunov.study.regimes.Panel("a", arc, arc.x, np.ones(3), 1.0)],
+                "q",
+                "v",
             ),
             {
                 "panels": [None, "a", 3, [1], [arc]],
@@ -447,24 +461,25 @@ def table(made):
                 "labels": LABELS,
             },
         ),
-        (call(lyapunov.plot.plot_exponents, ax, chart), {"ax": [None, *AXES], "chart": [None, "a", 3, arc]}),
+        (call(lyapunov.plot.plot_exponents, chart), {"ax": AXES, "chart": [None, "a", 3, arc]}),
         (
-            call(lyapunov.plot.plot_bifurcation, ax, chart),
+            call(lyapunov.plot.plot_bifurcation, chart),
             {
-                "ax": [None, *AXES],
+                "ax": AXES,
                 "chart": [None, "a", 3, arc],
                 "component": COMPONENT,
             },
         ),
         (
-            call(lyapunov.plot.plot_map, ax, chart),
+            call(lyapunov.plot.plot_map, chart),
             {
-                "ax": [None, *AXES],
+                "ax": AXES,
                 "chart": [None, "a", 3, arc],
                 "exponent": [1, *COUNT],
             },
         ),
         (call(lyapunov.plot.plot_chart, chart), {"chart": [None, "a", 3, arc], "component": COMPONENT}),
+        (call(lyapunov.plot.plot_spectrum, made["spectrum"]), {"spectrum": [None, "a", 3, arc], "ax": AXES}),
         (call(lyapunov.plot.style), {}),
         (call(hybrid.testing.states, BALL), {"system": SYSTEM, "ranges": RANGES}),
         (
@@ -628,11 +643,10 @@ def public_functions():
     found = []
     for module in (hybrid, hybrid.testing, lyapunov):
         found += [getattr(module, name) for name in module.__all__]
-    for module in (hybrid.plot, lyapunov.plot):
-        own = (each for name, each in vars(module).items() if not name.startswith("_") and callable(each))
-        found += [
-            each for each in own if each.__module__ == module.__name__ and not each.__name__.startswith("as_")
-        ]
+    plots = [each for name, each in vars(lyapunov.plot).items() if name.startswith("plot_")]
+    assert len(plots) == 7
+    found += [*plots, lyapunov.plot.style, lyapunov.study.regimes.plot_regimes]
+    found += [getattr(hybrid.plot, name) for name in hybrid.plot.__all__ if name.startswith("plot")]
     found += [each for name, each in vars(models).items() if inspect.isfunction(each)]
     laws = (contact.Rigid, contact.Hertz, contact.HuntCrossley, contact.KelvinVoigt)
     found += [*laws, contact.matched_laws, hertz_stiffness, one_impact_orbits, den_hartog_amplitude]
@@ -651,7 +665,7 @@ def arguments_of(function):
     return [
         name
         for name in inspect.signature(function).parameters
-        if name not in ("self", "cls", "args", "kwargs")
+        if name not in ("self", "cls", "args", "kwargs", "options")
     ]
 
 

@@ -4,14 +4,14 @@ import ctypes
 
 import numpy as np
 
-from hybrid.compiler.llvm.lowering import MATRIX_ROLE, SERIES_ROLE, VECTOR_ROLE, parsed
+from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, SERIES_SIGNATURE, VECTOR_SIGNATURE, parsed
 from hybrid.compiler.llvm.machine import load, machine_code
 from hybrid.symbolic.printer import IMPORTS
 
-SIGNATURES = (VECTOR_ROLE, MATRIX_ROLE, SERIES_ROLE)
+SIGNATURES = (VECTOR_SIGNATURE, MATRIX_SIGNATURE, SERIES_SIGNATURE)
 
 
-def both(lines, kind=SERIES_ROLE, *, fused=False):
+def both(lines, kind=SERIES_SIGNATURE, *, fused=False):
     """Functions of the same arguments that run a text as Python, and as machine code."""
     head = f"def function({', '.join(kind.names)}):\n"
     source = head + "".join(f"    {line}\n" for line in lines)

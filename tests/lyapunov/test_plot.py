@@ -32,7 +32,7 @@ def grid():
 
 
 def test_exponents_are_drawn_in_the_order_of_the_parameter(line):
-    ax = plot_exponents(plt.figure().subplots(), line)
+    ax = plot_exponents(line, ax=plt.figure().subplots())
     zero, first, second, failed = ax.lines
     assert set(zero.get_ydata()) == {0.0}
     np.testing.assert_array_equal(first.get_xdata(), [-1.0, 0.5, 0.8, 1.0])
@@ -44,15 +44,16 @@ def test_exponents_are_drawn_in_the_order_of_the_parameter(line):
 
 
 def test_the_bifurcation_diagram_has_every_point(line):
-    ax = plot_bifurcation(plt.figure().subplots(), line, "v")
-    (points,) = ax.lines
-    np.testing.assert_array_equal(points.get_xdata(), np.repeat([1.0, 0.5, 0.8, -1.0], 3))
-    np.testing.assert_array_equal(points.get_ydata(), line.section[:, :, 1].ravel())
+    ax = plot_bifurcation(line, "v", ax=plt.figure().subplots())
+    (points,) = ax.collections
+    across, up = points.get_offsets().T
+    np.testing.assert_array_equal(across, np.repeat([1.0, 0.5, 0.8, -1.0], 3))
+    np.testing.assert_array_equal(up, line.section[:, :, 1].ravel())
     assert ax.get_ylabel() == "v"
 
 
 def test_a_map_is_white_at_zero_and_grey_where_nothing_is_known(grid):
-    ax = plot_map(plt.figure().subplots(), grid)
+    ax = plot_map(grid, ax=plt.figure().subplots())
     (mesh,) = ax.collections
     assert mesh.norm(0.0) == 0.5
     shown = mesh.get_array()
@@ -68,12 +69,12 @@ def test_a_figure_of_each_kind(line, grid):
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
     assert len(plot_chart(bare).axes) == 1
     with pytest.raises(ArgumentError, match="no points of a section"):
-        plot_bifurcation(plt.figure().subplots(), bare)
+        plot_bifurcation(bare, ax=plt.figure().subplots())
 
 
 def test_lines_and_maps_want_their_kind_of_chart(line, grid):
     ax = plt.figure().subplots()
     with pytest.raises(ArgumentError, match="over r and d: lines need one parameter"):
-        plot_exponents(ax, grid)
+        plot_exponents(grid, ax=ax)
     with pytest.raises(ArgumentError, match="A map needs a chart over two parameters"):
-        plot_map(ax, line)
+        plot_map(line, ax=ax)

@@ -1,3 +1,5 @@
+import inspect
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -6,9 +8,12 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 
+import hybrid
+import lyapunov
+import lyapunov.plot
 import models
 from hybrid import ArgumentError, Guard, HybridSystem, Mode, Transition, simulate
-from hybrid.plot import plot_arc, plot_graph, plot_phase
+from hybrid.plot import plot, plot_arc, plot_graph, plot_phase
 
 
 @pytest.fixture(autouse=True)
@@ -110,3 +115,69 @@ def test_graph_shows_the_end_of_a_run():
     axes = plot_graph(system)
     axes.get_figure().canvas.draw()
     assert {"fall", "ground ↓"} <= texts(axes)
+
+
+def test_a_curve_is_as_fine_as_it_bends():
+    """An exact step spans whole turns of a circle: each is still drawn round."""
+    system = hybrid.HybridSystem(state=("q", "v"), modes=[hybrid.Mode("free", lambda t, x, p: (x.v, -x.q))])
+    arc = simulate(system, (1.0, 0.0), (0.0, 40.0))
+    points = curves(plot_phase(arc, "q", "v"))[0]
+    points = points[np.isfinite(points[:, 0])]
+    assert np.abs(np.hypot(*points.T) - 1.0).max() < 1e-9
+    middles = 0.5 * (points[:-1] + points[1:])
+    assert np.hypot(*middles.T).min() > 1 - 4e-3
+    assert len(points) < 5000
+
+
+def test_straight_lines_take_few_points():
+    system = hybrid.HybridSystem(
+        state=("q",), modes=[hybrid.Mode("free", lambda t, x, p: (1.0 + 0.0 * x.q,))]
+    )
+    (row,) = plot_arc(simulate(system, (0.0,), (0.0, 10.0)))
+    assert len(curves(row)[0]) < 50
+
+
+def test_each_result_has_its_picture():
+    oscillator = models.impact_oscillator()
+    orbit = hybrid.periodic_orbit(oscillator, (0.9, 1.0))
+    section = hybrid.stroboscopic_section(oscillator, (0.0, 0.0), periods=40)
+    axes = plot(section)
+    (dots,) = axes.collections
+    np.testing.assert_array_equal(dots.get_offsets(), section.x)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == oscillator.state_names == ("x", "v")
+    # Forty dots are large enough to be seen in print.
+    assert dots.get_sizes()[0] >= 10
+    axes = plot(section, y="x", x="v")
+    np.testing.assert_array_equal(axes.collections[0].get_offsets(), section.x[:, ::-1])
+    assert "period 6.28" in plot(orbit).get_title(loc="left")
+    assert plot(oscillator).texts
+    assert len(plot(orbit.arc())) == 2
+    spectrum = lyapunov.lyapunov_spectrum(oscillator, (0.0, 0.0), intervals=50)
+    axes = plot(spectrum)
+    drawn = [line for line in axes.get_lines() if line.get_label().startswith("$")]
+    ends = [line.get_ydata()[-1] for line in drawn]
+    np.testing.assert_allclose(ends, spectrum.exponents)
+    with pytest.raises(ArgumentError, match="result must be a system, an arc"):
+        plot(3)
+    with pytest.raises(ArgumentError, match="no history"):
+        plot(lyapunov.lyapunov_spectrum(oscillator, (0.0, 0.0), intervals=5, history=False))
+
+
+def test_a_section_of_one_component_is_drawn_over_time():
+    circle = models.switched_arrival()
+    line = hybrid.HybridSystem(
+        state=("u",), modes=[hybrid.Mode("decay", lambda t, x, p: (-x.u + np.cos(t),))], period=2 * np.pi
+    )
+    section = hybrid.stroboscopic_section(line, (1.0,), periods=5)
+    axes = plot(section)
+    np.testing.assert_array_equal(axes.collections[0].get_offsets(), np.column_stack([section.t, section.x]))
+    assert axes.get_xlabel() == "t"
+    assert plot(circle) is not None
+
+
+def test_axes_come_last_and_by_keyword():
+    for module in (hybrid.plot, lyapunov.plot):
+        for name, function in vars(module).items():
+            if name.startswith("plot_") and "ax" in inspect.signature(function).parameters:
+                last = list(inspect.signature(function).parameters.values())[-1]
+                assert (last.name, last.kind, last.default) == ("ax", inspect.Parameter.KEYWORD_ONLY, None)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybrid
+import models
 from hybrid import simulate
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
@@ -239,3 +240,29 @@ class TestJumps:
         assert jump.transversality == jump.x_minus[1] < 0
         assert jump.saltation.shape == (2, 2)
         assert type(jump.t) is float
+
+
+def test_components_and_jumps_by_name():
+    system = models.impact_pair()
+    arc = hybrid.simulate(system, system.dimension * (0.1,), (0.0, 20.0))
+    for i, name in enumerate(system.state_names):
+        np.testing.assert_array_equal(arc[name], arc.x[:, i])
+    with pytest.raises(hybrid.ArgumentError, match="State component 'w' does not exist"):
+        arc["w"]
+    first, second = system.transition_names[:2]
+    assert {first, second} == set(arc.jumps.transition)
+    assert [jump.transition for jump in arc.jumps] == arc.jumps.transition.tolist()
+    assert [jump.kind for jump in arc.jumps] == arc.jumps.kind.tolist()
+    for name in (first, second):
+        chosen = arc.jumps[name]
+        assert [jump.t for jump in chosen] == arc.jumps.t[arc.jumps.transition == name].tolist()
+        assert {jump.transition for jump in chosen} == {name}
+    with pytest.raises(hybrid.ModelError, match="Transition 'wall' does not exist"):
+        arc.jumps["wall"]
+
+
+def test_parameters_are_all_of_them_by_name():
+    oscillator = models.impact_oscillator()
+    orbit = hybrid.periodic_orbit(oscillator, (0.9, 1.0), parameters={"r": 0.75})
+    arc = orbit.arc()
+    assert arc.parameters == orbit.parameters == {**oscillator.parameters, "r": 0.75}

@@ -17,7 +17,7 @@ def ulps(found, exact):
 
 
 def test_order_follows_the_tolerance():
-    assert [Taylor(rtol=rtol).order for rtol in (1e-3, 1e-6, 1e-10, 1e-15)] == [13, 20, 28, 28]
+    assert [Taylor(rtol=rtol).series_order for rtol in (1e-3, 1e-6, 1e-10, 1e-15)] == [13, 20, 28, 28]
 
 
 def test_bounces_within_units_in_the_last_place():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+import models
 from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition
 
 
@@ -210,3 +211,51 @@ def test_markers():
     assert Transition("a", "a", Guard(down)).is_marker
     assert not BOUNCE.is_marker
     assert not Transition("a", "b", Guard(down)).is_marker
+
+
+def test_a_system_is_shown_as_a_table():
+    system = models.vibroimpact()
+    text = repr(system)
+    assert text.splitlines()[0] == "HybridSystem vibro-impact"
+    assert "state: x1, x2, v1, v2" in text
+    assert "P = 500" in text
+    assert "modes: free, contact" in text
+    assert "period: a function of the parameters" in text
+    assert [line.split() for line in text.splitlines()[-2:]] == [
+        ["impact", "free", "contact", "rises"],
+        ["release", "contact", "free", "falls"],
+    ]
+    assert max(map(len, text.splitlines())) <= 100
+    html = system._repr_html_()
+    assert html.count("<tr>") == 3
+    assert "<td>impact</td><td>free</td><td>contact</td><td>rises</td>" in html
+
+
+def test_a_table_shows_conditions_ends_and_limits():
+    system = HybridSystem(
+        state=3,
+        modes=[Mode("a<b", lambda t, x, p: -x), Mode("rest", lambda t, x, p: 0 * x)],
+        transitions=[
+            Transition("a<b", None, Guard(lambda t, x, p: x[0] - 9, when=lambda t, x, p: x[1]), name="out"),
+            Transition(
+                "a<b",
+                "a<b",
+                Guard(lambda t, x, p: x[0], -1),
+                Reset(lambda t, x, p: -x),
+                name="hit",
+                accumulates_to="rest",
+            ),
+        ],
+        period=2,
+    )
+    lines = repr(system).splitlines()
+    assert "state: 3 components" in lines
+    assert "parameters: none" in lines
+    assert "period: 2" in lines
+    assert lines[-2].split() == ["out", "a<b", "(end)", "either", "way", "yes"]
+    assert lines[-1].split() == ["hit", "a<b", "a<b", "falls", "yes", "rest"]
+    assert "a&lt;b" in system._repr_html_()
+
+
+def test_a_smooth_system_has_no_transitions_to_show():
+    assert repr(HybridSystem(state=1, modes=[Mode("a", lambda t, x, p: -x)])).endswith("no transitions")

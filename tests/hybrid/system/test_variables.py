@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from hybrid.errors import ModelError
-from hybrid.system.elements import Mode
-from hybrid.system.graph import HybridSystem
-from hybrid.system.variables import PARAMETERS, named_values, parameter_view, plain_class, state_values
+import models
+from hybrid import simulate
+from hybrid.errors import ArgumentError, ModelError
+from hybrid.system.variables import PARAMETERS, Variables, named_values, plain_class
 
 
 def test_values_are_read_by_name_by_index_and_in_order():
@@ -36,18 +36,40 @@ def test_an_unknown_name_lists_those_that_exist(kind, name, text):
     assert not hasattr(x, name)
 
 
-def test_views_of_a_system():
-    named = HybridSystem(
-        state=("q",), parameters={"k": 2.0}, modes=[Mode("a", lambda t, x, p: (-p.k * x.q,))]
-    )
-    plain = HybridSystem(state=2, modes=[Mode("a", lambda t, x, p: -x)])
+def test_views():
+    named, plain = Variables(("q",), {"k": 2.0}), Variables(2, {})
     values = np.array([3.0, 4.0])
-    assert state_values(named, [3.0]).q == 3.0
-    view = state_values(plain, values)
+    assert named.state_view([3.0]).q == 3.0
+    view = plain.state_view(values)
     np.testing.assert_array_equal(view, values)
     with pytest.raises(ValueError, match="read-only"):
         view[0] = 1.0
-    assert parameter_view(named, [5.0]).k == 5.0
+    assert named.parameter_view([5.0]).k == 5.0
+    assert (named.dimension, plain.dimension) == (1, 2)
+    assert plain.state_names == ("x0", "x1")
+    np.testing.assert_array_equal(named.defaults, [2.0])
+    with pytest.raises(ValueError, match="read-only"):
+        named.defaults[0] = 1.0
+
+
+def test_a_state_by_name():
+    variables = Variables(("q", "v"), {})
+    np.testing.assert_array_equal(variables.state_values("x0", {"v": 2.0, "q": 1}), [1.0, 2.0])
+    for given, text in (
+        ({"q": 1.0}, "x0 lacks v. The state is q, v; give each a number."),
+        ({"q": 1.0, "w": 2.0}, "x0: State component 'w' does not exist. State components: q, v."),
+        ({"q": 1.0, "v": "two"}, "x0 must hold 2 numbers; got [1.0, 'two']. The state is q, v."),
+        ({"q": 1.0, "v": np.nan}, "x0: component 'v' must be finite; got nan."),
+    ):
+        with pytest.raises(ArgumentError) as caught:
+            variables.state_values("x0", given)
+        assert str(caught.value) == text
+
+
+def test_a_run_starts_from_a_state_by_name():
+    ball = models.bouncing_ball()
+    arc = simulate(ball, {"v": 0.0, "q": 1.0}, (0.0, 1.0))
+    np.testing.assert_array_equal(arc.x, simulate(ball, (1.0, 0.0), (0.0, 1.0)).x)
 
 
 def test_compiled_code_takes_the_plain_class():

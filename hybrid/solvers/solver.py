@@ -1,4 +1,4 @@
-"""What all Runge-Kutta methods share: tolerances, and the kernel's view of the tableau."""
+"""What all solvers share: tolerances, limits, and what the driver of the kernels is handed."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ if TYPE_CHECKING:
 
 
 @attrs.frozen
-class RungeKutta:
-    """Abstract base of the methods; use one of its subclasses.
+class Solver:
+    """Abstract base of the solvers; use one of its subclasses.
+
+    A solver of one's own is a subclass with a ``tableau``. One that is no explicit pair names the kernel that
+    attempts its steps, too.
 
     The error estimate of every component ``i`` of the state is kept below ``atol + rtol |x_i|`` in the root
     mean square. Tangent vectors are under the same control, each by itself: their components are kept below
@@ -36,12 +39,21 @@ class RungeKutta:
         If a value is not positive, ``rtol`` is below 1e-15 or above 1, or ``max_steps`` is not whole.
     """
 
+    # Coefficients, error estimate and interpolant.
     tableau: ClassVar[Tableau]
+    # Module and name of the kernel that attempts a step of an implicit method: a PART with the signature of
+    # ``Attempts.attempt_implicit``.
+    attempt: ClassVar[tuple[str, str]] = ("hybrid.kernels.steps.step", "no_attempt")
 
     rtol: float = attrs.field(default=1e-10, kw_only=True)
     atol: float = attrs.field(default=1e-12, kw_only=True)
     max_step: float = attrs.field(default=float("inf"), kw_only=True)
     max_steps: int = attrs.field(default=1_000_000_000, kw_only=True)
+
+    @property
+    def series_order(self) -> int:
+        """Order of Taylor series in the modes that have them; 0 if every mode goes by the tableau."""
+        return 0
 
     def __attrs_post_init__(self) -> None:
         name = type(self).__name__

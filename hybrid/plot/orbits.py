@@ -1,0 +1,102 @@
+"""Sections as points, and periodic orbits as closed curves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.orbits.periodic_orbit import PeriodicOrbit
+from hybrid.orbits.sections import Section
+from hybrid.plot.arcs import plot_phase
+from hybrid.plot.style import as_component, axes_for, check_axes, colour_of, dot_area, legend, plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def plot_section(
+    section: Section, x: str | int = 0, y: str | int | None = None, *, ax: Axes | None = None
+) -> Axes:
+    """Draw the points of a section in the plane of two components: one colour per mode.
+
+    Parameters
+    ----------
+    section
+        From :func:`hybrid.stroboscopic_section` or :func:`hybrid.poincare_section`.
+    x, y
+        Names or indices of the components, by default the first two; the only component of a state is drawn
+        over time.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ArgumentError
+        If a component does not exist.
+    """
+    arguments.instance("section", section, Section, "Make one with hybrid.stroboscopic_section.")
+    names = section.state_names
+    i = as_component("x", names, x)
+    j = _second(len(names), i) if y is None else as_component("y", names, y)
+    (ax,) = axes_for(ax, 1, figsize=(5.0, 4.2))
+    across, up = (section.t, section.x[:, i]) if j is None else (section.x[:, i], section.x[:, j])
+    modes = section.mode_names
+    visited = [index for index, mode in enumerate(modes) if np.any(section.mode == mode)]
+    area = dot_area(len(section))
+    for index in visited:
+        there = section.mode == modes[index]
+        colour = colour_of(index)
+        ax.scatter(across[there], up[there], s=area, color=colour, linewidths=0, rasterized=True)
+    ax.set_xlabel("t" if j is None else names[i])
+    ax.set_ylabel(names[i] if j is None else names[j])
+    plain(ax)
+    legend(ax, modes, visited)
+    return ax
+
+
+def plot_orbit(
+    orbit: PeriodicOrbit, x: str | int = 0, y: str | int | None = None, *, ax: Axes | None = None
+) -> Axes:
+    """Draw a periodic orbit in the plane of two components, with its period and largest multiplier.
+
+    Parameters
+    ----------
+    orbit
+        From :func:`hybrid.periodic_orbit`.
+    x, y
+        Names or indices of the components, by default the first two.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ArgumentError
+        If a component does not exist.
+    """
+    arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
+    names = orbit.system.state_names
+    i = as_component("x", names, x)
+    j = _second(len(names), i) if y is None else as_component("y", names, y)
+    check_axes(ax)
+    ax = plot_phase(orbit.arc(), i, i if j is None else j, ax=ax)
+    largest = orbit.multipliers[0]
+    number = f"{largest.real:.4g}" if largest.imag == 0 else f"{largest:.4g}"
+    ax.set_title(f"period {orbit.period:.6g}, largest multiplier {number}", loc="left", fontsize=9)
+    return ax
+
+
+def _second(dimension: int, first: int) -> int | None:
+    """The component to draw over the first one; None if there is no other."""
+    if dimension == 1:
+        return None
+    return first + 1 if first + 1 < dimension else first - 1
