@@ -57,7 +57,7 @@ def phase_error(system: HybridSystem, periods: int, solver: Solver) -> float:
     record, largest = trajectory.no_record(), 0.0
     for count in np.unique(np.geomspace(1, periods, 60).astype(int)):
         assert trajectory.advance(phase + (count + 0.5) * period, record) == codes.DONE
-        found = float(trajectory.run.clock[codes.LAST_JUMP_PHASE]) - phase
+        found = float(trajectory.run.last_jump_phase) - phase
         largest = max(largest, abs(found - round(found / period) * period))
     return largest
 

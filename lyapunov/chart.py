@@ -264,10 +264,8 @@ class _Rows:
         period, clock = trajectory.model.period, trajectory.run
         span = self.transient * length
         cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
-        phase = clock.clock[codes.PHASE] + (0.0 if period else span)
-        code = trajectory.advance_to(
-            int(clock.count[codes.CYCLE]) + cycles, float(phase), trajectory.no_record()
-        )
+        phase = clock.phase + (0.0 if period else span)
+        code = trajectory.advance_to(int(clock.cycle) + cycles, float(phase), trajectory.no_record())
         if code != codes.DONE:
             return self.x0, self.mode
         # With a single mode the check that it allows the state is worth more than the name.

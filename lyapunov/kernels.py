@@ -6,21 +6,11 @@ from numba import boolean, float64, int64, njit, types
 
 from hybrid.kernels.arithmetic.tangent import orthonormalise
 from hybrid.kernels.types.codes import (
-    DIVERGENCE,
     DONE,
     ENTERING,
-    INDISTINCT,
-    LAST_FIRED,
-    LOG_DETERMINANT,
-    MODE,
     NO_TRANSITION,
-    PENDING,
-    PHASE_OF_RUN,
-    PREVIOUS_MODE,
     READY,
     STALE,
-    STEPS,
-    STRAIN,
 )
 from hybrid.kernels.types.layout import (
     ADVANCE,
@@ -28,14 +18,11 @@ from hybrid.kernels.types.layout import (
     INDICES,
     KERNEL,
     MATRIX,
-    METHOD,
-    MODEL,
     PARTS,
-    RECORD,
-    RUN,
+    TASK,
     VECTOR,
-    WORK,
 )
+from hybrid.kernels.types.structure import Structure
 from lyapunov import statistics
 
 UNLIMITED = 9223372036854775807
@@ -55,71 +42,45 @@ def later(period, cycle, phase, interval):
     return cycle, phase
 
 
+class End(Structure, counters=("cycle",), numbers=("phase",)):
+    """When an interval ends: after ``cycle`` whole periods and at the ``phase`` of the next."""
+
+    counters: INDICES
+    numbers: VECTOR
+
+
+END = End.numba_type
+
+
 @njit(
-    types.UniTuple(int64, 2)(
-        ADVANCE,
-        PARTS,
-        MODEL,
-        METHOD,
-        RUN,
-        RECORD,
-        WORK,
-        int64,
-        INDICES,
-        VECTOR,
-        float64,
-        int64,
-        boolean,
-        MATRIX,
-        MATRIX,
-        INDICES,
-    ),
+    types.UniTuple(int64, 2)(ADVANCE, PARTS, TASK, END, float64, int64, boolean, MATRIX, MATRIX, INDICES),
     **ENTRY,
 )
-def growth_rates(
-    advance,
-    parts,
-    model,
-    method,
-    run,
-    record,
-    work,
-    tangents,
-    cycle,
-    phase,
-    interval,
-    max_steps,
-    resumed,
-    rates,
-    batches,
-    batch_state,
-):
+def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates, batches, batch_state):
     """Growth rates ``(M, k + 1)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
 
     The last column is the other side of the sum rule: the integral of div f plus the log-determinants of the
-    saltation matrices, per unit time. ``cycle (1,)`` and ``phase (1,)`` hold the end of the last interval.
-    Each row also goes to ``batches``. Returns how many intervals were completed, and the driver's code. After
-    ``MAX_STEPS`` the interval that was not completed is ``resumed`` by the next call.
+    saltation matrices, per unit time. ``end`` is the end of the last interval. Each row is also added to
+    ``batches``. Returns how many intervals were completed, and the driver's code. After ``MAX_STEPS`` the
+    next call resumes the interval that was not completed: ``resumed``.
     """
-    n = model.dimension
+    run, period, n, tangents = task.run, task.model.period, task.model.dimension, task.tangents
     for done in range(rates.shape[0]):
         if done > 0 or not resumed:
             for c in range(tangents):
                 run.growth[c] = 0.0
-            run.clock[DIVERGENCE], run.clock[LOG_DETERMINANT] = 0.0, 0.0
-            cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
-        code = advance(
-            parts, model, method, run, record, tangents, True, cycle[0], phase[0], max_steps, UNLIMITED, work
-        )
+            run.divergence, run.log_determinant = 0.0, 0.0
+            end.cycle, end.phase = later(period, end.cycle, end.phase, interval)
+        code = advance(parts, task, end.cycle, end.phase, max_steps, UNLIMITED)
         if code != DONE:
             return done, code
-        run.count[INDISTINCT] += orthonormalise(run.y, n, tangents, run.growth, 0.0)
-        run.clock[STRAIN] = 0.0
-        if run.count[PHASE_OF_RUN] == READY:
-            run.count[PHASE_OF_RUN] = STALE
+        run.indistinct += orthonormalise(run.y, n, tangents, run.growth, 0.0)
+        run.strain = 0.0
+        if run.stage == READY:
+            run.stage = STALE
         for c in range(tangents):
             rates[done, c] = run.growth[c] / interval
-        rates[done, tangents] = (run.clock[DIVERGENCE] + run.clock[LOG_DETERMINANT]) / interval
+        rates[done, tangents] = (run.divergence + run.log_determinant) / interval
         push(batches, batch_state, rates[done])
     return rates.shape[0], DONE
 
@@ -141,57 +102,21 @@ def rescale(run, other, n, factor):
     # It has been taken from the point of ``run`` to its own: what lies in between it has crossed.
     for i in range(other.side.shape[0]):
         other.side[i], other.on_guard[i], other.due[i] = run.side[i], run.on_guard[i], 0
-    other.count[PREVIOUS_MODE] = run.count[MODE]
-    other.count[MODE] = run.count[MODE]
-    other.count[PHASE_OF_RUN] = ENTERING
-    other.count[LAST_FIRED] = NO_TRANSITION
-    other.count[PENDING] = NO_TRANSITION
+    other.previous_mode = run.mode
+    other.mode = run.mode
+    other.stage = ENTERING
+    other.last_fired = NO_TRANSITION
+    other.pending = NO_TRANSITION
 
 
 @njit(
     types.UniTuple(int64, 2)(
-        ADVANCE,
-        PARTS,
-        MODEL,
-        METHOD,
-        RUN,
-        RUN,
-        RUN,
-        RECORD,
-        WORK,
-        WORK,
-        WORK,
-        INDICES,
-        VECTOR,
-        float64,
-        float64,
-        int64,
-        int64,
-        boolean,
-        MATRIX,
+        ADVANCE, PARTS, TASK, TASK, TASK, END, float64, float64, int64, int64, boolean, MATRIX
     ),
     **ENTRY,
 )
 def distances(
-    advance,
-    parts,
-    model,
-    method,
-    run,
-    free,
-    renormalised,
-    record,
-    work,
-    free_work,
-    renormalised_work,
-    cycle,
-    phase,
-    interval,
-    separation,
-    max_steps,
-    burst,
-    resumed,
-    out,
+    advance, parts, task, free, renormalised, end, interval, separation, max_steps, burst, resumed, out
 ):
     """Distances ``(M, 2)`` of two companions from an orbit at the ends of ``M`` intervals.
 
@@ -200,48 +125,22 @@ def distances(
     run takes ``burst`` steps at most; after ``MAX_STEPS`` the interval that was not completed is ``resumed``
     by the next call.
     """
-    n = model.dimension
-    most = min(max_steps, run.count[STEPS] + burst)
-    free_most = min(max_steps, free.count[STEPS] + burst)
-    renormalised_most = min(max_steps, renormalised.count[STEPS] + burst)
+    run, period, n = task.run, task.model.period, task.model.dimension
+    most = min(max_steps, run.steps + burst)
+    free_most = min(max_steps, free.run.steps + burst)
+    renormalised_most = min(max_steps, renormalised.run.steps + burst)
     for done in range(out.shape[0]):
         if done > 0 or not resumed:
-            cycle[0], phase[0] = later(model.period, cycle[0], phase[0], interval)
-        code = advance(parts, model, method, run, record, 0, False, cycle[0], phase[0], most, UNLIMITED, work)
+            end.cycle, end.phase = later(period, end.cycle, end.phase, interval)
+        code = advance(parts, task, end.cycle, end.phase, most, UNLIMITED)
         if code == DONE:
-            code = advance(
-                parts,
-                model,
-                method,
-                free,
-                record,
-                0,
-                False,
-                cycle[0],
-                phase[0],
-                free_most,
-                UNLIMITED,
-                free_work,
-            )
+            code = advance(parts, free, end.cycle, end.phase, free_most, UNLIMITED)
         if code == DONE:
-            code = advance(
-                parts,
-                model,
-                method,
-                renormalised,
-                record,
-                0,
-                False,
-                cycle[0],
-                phase[0],
-                renormalised_most,
-                UNLIMITED,
-                renormalised_work,
-            )
+            code = advance(parts, renormalised, end.cycle, end.phase, renormalised_most, UNLIMITED)
         if code != DONE:
             return done, code
-        out[done, 0] = distance(run, free, n)
-        out[done, 1] = distance(run, renormalised, n)
+        out[done, 0] = distance(run, free.run, n)
+        out[done, 1] = distance(run, renormalised.run, n)
         if out[done, 1] > 0.0:
-            rescale(run, renormalised, n, separation / out[done, 1])
+            rescale(run, renormalised.run, n, separation / out[done, 1])
     return out.shape[0], DONE

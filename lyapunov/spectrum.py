@@ -209,16 +209,21 @@ def generic_directions(n: int, k: int) -> np.ndarray:
     return np.asarray(directions[:, :k])
 
 
+def end_at(trajectory: Trajectory) -> Any:
+    """The current time of a run as the end of an interval, which the kernels take further."""
+    End = load_kernels("lyapunov.kernels").End
+    run = trajectory.run
+    return End(counters=np.array([run.cycle]), numbers=np.array([run.phase]))
+
+
 class Estimate:
     """Takes a trajectory further and accumulates the growth rates that the kernel delivers in bursts."""
 
     def __init__(self, trajectory: Trajectory, interval: float) -> None:
         self.trajectory = trajectory
         self.interval = interval
-        run = trajectory.run
-        self.cycle = run.count[codes.CYCLE : codes.CYCLE + 1].copy()
-        self.phase = run.clock[codes.PHASE : codes.PHASE + 1].copy()
-        self.record = trajectory.no_record()
+        self.end = end_at(trajectory)
+        self.task = trajectory.task(trajectory.no_record(), orthonormal=True)
         self.grazed_growth = 0.0
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
@@ -229,8 +234,8 @@ class Estimate:
             _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
             self._replace_annihilated()
         mean, batches = TaperedMean(k + 1), new_batches(k + 1)
-        jumps, steps = trajectory.jumps, int(trajectory.run.count[codes.STEPS])
-        self.grazed_growth = trajectory.run.clock[codes.ILL_CONDITIONED_GROWTH]
+        jumps, steps = trajectory.jumps, int(trajectory.run.steps)
+        self.grazed_growth = trajectory.run.ill_conditioned_growth
         growths = np.empty((0, k))
         if code == codes.DONE:
             growths, code = self._collect(intervals, mean, batches, history, bar)
@@ -244,7 +249,7 @@ class Estimate:
             interval=self.interval,
             intervals=mean.count,
             jumps_per_interval=(trajectory.jumps - jumps) / max(mean.count, 1),
-            steps_per_interval=(int(trajectory.run.count[codes.STEPS]) - steps) / max(mean.count, 1),
+            steps_per_interval=(int(trajectory.run.steps) - steps) / max(mean.count, 1),
             mode=trajectory.mode,
             x=trajectory.x,
             status=self._status(code, max(mean.count, 1)),
@@ -266,14 +271,8 @@ class Estimate:
                 done, code = kernel(
                     advance,
                     trajectory.parts,
-                    trajectory.model,
-                    trajectory.method,
-                    trajectory.run,
-                    self.record,
-                    trajectory.work,
-                    trajectory.tangents,
-                    self.cycle,
-                    self.phase,
+                    self.task,
+                    self.end,
                     self.interval,
                     bursts.most(),
                     resumed,
@@ -305,10 +304,10 @@ class Estimate:
 
     def _status(self, code: int, intervals: int) -> Status:
         status = status_of(self.trajectory, code)
-        run, grazed = self.trajectory.run, int(self.trajectory.run.count[codes.ILL_CONDITIONED])
+        run, grazed = self.trajectory.run, int(self.trajectory.run.ill_conditioned)
         if not status.ok or not grazed:
             return status
-        share = (run.clock[codes.ILL_CONDITIONED_GROWTH] - self.grazed_growth) / (self.interval * intervals)
+        share = (run.ill_conditioned_growth - self.grazed_growth) / (self.interval * intervals)
         return attrs.evolve(
             status, message=f"{status.message} They contribute {share:.3g} to the first exponent."
         )

@@ -19,7 +19,7 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
-from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
+from lyapunov.spectrum import INTERVALS_AT_ONCE, end_at, interval_length
 from lyapunov.statistics import running_tapered_mean
 
 
@@ -220,7 +220,7 @@ def _skip(trajectory: Trajectory, intervals: int, interval: float) -> int:
     """Run a number of intervals, exactly if they are forcing periods; returns the driver's code."""
     record = trajectory.no_record()
     if interval == trajectory.model.period:
-        cycle, phase = trajectory.run.count[codes.CYCLE], trajectory.run.clock[codes.PHASE]
+        cycle, phase = trajectory.run.cycle, trajectory.run.phase
         return trajectory.advance_to(int(cycle) + intervals, float(phase), record)
     return trajectory.advance(trajectory.t + intervals * interval, record)
 
@@ -239,10 +239,9 @@ def _companion(
         companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
         # What lies between the two orbits, the companion has crossed.
         companion.run.side[:] = reference.run.side
-        companion.run.count[codes.PREVIOUS_MODE] = companion.run.count[codes.MODE]
-    companion.run.count[codes.CYCLE] = reference.run.count[codes.CYCLE]
-    for slot in (codes.PHASE, codes.PHASE_LOW):
-        companion.run.clock[slot] = reference.run.clock[slot]
+        companion.run.previous_mode = companion.run.mode
+    companion.run.cycle = reference.run.cycle
+    companion.run.phase, companion.run.phase_low = reference.run.phase, reference.run.phase_low
     return companion
 
 
@@ -258,8 +257,8 @@ def _follow(
     kernel = entry(load_kernels("lyapunov.kernels").distances)
     advance = address(load_kernels().advance)
     runs: list[Any] = [reference, *companions]
-    cycle = reference.run.count[codes.CYCLE : codes.CYCLE + 1].copy()
-    phase = reference.run.clock[codes.PHASE : codes.PHASE + 1].copy()
+    end = end_at(reference)
+    tasks = [run.task(run.no_record()) for run in runs]
     kept, total, code = [np.empty((0, 2))], 0, codes.DONE
     bursts = Bursts(runs)
     while total < intervals and code in (codes.DONE, codes.GO_ON):
@@ -268,13 +267,8 @@ def _follow(
         done, code = kernel(
             advance,
             reference.parts,
-            reference.model,
-            reference.method,
-            *(run.run for run in runs),
-            reference.no_record(),
-            *(run.work for run in runs),
-            cycle,
-            phase,
+            *tasks,
+            end,
             interval,
             separation,
             reference.max_steps,
@@ -286,7 +280,5 @@ def _follow(
         kept.append(out[:done])
         total += done
         bar.update(done)
-    unfinished = (
-        run for run in runs if (run.run.count[codes.CYCLE], run.run.clock[codes.PHASE]) != (*cycle, *phase)
-    )
+    unfinished = (run for run in runs if (run.run.cycle, run.run.phase) != (end.cycle, end.phase))
     return np.concatenate(kept), status_of(next(unfinished, reference), code)

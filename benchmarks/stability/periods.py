@@ -13,7 +13,6 @@ import models
 from benchmarks.peers.scipy_ivp import Edge, with_events
 from benchmarks.stability.methods import EVENTS, LEAST, OURS, SCIPY, WITHOUT_PERIOD, Curves
 from hybrid import HybridSystem
-from hybrid.kernels.types import codes
 from hybrid.simulation.trajectory import start
 from models.one_impact import one_impact_orbits
 
@@ -68,8 +67,8 @@ def phases(
     errors, largest = [], 0.0
     for count in counts:
         trajectory.advance(phase + (count + 0.5) * period, record)
-        clock, cycles = trajectory.run.clock, trajectory.run.count[codes.JUMPS]
-        found = float(clock[codes.LAST_JUMP_PHASE]) - phase
+        run = trajectory.run
+        cycles, found = run.jumps, run.last_jump_phase - phase
         # With a period that is a phase already, without it a time.
         whole = round(found / period) if trajectory.model.period > 0 else cycles
         # The largest so far: a time as one number is right now and then by chance.

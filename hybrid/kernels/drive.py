@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit
+from numba import float64, int64, njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
@@ -20,35 +20,23 @@ from hybrid.kernels.events.sides import side_of
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
-    AT_REST,
     DONE,
     ENTERING,
     GO_ON,
-    JUMPS,
-    JUMPS_HERE,
-    LAST_FIRED,
-    LAST_STEP,
     MAX_JUMPS,
     MAX_STEPS,
-    MODE,
-    NEXT_STEP,
     NO_MODE,
     NO_TRANSITION,
     NON_FINITE,
-    PENDING,
-    PHASE,
-    PHASE_OF_RUN,
-    PREVIOUS_MODE,
     RECORD_FULL,
     RESTING,
     RUNGE_KUTTA,
-    SINCE_ENTRY,
     STALE,
-    STEPS,
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.types.layout import ENTRY, KERNEL, METHOD, MODEL, PARTS, RECORD, RUN, WORK
+from hybrid.kernels.types.layout import ENTRY, KERNEL, PARTS, TASK
+from hybrid.kernels.types.task import task_of
 
 # More jumps than this at one instant, in all or per transition, are not going to end.
 MOST_JUMPS_AT_ONCE = 1000
@@ -63,7 +51,7 @@ def arrived(model, run, work):
     and takes a guard that it starts beyond as crossed; but the steps of Runge-Kutta methods can pass a guard
     by their own rounding without having found it.
     """
-    mode, t, found = run.count[MODE], run.clock[PHASE], NO_TRANSITION
+    mode, t, found = run.mode, run.phase, NO_TRANSITION
     model.flow(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
         work.settled[i] = run.scale[i]
@@ -100,109 +88,86 @@ def finite(run, length):
     return total < math.inf
 
 
-@njit(
-    int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK),
-    **ENTRY,
-)
-def advance(
-    parts,
-    model,
-    method,
-    run,
-    record,
-    tangents,
-    orthonormal,
-    stop_cycle,
-    stop_phase,
-    max_steps,
-    max_jumps,
-    work,
-):
+@njit(int64(PARTS, TASK, int64, float64, int64, int64), **ENTRY)
+def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 
     The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record
     has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. Nothing is allocated.
     """
-    length = model.dimension * (1 + tangents)
-    recording = record.step_time.shape[0] > 0
+    _, model, _, run, record, work = task_of(task)
+    length = model.dimension * (1 + task.tangents)
+    recording = record.step_phase.shape[0] > 0
     while True:
-        if run.count[PENDING] != NO_TRANSITION:
-            if run.count[JUMPS] >= max_jumps:
+        if run.pending != NO_TRANSITION:
+            if run.jumps >= max_jumps:
                 return MAX_JUMPS
             # One more than this jump: it may turn out to be the last of a chatter, whose limit follows at
             # once.
-            if 0 < record.jump_time.shape[0] <= record.used[1] + 1:
+            if 0 < record.jump_phase.shape[0] <= record.jumps + 1:
                 return RECORD_FULL
-            if run.count[JUMPS_HERE] > max(MOST_JUMPS_AT_ONCE, MOST_JUMPS_EACH * model.target.shape[0]):
+            if run.jumps_here > max(MOST_JUMPS_AT_ONCE, MOST_JUMPS_EACH * model.target.shape[0]):
                 return STUCK
-            fired = run.count[PENDING]
-            run.count[PENDING] = NO_TRANSITION
-            parts.jump(model, method, run, record, fired, tangents, orthonormal, work)
+            fired = run.pending
+            run.pending = NO_TRANSITION
+            parts.jump(task, fired)
             if model.target[fired] == NO_MODE:
                 return TERMINAL
             remaining = time_left(model, run, stop_cycle, stop_phase)
-            if (
-                parts.finish_chatter(
-                    model, method, run, record, fired, remaining, tangents, orthonormal, work
-                )
-                and model.accumulates_to[run.count[LAST_FIRED]] == NO_MODE
-            ):
+            ended = parts.finish_chatter(task, fired, remaining)
+            if ended and model.accumulates_to[run.last_fired] == NO_MODE:
                 return ACCUMULATION
             continue
-        mode = run.count[MODE]
-        if run.count[PHASE_OF_RUN] == ENTERING:
+        mode = run.mode
+        if run.stage == ENTERING:
             if not finite(run, length):
                 return NON_FINITE
             fires = parts.enter(model, run, work)
             if fires == RESTING:
-                limit_mode = model.accumulates_to[run.count[LAST_FIRED]]
+                limit_mode = model.accumulates_to[run.last_fired]
                 if limit_mode == NO_MODE:
-                    run.count[AT_REST] = 1
+                    run.at_rest = 1
                     return ACCUMULATION
-                parts.rest(model, run, limit_mode, tangents, orthonormal, work)
+                parts.rest(task, limit_mode)
                 continue
             if fires != NO_TRANSITION:
-                run.count[PENDING] = fires
+                run.pending = fires
                 continue
-            if mode != run.count[PREVIOUS_MODE]:
-                run.clock[NEXT_STEP] = run.first_step[mode]
+            if mode != run.previous_mode:
+                run.next_step = run.first_step[mode]
                 run.first_step[mode] = 0.0
-            run.clock[LAST_STEP] = 0.0
-            run.count[PHASE_OF_RUN] = STALE
+            run.last_step = 0.0
+            run.stage = STALE
         remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
             fired = arrived(model, run, work)
             if fired == NO_TRANSITION:
                 return DONE
-            run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
+            run.pending = parts.first_in_order(task, fired)
             continue
-        if recording and record.used[0] + 1 >= record.step_time.shape[0]:
+        if recording and record.steps + 1 >= record.step_phase.shape[0]:
             return RECORD_FULL
-        if 0 < record.grazing_time.shape[0] == record.used[2]:
+        if 0 < record.grazing_phase.shape[0] == record.grazings:
             return RECORD_FULL
-        if run.count[STEPS] >= max_steps:
+        if run.steps >= max_steps:
             return MAX_STEPS
         if model.propagator[mode] == RUNGE_KUTTA:
-            code, span = parts.runge_kutta_step(
-                parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
-            )
+            code, span = parts.runge_kutta_step(task, remaining)
         else:
-            code, span = series_step(parts.attempts, model, method, run, record, tangents, remaining, work)
+            code, span = series_step(task, remaining)
             if code == NON_FINITE and is_forced(model, mode):
                 # Terms of the series overflow far from a pulse, ``cosh`` in ``1 / cosh``; the field does not.
-                run.count[PHASE_OF_RUN] = STALE
-                code, span = parts.runge_kutta_step(
-                    parts.attempts, model, method, run, record, tangents, orthonormal, remaining, work
-                )
-                run.count[PHASE_OF_RUN] = STALE
+                run.stage = STALE
+                code, span = parts.runge_kutta_step(task, remaining)
+                run.stage = STALE
         if code != GO_ON:
             return int(code)
         forward(run, model.period, span)
-        run.clock[SINCE_ENTRY] += span
-        if orthonormal and 0.0 < span < remaining:
-            keep_apart(model, run, mode, tangents, work.jacobian)
-        fired = run.count[PENDING]
+        run.since_entry += span
+        if task.orthonormal != 0 and 0.0 < span < remaining:
+            keep_apart(model, run, mode, task.tangents, work.jacobian)
+        fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
         if fired != NO_TRANSITION:
-            run.count[PENDING] = parts.first_in_order(model, run, record, fired, work)
+            run.pending = parts.first_in_order(task, fired)

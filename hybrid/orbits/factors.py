@@ -42,18 +42,18 @@ def fundamental_factors(trajectory: Trajectory, t: float) -> tuple[list[np.ndarr
         if trajectory.stop.is_set():
             return factors, StatusCode.INTERRUPTED
         before = run.saved() if implicit else None
-        steps = int(run.count[codes.STEPS])
+        steps = int(run.steps)
         code = trajectory.advance_to(*place, record, max_steps=steps + 1, max_jumps=trajectory.jumps)
         if code not in (codes.MAX_STEPS, codes.MAX_JUMPS, codes.DONE):
             return factors, code
-        if int(run.count[codes.STEPS]) > steps or code == codes.DONE:
+        if int(run.steps) > steps or code == codes.DONE:
             sizes = np.linalg.svd(trajectory.tangent_matrix, compute_uv=False)
             if not np.all(np.isfinite(sizes)):
                 return factors, codes.NON_FINITE
             if before is not None and sizes[0] > CONDITION * LONGEST_STEP * sizes[-1]:
-                length = run.clock[codes.LAST_STEP]
+                length = run.last_step
                 run.restore(before)
-                run.clock[codes.NEXT_STEP] = SHORTER * length
+                run.next_step = SHORTER * length
                 trajectory.replace_tangents(trajectory.tangent_matrix)
                 continue
             strained = True
@@ -62,11 +62,11 @@ def fundamental_factors(trajectory: Trajectory, t: float) -> tuple[list[np.ndarr
         if code == codes.MAX_JUMPS:
             if strained:
                 orthonormalise()
-            code = trajectory.advance_to(*place, record, max_steps=int(run.count[codes.STEPS]))
+            code = trajectory.advance_to(*place, record, max_steps=int(run.steps))
             if code not in (codes.MAX_STEPS, codes.DONE):
                 return factors, code
             orthonormalise()
         if code == codes.DONE:
             return [*factors, trajectory.tangent_matrix], code
-        if run.count[codes.STEPS] >= trajectory.max_steps:
+        if run.steps >= trajectory.max_steps:
             return factors, codes.MAX_STEPS

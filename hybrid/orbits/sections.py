@@ -144,18 +144,15 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     places = np.empty((count, 3), dtype=np.int64)
     kernel = entry(load_kernels("hybrid.kernels.events.sections").strobe)
     record, bursts = trajectory.no_record(), Bursts([trajectory])
-    first, total, code = int(trajectory.run.count[codes.CYCLE]) + 1, 0, codes.GO_ON
+    task = trajectory.task(record, tangents=False)
+    first, total, code = int(trajectory.run.cycle) + 1, 0, codes.GO_ON
     # Points need no tangent vectors, which the trajectory may have.
     plain = attrs.evolve(trajectory, tangents=0)
     while code == codes.GO_ON:
         done, code = kernel(
             address(load_kernels().advance),
             trajectory.parts,
-            trajectory.model,
-            trajectory.method,
-            trajectory.run,
-            record,
-            trajectory.work,
+            task,
             trajectory.phase0,
             bursts.most(),
             UNLIMITED,
@@ -168,7 +165,8 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
             # The burst has ended within a period, which the kernel would begin anew.
             code = plain.advance_to(first + total, trajectory.phase0, record)
             if code == codes.DONE:
-                places[total] = trajectory.run.count[[codes.CYCLE, codes.MODE, codes.JUMPS]]
+                run = trajectory.run
+                places[total] = run.cycle, run.mode, run.jumps
                 states[total] = trajectory.x
                 total += 1
                 code = codes.GO_ON if total < count else codes.DONE
@@ -248,13 +246,13 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
     while found < transient + points:
         limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
         code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
-        used = record.used[1]
-        cycle, transition = record.jump_place[:used, :2].T
+        used = record.jumps
+        cycle, transition = record.jump_cycle[:used], record.jump_transition[:used]
         marked = transition < markers
         counts = jumps + np.cumsum(~marked)
         rows.append(
             (
-                (cycle * model.period + record.jump_time[:used, 0])[marked],
+                (cycle * model.period + record.jump_phase[:used])[marked],
                 record.jump_states[:used, 0][marked],
                 transition[marked],
                 counts[marked],
@@ -263,7 +261,7 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
         jumps = int(counts[-1]) if used else jumps
         found += int(marked.sum())
         if marked.any():
-            steps_at_point = int(trajectory.run.count[codes.STEPS])
+            steps_at_point = int(trajectory.run.steps)
         bar.update(int(marked.sum()))
         record.used[:] = 0
         if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):

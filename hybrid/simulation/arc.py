@@ -93,30 +93,34 @@ class Jumps(Sequence[Jump]):
     """The jumps of an arc in order; ``jumps["impact"]`` are those of one transition.
 
     Each :class:`Jump` is made when it is looked at; the arrays hold all of them.
+
+    Attributes
+    ----------
+    transversality
+        As in :class:`Jump`, ``(jumps,)``.
     """
 
     system: HybridSystem
     _parameters: np.ndarray
     _period: float
-    _time: np.ndarray
-    _place: np.ndarray
+    _phase: np.ndarray
+    _cycle: np.ndarray
+    _transition: np.ndarray
+    transversality: np.ndarray
+    _kind: np.ndarray
+    _has_matrix: np.ndarray
     _states: np.ndarray
     _recorded: np.ndarray
 
     @cached_property
     def t(self) -> np.ndarray:
         """Times ``(jumps,)``."""
-        return self._place[:, 0] * self._period + self._time[:, 0]
-
-    @property
-    def transversality(self) -> np.ndarray:
-        """As in :class:`Jump`, ``(jumps,)``."""
-        return self._time[:, 1]
+        return self._cycle * self._period + self._phase
 
     @property
     def transition_index(self) -> np.ndarray:
         """Indices ``(jumps,)`` of the transitions in the system."""
-        return self._place[:, 1]
+        return self._transition
 
     @cached_property
     def transition(self) -> np.ndarray:
@@ -126,7 +130,7 @@ class Jumps(Sequence[Jump]):
     @cached_property
     def kind(self) -> np.ndarray:
         """As in :class:`Jump`, ``(jumps,)``."""
-        return np.array(KINDS)[self._place[:, 2]]
+        return np.array(KINDS)[self._kind]
 
     @property
     def x_minus(self) -> np.ndarray:
@@ -141,21 +145,21 @@ class Jumps(Sequence[Jump]):
     @cached_property
     def saltation(self) -> np.ndarray:
         """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
-        missing = np.flatnonzero(self._place[:, 3] == 0)
+        missing = np.flatnonzero(self._has_matrix == 0)
         if not missing.size:
             return self._recorded
-        fired, phases = self.transition_index[missing].tolist(), self._time[missing, 0].tolist()
+        fired, phases = self.transition_index[missing].tolist(), self._phase[missing].tolist()
         parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
         model = compile_system(self.system).model(parameters)
         matrices = np.empty((len(self), *self._recorded.shape[1:]))
-        matrices[self._place[:, 3] == 1] = self._recorded
+        matrices[self._has_matrix == 1] = self._recorded
         matrices[missing], _ = matrices_at(
             self.system, model, fired, phases, np.ascontiguousarray(self.x_minus[missing])
         )
         return matrices
 
     def __len__(self) -> int:
-        return len(self._place)
+        return len(self._phase)
 
     def __repr__(self) -> str:
         return f"<{len(self)} jumps>"
@@ -179,7 +183,7 @@ class Jumps(Sequence[Jump]):
 
     def _jump(self, i: int) -> Jump:
         transition = self.system.transitions[self.transition_index[i]]
-        kind = KINDS[self._place[i, 2]]
+        kind = KINDS[self._kind[i]]
         target = transition.accumulates_to if kind == "limit" else transition.target
         return Jump(
             float(self.t[i]),

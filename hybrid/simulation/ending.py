@@ -37,7 +37,7 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
 
 def _unproved(trajectory: Trajectory) -> Iterator[str]:
     """What is to be said of guards whose crossings are not proved."""
-    steps = trajectory.run.count.item(codes.UNPROVED)
+    steps = trajectory.run.unproved
     if not steps:
         return
     names = trajectory.system.transition_names
@@ -56,8 +56,8 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
 
 def _unresolved(trajectory: Trajectory) -> Iterator[str]:
     """What is to be said of steps on which the forcing could not be resolved."""
-    count = trajectory.run.count
-    steps = count.item(codes.UNRESOLVED) + count.item(codes.COARSE)
+    run = trajectory.run
+    steps = run.unresolved + run.coarse
     if steps:
         yield (
             f"On {steps} steps the forcing is not resolved: it changes, or its bounds are wide, over times "
@@ -69,9 +69,9 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     where = f"at t = {trajectory.t:.12g} in mode {trajectory.mode!r}"
     if code == StatusCode.INTERRUPTED:
         return run_status(code, where, None, bare_time=False)
-    count, jumps = trajectory.run.count.tolist(), trajectory.jumps
-    singular, ambiguous = count[codes.SINGULAR_JUMPS], count[codes.ORDER_MATTERED]
-    grazed = count[codes.ILL_CONDITIONED] if trajectory.tangents else 0
+    run, jumps = trajectory.run, trajectory.jumps
+    singular, ambiguous = run.singular_jumps, run.order_mattered
+    grazed = run.ill_conditioned if trajectory.tangents else 0
     if trajectory.tangents and singular:
         return Status(
             StatusCode.SINGULAR_SALTATION,
@@ -82,10 +82,10 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
         jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
         return discontinuous_status({mode: where for mode, where in jumping if where})
-    if trajectory.tangents and code == codes.DONE and count[codes.INDISTINCT]:
+    if trajectory.tangents and code == codes.DONE and run.indistinct:
         return Status(
             StatusCode.INDISTINCT_TANGENTS,
-            f"{count[codes.INDISTINCT]} times only rounding was left of what tells the tangent vectors "
+            f"{run.indistinct} times only rounding was left of what tells the tangent vectors "
             "apart; the exponents after the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
@@ -104,15 +104,15 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         fired = _round(trajectory)
         transitions = [trajectory.system.transitions[i] for i in fired]
         return stuck_status(where, transitions, _faces(trajectory, fired))
-    if code == codes.ACCUMULATION and not count[codes.AT_REST]:
-        return chatter_status(where, [names[i] for i in _recent(trajectory, count[codes.ROUND])])
-    last = count[codes.LAST_FIRED]
-    bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(count[codes.MODE]) == 1
+    if code == codes.ACCUMULATION and not run.at_rest:
+        return chatter_status(where, [names[i] for i in _recent(trajectory, run.round)])
+    last = run.last_fired
+    bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
     return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
 
 
 def _grazed(trajectory: Trajectory, grazed: int) -> Status:
-    largest = trajectory.run.clock[codes.LARGEST_SALTATION]
+    largest = trajectory.run.largest_saltation
     return Status(
         StatusCode.SUCCESS,
         f"Reached the end. {grazed} of {trajectory.jumps} jumps grazed within the tolerances: their "

@@ -57,7 +57,7 @@ def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any,
     if undefined != codes.NO_TRANSITION:
         raise ArgumentError(
             f"Transition {system.transition_names[undefined]!r}: the guard is {work.scalar[0]} at "
-            f"t = {run.clock[codes.PHASE]}, {_place(system, run)}. "
+            f"t = {run.phase}, {_place(system, run)}. "
             "A guard must be finite wherever its mode runs."
         )
     return verdicts.tolist()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -110,13 +110,13 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
 @lru_cache(MOST_LAYOUTS)
 def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
     """Where the arrays of a run lie."""
-    from hybrid.kernels.types.layout import Run
+    from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Run
     from hybrid.kernels.types.structure import Layout
 
     n = dimension
     shapes = {
-        "count": (codes.COUNTERS,),
-        "clock": (codes.CLOCKS,),
+        "counters": (len(COUNTERS),),
+        "numbers": (len(NUMBERS),),
         "y": (n * (1 + tangents),),
         "side": (transitions,),
         "on_guard": (transitions,),
@@ -136,18 +136,30 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
     return Layout(Run, shapes)
 
 
+@cache
+def _first_entries() -> tuple[np.ndarray, np.ndarray]:
+    """The named entries of a run that has no mode yet and has not jumped."""
+    from hybrid.kernels.types.layout import COUNTERS, NUMBERS
+
+    counters = dict.fromkeys(COUNTERS, 0) | {
+        "stage": codes.ENTERING,
+        "last_fired": codes.NO_TRANSITION,
+        "pending": codes.NO_TRANSITION,
+        "previous_mode": codes.NO_MODE,
+    }
+    numbers = dict.fromkeys(NUMBERS, 0.0) | {"last_jump_phase": np.nan}
+    return np.array(list(counters.values())), np.array(list(numbers.values()))
+
+
 def fresh_run(
     layout: Any, model: Any, state: np.ndarray, tangent: np.ndarray | None, t0: float
 ) -> tuple[Any, float]:
     """The run at its start, in no mode yet, and the phase of the start."""
     run, n = layout.zeros(), model.dimension
-    count, clock, y = run.count, run.clock, run.y
+    y = run.y
     cycle, phase = split_time(t0, model.period)
-    count[codes.CYCLE], clock[codes.PHASE] = cycle, phase
-    count[codes.PHASE_OF_RUN] = codes.ENTERING
-    for slot in (codes.LAST_FIRED, codes.PENDING, codes.PREVIOUS_MODE):
-        count[slot] = codes.NO_TRANSITION
-    clock[codes.LAST_JUMP_PHASE] = np.nan
+    run.counters[:], run.numbers[:] = _first_entries()
+    run.cycle, run.phase = cycle, phase
     y[:n] = state
     if tangent is not None:
         y[n:] = tangent.T.ravel()

@@ -36,12 +36,14 @@ def check_solver(solver: object) -> Solver:
 class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
-    ``model`` is that at the default parameters. ``propagators`` says how each mode is advanced, by its name;
-    ``degree`` is that of a record's steps.
+    ``task`` lacks only what a run has for itself. ``model`` is that at the default parameters.
+    ``propagators`` says how each mode is advanced, by the name of the mode; ``degree`` is that of the steps
+    in a record.
     """
 
     method: Any
     parts: Any
+    task: Any
     model: Any
     propagators: dict[str, str]
     degree: int
@@ -57,25 +59,41 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int) -> Plan:
         load_kernels("hybrid.kernels.events.initial_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
         kinds = propagator_kinds(compiled, solver)
+        parts, attempts = driver_parts(
+            codes.RUNGE_KUTTA not in kinds, solver.attempt, bool(compiled.emitted.forcing_component)
+        )
+        model = compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64))
+        columns, rows = compiled.series_columns(tangents), compiled.emitted.programs.longest
         plan = Plan(
             method,
-            driver_parts(
-                codes.RUNGE_KUTTA not in kinds,
-                solver.attempt,
-                bool(compiled.emitted.forcing_component),
-            ),
-            compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64)),
+            parts,
+            _task(attempts, model, method, tangents),
+            model,
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),
             run_layout(n, tangents, modes, transitions),
-            work_layout(
-                method, n, tangents, compiled.series_columns(tangents), compiled.emitted.programs.longest
-            ),
+            work_layout(method, n, tangents, columns, rows),
         )
         while len(compiled.plans) >= MOST_LAYOUTS:
             compiled.plans.pop(next(iter(compiled.plans)), None)
         compiled.plans[solver, tangents] = plan
     return plan
+
+
+def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:
+    """What the driver works on, without the memory of any run."""
+    from hybrid.kernels.types.layout import Task
+
+    return Task(
+        attempts=attempts,
+        model=model,
+        method=method,
+        run=Absent(),
+        record=Absent(),
+        work=Absent(),
+        tangents=tangents,
+        orthonormal=0,
+    )
 
 
 @lru_cache(MOST_LAYOUTS)
@@ -106,7 +124,7 @@ def kernel_method(solver: Solver) -> Any:
 
 
 @cache
-def driver_parts(series_only: bool, attempt: tuple[str, str], forced: bool) -> Any:
+def driver_parts(series_only: bool, attempt: tuple[str, str], forced: bool) -> tuple[Any, Any]:
     """The pieces that the driver is handed; what the run does not need is not loaded."""
     from hybrid.kernels.types.layout import Attempts, Parts
 
@@ -120,12 +138,7 @@ def driver_parts(series_only: bool, attempt: tuple[str, str], forced: bool) -> A
     if forced:
         forcing = load_kernels("hybrid.kernels.steps.forcing")
         explained_step, explained_series = map(address, (forcing.explained_step, forcing.explained_series))
-    return Parts(
-        attempts=Attempts(
-            attempt_implicit=address(vars(load_kernels(module))[name]),
-            explained_step=explained_step,
-            explained_series=explained_series,
-        ),
+    parts = Parts(
         runge_kutta_step=address(step),
         enter=address(corners.enter),
         jump=address(jumps.jump),
@@ -133,6 +146,12 @@ def driver_parts(series_only: bool, attempt: tuple[str, str], forced: bool) -> A
         rest=address(jumps.rest),
         first_in_order=address(corners.first_in_order),
     )
+    attempts = Attempts(
+        attempt_implicit=address(vars(load_kernels(module))[name]),
+        explained_step=explained_step,
+        explained_series=explained_series,
+    )
+    return parts, attempts
 
 
 def propagator_kinds(compiled: CompiledSystem, solver: Solver) -> list[int]:

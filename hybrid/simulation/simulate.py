@@ -137,11 +137,11 @@ class _Recorder:
                     code = (
                         StatusCode.INTERRUPTED if trajectory.stop.is_set() else self._advance(t1, max_jumps)
                     )
-        model, system, count = trajectory.model, trajectory.system, run.count.tolist()
+        model, system = trajectory.model, trajectory.system
         columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
         jumps = Jumps(system, model.parameters, model.period, *columns)
         t_end = t1 if code == codes.DONE else trajectory.t
-        end = (t_end, trajectory.x, count[codes.MODE])
+        end = (t_end, trajectory.x, run.mode)
         pieces = None
         if self.times is None:
             pieces = Pieces(*join(self.steps))
@@ -162,8 +162,8 @@ class _Recorder:
             status_of(trajectory, code),
             trajectory.tangent_matrix if trajectory.tangents else None,
             trajectory.plan.propagators.copy(),
-            count[codes.STEPS],
-            count[codes.REJECTED],
+            run.steps,
+            run.rejected,
             pieces,
         )
 
@@ -217,9 +217,9 @@ def _places_of_steps(
     record: Any, used: int, period: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Start in two parts, length, mode and jump count of the steps in a record."""
-    cycle, mode, j = record.step_place[:used].T
-    phase, h, low = record.step_time[:used].T
-    return cycle * period + phase, low.copy(), h.copy(), mode.copy(), j.copy()
+    phase, low, length = record.step_time[:used].T.copy()
+    cycle, mode, jumps = record.step_place[:used].T.copy()
+    return cycle * period + phase, low, length, mode, jumps
 
 
 @cache
@@ -229,15 +229,17 @@ def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
 
 
 def _jump_columns(record: Any, used: int, matrices: int) -> tuple[np.ndarray, ...]:
-    columns = record.jump_time, record.jump_place, record.jump_states
-    return (*(column[:used].copy() for column in columns), record.jump_saltation[:matrices].copy())
+    phase, transversality = record.jump_time[:used].T.copy()
+    cycle, transition, kind, has_matrix = record.jump_place[:used].T.copy()
+    states, saltation = record.jump_states[:used].copy(), record.jump_saltation[:matrices].copy()
+    return phase, cycle, transition, transversality, kind, has_matrix, states, saltation
 
 
 def _grazings(system: HybridSystem, record: Any, used: int, period: float) -> list[Grazing]:
-    cycle, transition, j = record.grazing_place[:used].T
     phase, value, acceleration = record.grazing_time[:used].T
+    cycle, transition, jumps = record.grazing_place[:used].T
     x = record.grazing_state[:used].copy()
-    columns = cycle * period + phase, j, transition, x, value, acceleration
+    columns = cycle * period + phase, jumps, transition, x, value, acceleration
     return [
         Grazing(float(t), int(j), system.transition_names[transition], x, float(value), float(acceleration))
         for t, j, transition, x, value, acceleration in zip(*columns, strict=True)

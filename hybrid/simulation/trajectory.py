@@ -50,7 +50,7 @@ def start(
     check_time(time, t0, model.period)
     run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
     work = fresh_work(plan.work_layout, plan.method)
-    run.count[codes.MODE], beyond = choose_mode(system, plan.parts, model, run, work, mode)
+    run.mode, beyond = choose_mode(system, plan.parts, model, run, work, mode)
     return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond, stop)
 
 
@@ -91,7 +91,7 @@ class Trajectory:
     def t(self) -> float:
         """Current time."""
         run = self.run
-        return run.count.item(codes.CYCLE) * self.model.period + run.clock.item(codes.PHASE)
+        return run.cycle * self.model.period + run.phase
 
     @property
     def x(self) -> np.ndarray:
@@ -101,17 +101,17 @@ class Trajectory:
     @property
     def mode(self) -> str:
         """Current mode."""
-        return self.system.mode_names[self.run.count[codes.MODE]]
+        return self.system.mode_names[self.run.mode]
 
     @property
     def jumps(self) -> int:
         """Jumps so far."""
-        return int(self.run.count[codes.JUMPS])
+        return int(self.run.jumps)
 
     @property
     def steps(self) -> int:
         """Steps tried so far."""
-        return int(self.run.count.item(codes.STEPS))
+        return int(self.run.steps)
 
     @property
     def tangent_matrix(self) -> np.ndarray:
@@ -122,15 +122,15 @@ class Trajectory:
     def replace_tangents(self, matrix: np.ndarray) -> None:
         """Go on with other tangent vectors, the columns of ``(n, k)``."""
         self.run.y[self.model.dimension :] = matrix.T.ravel()
-        if self.run.count[codes.PHASE_OF_RUN] == codes.READY:
-            self.run.count[codes.PHASE_OF_RUN] = codes.STALE
+        if self.run.stage == codes.READY:
+            self.run.stage = codes.STALE
 
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
         from hybrid.kernels.steps.step import flow_jacobian
 
         run, n = self.run, self.model.dimension
-        flow_jacobian(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, self.work.jacobian)
+        flow_jacobian(self.model, run.mode, run.phase, run.y, self.work.jacobian)
         return self.work.jacobian[:, :n].copy()
 
     def field(self) -> np.ndarray:
@@ -138,7 +138,7 @@ class Trajectory:
         from hybrid.kernels.steps.step import field
 
         run, out = self.run, np.empty(self.model.dimension)
-        field(self.model, run.count[codes.MODE], run.clock[codes.PHASE], run.y, out)
+        field(self.model, run.mode, run.phase, run.y, out)
         return out
 
     def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:
@@ -176,20 +176,23 @@ class Trajectory:
     def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
         return int(
             entry(load_kernels().advance)(
-                self.plan.parts,
-                self.model,
-                self.plan.method,
-                self.run,
-                record,
-                self.tangents,
-                False,
-                cycle,
-                phase,
-                max_steps,
-                max_jumps,
-                self.work,
+                self.plan.parts, self.task(record), cycle, phase, max_steps, max_jumps
             )
         )
+
+    def task(self, record: Any, *, orthonormal: bool = False, tangents: bool = True) -> Any:
+        """What the driver works on: this run and a record, perhaps without the tangent vectors.
+
+        With ``orthonormal`` these are orthonormalised whenever they come too close to each other.
+        """
+        changes: dict[str, Any] = {"run": self.run, "record": record, "work": self.work}
+        if self.model is not self.plan.model:
+            changes["model"] = self.model
+        if orthonormal:
+            changes["orthonormal"] = 1
+        if not tangents:
+            changes["tangents"] = 0
+        return self.plan.task.replace(**changes)
 
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""

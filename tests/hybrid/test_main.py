@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import hybrid.__main__ as command
+from hybrid import solvers
 from hybrid.compiler.cache.loader import ALL_KERNELS, DRIVER, EVENTS
 
 SOURCES = Path(command.__file__).parents[1]
@@ -19,7 +20,8 @@ def empty_cache(tmp_path, monkeypatch):
 
 
 def test_every_module_of_kernels_that_is_loaded_is_compiled_ahead():
-    loaded = {DRIVER, *EVENTS}
+    methods = (getattr(solvers, name) for name in solvers.__all__)
+    loaded = {DRIVER, *EVENTS, *(method.attempt[0] for method in methods)}
     for folder in ("hybrid", "lyapunov"):
         for path in (SOURCES / folder).rglob("*.py"):
             loaded |= set(re.findall(r'load_kernels\("([\w.]+)"\)', path.read_text(encoding="utf-8")))

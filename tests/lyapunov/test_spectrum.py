@@ -378,7 +378,7 @@ def test_rates_are_evaluated_anew_after_each_orthonormalisation():
 def test_vectors_that_only_rounding_tells_apart_are_reported():
     system = models.impact_oscillator()
     trajectory = hybrid.simulation.trajectory.start(system, (0.0, 0.0), 0.0, tangent=np.eye(2))
-    trajectory.run.count[hybrid.kernels.types.codes.INDISTINCT] = 2
+    trajectory.run.indistinct = 2
     status = status_of(trajectory, hybrid.kernels.types.codes.DONE)
     assert status.code == hybrid.StatusCode.INDISTINCT_TANGENTS
     assert "2 times only rounding was left" in status.message

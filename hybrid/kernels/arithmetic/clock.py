@@ -9,7 +9,6 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.types.codes import CYCLE, PHASE, PHASE_LOW, SINCE_ENTRY
 from hybrid.kernels.types.layout import INLINE, KERNEL
 
 # What a sum loses is found by sums in the order in which they are written.
@@ -29,26 +28,26 @@ def time_left(model, run, stop_cycle, stop_phase):
     """Time until the stop; periods are counted, not measured, so that none of their digits is lost."""
     if not stop_phase < math.inf:
         return stop_phase
-    left, lost = sum_in_two_parts(stop_phase, -run.clock[PHASE])
-    return (stop_cycle - run.count[CYCLE]) * model.period + (left + (lost - run.clock[PHASE_LOW]))
+    left, lost = sum_in_two_parts(stop_phase, -run.phase)
+    return (stop_cycle - run.cycle) * model.period + (left + (lost - run.phase_low))
 
 
 @njit(**IN_ORDER)
 def forward(run, period, span):
     """Move the clock of a run on, keeping the phase below the period."""
-    phase, lost = sum_in_two_parts(run.clock[PHASE], span)
-    phase, low = sum_in_two_parts(phase, lost + run.clock[PHASE_LOW])
+    phase, lost = sum_in_two_parts(run.phase, span)
+    phase, low = sum_in_two_parts(phase, lost + run.phase_low)
     while period > 0.0 and phase >= period:
         phase, low = sum_in_two_parts(phase - period, low)
-        run.count[CYCLE] += 1
-    run.clock[PHASE], run.clock[PHASE_LOW] = phase, low
+        run.cycle += 1
+    run.phase, run.phase_low = phase, low
 
 
 @njit(**KERNEL)
 def set_clock(run, cycle, phase):
     """Put the clock of a run to a number of whole periods and a phase."""
-    run.count[CYCLE] = cycle
-    run.clock[PHASE], run.clock[PHASE_LOW] = phase, 0.0
+    run.cycle = cycle
+    run.phase, run.phase_low = phase, 0.0
 
 
 @njit(**INLINE)
@@ -58,4 +57,4 @@ def measured_time(model, run, mode):
     It is the phase where the field of the mode or one of its guards depends on time. Where they do not, it is
     the time since the last jump.
     """
-    return abs(run.clock[PHASE]) if model.timed[mode] == 1 else run.clock[SINCE_ENTRY]
+    return abs(run.phase) if model.timed[mode] == 1 else run.since_entry

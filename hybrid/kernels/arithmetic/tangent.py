@@ -7,13 +7,9 @@ from numba import njit
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
-    INDISTINCT,
-    PHASE_OF_RUN,
     READY,
     RUNGE_KUTTA,
     STALE,
-    STRAIN,
-    UNCHECKED,
 )
 from hybrid.kernels.types.layout import KERNEL
 
@@ -121,17 +117,17 @@ def keep_apart(model, run, mode, tangents, gram):
         closest = CLOSE_IN_RUNGE_KUTTA
     elif kind == DESINGULARISED:
         steps = STEPS_IN_CONTACT
-    run.count[UNCHECKED] += 1
-    if run.count[UNCHECKED] < steps:
+    run.unchecked += 1
+    if run.unchecked < steps:
         return
-    run.count[UNCHECKED] = 0
+    run.unchecked = 0
     n = model.dimension
     if independence(run.y, n, tangents, gram) > closest:
         return
-    run.count[INDISTINCT] += orthonormalise(run.y, n, tangents, run.growth, 0.0)
-    run.clock[STRAIN] = 0.0
-    if run.count[PHASE_OF_RUN] == READY:
-        run.count[PHASE_OF_RUN] = STALE
+    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    run.strain = 0.0
+    if run.stage == READY:
+        run.stage = STALE
 
 
 @njit(**KERNEL)

@@ -15,16 +15,12 @@ from hybrid.kernels.events.guards import error_band, guard_value, has_program, r
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.types.codes import (
-    GRAZING_GUARD,
-    GRAZING_PLACE,
-    GRAZING_VALUE,
     HIGH,
     HIGH_MIDDLE,
     LEAST_SLOPE,
     LOW,
     LOW_MIDDLE,
     MOST_SLOPE,
-    UNPROVED,
 )
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
@@ -212,9 +208,9 @@ def _tolerated(model, method, run, transition, path, order, clock, start, pace, 
 @njit(**KERNEL)
 def _note_touch(run, transition, place, value, length):
     """Keep the earliest touch of the step."""
-    if 0.0 < place < length and place / length < run.clock[GRAZING_PLACE]:
-        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = place / length, value
-        run.count[GRAZING_GUARD] = transition
+    if 0.0 < place < length and place / length < run.grazing_place:
+        run.grazing_place, run.grazing_value = place / length, value
+        run.grazing_guard = transition
 
 
 @njit(**KERNEL)
@@ -291,7 +287,7 @@ def first_change(
                 continue
             if low > SMALL_SHARE * length:
                 return NOWHERE, side, low
-            run.count[UNPROVED] += 1
+            run.unproved += 1
         turn = high
         if smooth and not monotone:
             turn = _turn_between(
@@ -361,7 +357,7 @@ def first_change(
 @njit(**KERNEL)
 def sampled_change(model, run, transition, path, order, clock, start, pace, length, side, on_guard, work):
     """As ``first_change`` for a guard that could not be traced: it is looked at in some places only."""
-    run.count[UNPROVED] += 1
+    run.unproved += 1
     direction, low = model.direction[transition], 0.0
     for i in range(1, SAMPLES + 1):
         high = length * i / SAMPLES

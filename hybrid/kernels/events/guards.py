@@ -5,15 +5,6 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import lowest
-from hybrid.kernels.types.codes import (
-    CYCLE,
-    GRAZING_GUARD,
-    GRAZING_PLACE,
-    GRAZING_VALUE,
-    GRAZINGS,
-    JUMPS,
-    MODE,
-)
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
 # Share of a component's size, in units of rounding, that rounding may have changed it by.
@@ -135,7 +126,7 @@ def sides_at(model, run, t, work):
     A guard that is zero there has not been crossed yet: it keeps the side it had before, and has none if the
     next step has to show it.
     """
-    mode = run.count[MODE]
+    mode = run.mode
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         direction = model.direction[transition]
@@ -208,9 +199,9 @@ def note_grazing(run, transition, degree, side, band, work):
     ``work.polynomial`` is the guard on the step.
     """
     theta, value = lowest(work.polynomial, degree, side, work.stack)
-    if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.clock[GRAZING_PLACE]:
-        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, value
-        run.count[GRAZING_GUARD] = transition
+    if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.grazing_place:
+        run.grazing_place, run.grazing_value = theta, value
+        run.grazing_guard = transition
 
 
 @njit(**KERNEL)
@@ -246,17 +237,19 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
 @njit(**KERNEL)
 def keep_grazing(model, run, record, transition, t, x, value, work):
     """Count a touch of a guard at the state ``x (n,)``, and write it into the record if that keeps any."""
-    run.count[GRAZINGS] += 1
-    slot, mode = record.used[2], run.count[MODE]
-    if slot == record.grazing_time.shape[0]:
+    run.grazings += 1
+    slot, mode = record.grazings, run.mode
+    if slot == record.grazing_phase.shape[0]:
         return
     for i in range(model.dimension):
         record.grazing_state[slot, i] = x[i]
     place = record.grazing_state[slot]
     model.flow(mode, t, place, model.parameters, work.field)
     guard_speed(model, transition, t, place, work.field, work.gradient)
-    record.grazing_time[slot, 0], record.grazing_time[slot, 1] = t, value
-    record.grazing_time[slot, 2] = guard_acceleration(model, run, transition, mode, t, place, work)
-    record.grazing_place[slot, 0], record.grazing_place[slot, 1] = run.count[CYCLE], transition
-    record.grazing_place[slot, 2] = run.count[JUMPS]
-    record.used[2] = slot + 1
+    record.grazing_phase[slot] = t
+    record.grazing_cycle[slot] = run.cycle
+    record.grazing_transition[slot] = transition
+    record.grazing_jumps[slot] = run.jumps
+    record.grazing_value[slot] = value
+    record.grazing_acceleration[slot] = guard_acceleration(model, run, transition, mode, t, place, work)
+    record.grazings = slot + 1

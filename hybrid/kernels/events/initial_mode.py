@@ -5,7 +5,7 @@ import math
 from numba import int64, njit
 
 from hybrid.kernels.events.guards import allowed, guard_value
-from hybrid.kernels.types.codes import BEYOND, LEAVES, MODE, NO_OBJECTION, NO_TRANSITION, PHASE
+from hybrid.kernels.types.codes import BEYOND, LEAVES, NO_OBJECTION, NO_TRANSITION
 from hybrid.kernels.types.layout import ENTRY, INDICES, MODEL, PARTS, RUN, WORK
 
 
@@ -16,9 +16,9 @@ def try_modes(parts, model, run, work, first, stop, verdicts):
     What each of their guards says of it goes to ``verdicts (transitions,)``, which is zero before. Returns
     the first transition whose guard is not finite, its value in ``work.scalar``, or NO_TRANSITION.
     """
-    t = run.clock[PHASE]
+    t = run.phase
     for mode in range(first, stop):
-        run.count[MODE] = mode
+        run.mode = mode
         fires = parts.enter(model, run, work)
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
             transition = model.outgoing[slot]

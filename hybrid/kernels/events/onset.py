@@ -20,7 +20,6 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.types.codes import LAST_FIRED, SINCE_ENTRY
 from hybrid.kernels.types.layout import INLINE
 
 # Orders of a guard that is zero: its speed says on which side it leaves, its acceleration, or the next step.
@@ -55,4 +54,4 @@ def side_is_certain(on_guard, least_slope, most_slope):
 @njit(**INLINE)
 def has_just_fired(run, transition, on_guard):
     """Whether the state stands on the guard, which has led here: no time has passed since."""
-    return on_guard > 0 and run.count[LAST_FIRED] == transition and run.clock[SINCE_ENTRY] == 0.0
+    return on_guard > 0 and run.last_fired == transition and run.since_entry == 0.0

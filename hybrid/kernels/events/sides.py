@@ -15,7 +15,7 @@ from hybrid.kernels.events.guards import (
     speed_rounding,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
-from hybrid.kernels.types.codes import LAST_TRANSVERSALITY, NO_TRANSITION, RESTING
+from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
 from hybrid.kernels.types.layout import KERNEL
 
 # How the state came to the point: a run starts there, the flow led there, or a reset put it there.
@@ -176,7 +176,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         flat = (
             own
             and order == BY_STEP
-            and abs(run.clock[LAST_TRANSVERSALITY]) <= speed_rounding(model, run, mode, t, work)
+            and abs(run.last_transversality) <= speed_rounding(model, run, mode, t, work)
         )
         side[transition], zero[transition] = 0 if flat else now, order
         due[transition] = 1 if crossed or pending else 0

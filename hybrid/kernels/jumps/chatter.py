@@ -7,16 +7,6 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
 from hybrid.kernels.jumps.rounds import fired_before
-from hybrid.kernels.types.codes import (
-    CHATTER_JUMPS,
-    CHATTERING,
-    JUMPS,
-    LAST_FIRED,
-    LAST_TRANSVERSALITY,
-    MODE,
-    PHASE,
-    RESTITUTION,
-)
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
 # Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
@@ -46,7 +36,7 @@ def far_side(model, run, transition):
     """The side of its guard on which the transition that has just fired found the state."""
     if model.direction[transition] != 0:
         return model.direction[transition]
-    return 1 if run.clock[LAST_TRANSVERSALITY] > 0.0 else -1
+    return 1 if run.last_transversality > 0.0 else -1
 
 
 @njit(**KERNEL)
@@ -56,9 +46,9 @@ def remaining_chatter(model, run, transition, speed, work):
     The acceleration ``a`` towards the guard is taken here, ``r`` is the restitution of the jump just made.
     Zero if the flights do not shrink or nothing pulls the state back.
     """
-    ratio = run.clock[RESTITUTION]
+    ratio = run.restitution
     pull = far_side(model, run, transition) * guard_acceleration(
-        model, run, transition, run.count[MODE], run.clock[PHASE], run.y, work
+        model, run, transition, run.mode, run.phase, run.y, work
     )
     if not (0.0 < ratio < 1.0 and pull > 0.0):
         return 0.0
@@ -72,7 +62,7 @@ def mean_field(model, run, transition, t, x, out, work):
     ``a`` is the guard's acceleration and ``p`` the impulse per unit of the guard's speed: the impulses give
     back the speed that the pull takes.
     """
-    mode = run.count[MODE]
+    mode = run.mode
     model.flow(mode, t, x, model.parameters, work.field)
     guard_speed(model, transition, t, x, work.field, work.gradient)
     acceleration = guard_acceleration(model, run, transition, mode, t, x, work)
@@ -88,7 +78,7 @@ def follow_mean(model, run, transition, speed, span, work):
     ``speed`` is the guard's, with its sign. The error is of third order in it where pull and impulse are
     constant, and one step of the classical Runge-Kutta method follows the mean field.
     """
-    n, t = model.dimension, run.clock[PHASE]
+    n, t = model.dimension, run.phase
     start, place, slope = work.trial, work.error, work.new
     for i in range(n):
         start[i] = run.y[i] - speed * run.trail[IMPULSE, i]
@@ -109,7 +99,7 @@ def change_of_limit_time(model, method, run, gain, shift, span):
 
     Judged from the change since the jump before, by ``shift``, of which they will still make ``gain`` times.
     """
-    rounding = 8.0 * EPSILON * measured_time(model, run, run.count[MODE])
+    rounding = 8.0 * EPSILON * measured_time(model, run, run.mode)
     return gain * abs(shift) / (method.rtol * span + rounding)
 
 
@@ -134,30 +124,30 @@ def accumulation(model, method, run, transition, since_last, work):
     goes to ``work.settled``.
     """
     n = model.dimension
-    model.flow(run.count[MODE], run.clock[PHASE], run.y, model.parameters, work.field)
-    speed = guard_speed(model, transition, run.clock[PHASE], run.y, work.field, work.gradient)
+    model.flow(run.mode, run.phase, run.y, model.parameters, work.field)
+    speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient)
     side = -far_side(model, run, transition)
     speed *= side
-    value = guard_value(model, transition, run.clock[PHASE], run.y, work.scalar)
-    band = rounding_band(model, run, transition, run.clock[PHASE], run.y, work)
+    value = guard_value(model, transition, run.phase, run.y, work.scalar)
+    band = rounding_band(model, run, transition, run.phase, run.y, work)
     span, found = 0.0, False
     # A reset that leaves the guard begins no chatter.
     if abs(value) <= band:
         span = remaining_chatter(model, run, transition, speed, work)
     if not span > 0.0:
-        run.count[CHATTERING] = 0
+        run.chattering = 0
         return 0.0
-    consecutive = run.count[CHATTER_JUMPS] + 1 == run.count[JUMPS] and run.count[CHATTERING] > 0
+    consecutive = run.chatter_jumps + 1 == run.jumps and run.chattering > 0
     if consecutive and fired_before(run, 1) == transition:
-        ratio = run.clock[RESTITUTION]
+        ratio = run.restitution
         # The flight that has ended, and the speed after it, in the series with the ratio of this impact.
         flight, slower = run.trail[LIMIT, n] * (1.0 - ratio), ratio * run.trail[BEFORE, n]
-        steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.clock[PHASE])
+        steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.phase)
         steady = steady and abs(speed - slower) <= STEADY * slower
         # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
         height = 0.25 * speed * span * (1.0 - ratio)
         drowned = steady and height <= band
-        shallow = height <= SHALLOW * band or run.count[CHATTERING] >= FEWEST_JUMPS
+        shallow = height <= SHALLOW * band or run.chattering >= FEWEST_JUMPS
         shift = span - (run.trail[LIMIT, n] - since_last)
         # The change is of second order in the speed, which each jump multiplies by the ratio.
         gain = ratio * ratio / (1.0 - ratio * ratio)
@@ -173,12 +163,12 @@ def accumulation(model, method, run, transition, since_last, work):
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
         found = drowned or (shallow and (misfit <= 1.0 or floor))
         run.trail[IMPULSE, n] = misfit
-        run.count[CHATTERING] += 1
+        run.chattering += 1
     else:
-        run.count[CHATTERING] = 1
+        run.chattering = 1
         run.trail[LIMIT, 0], run.trail[IMPULSE, n] = math.inf, math.inf
     run.trail[LIMIT, n], run.trail[BEFORE, n] = span, speed
-    run.count[CHATTER_JUMPS] = run.count[JUMPS]
+    run.chatter_jumps = run.jumps
     return span if found else 0.0
 
 
@@ -186,8 +176,8 @@ def accumulation(model, method, run, transition, since_last, work):
 def remember_impulse(model, run, transition, transversality, work):
     """Keep the restitution of the jump to ``work.new``, and its direction per unit of speed."""
     n = model.dimension
-    after = guard_speed(model, transition, run.clock[PHASE], work.new, work.field_after, work.gradient)
-    run.clock[RESTITUTION] = -after / transversality
+    after = guard_speed(model, transition, run.phase, work.new, work.field_after, work.gradient)
+    run.restitution = -after / transversality
     for i in range(n):
         change = work.new[i] - run.y[i]
         # A reset that puts the state back on the guard only takes away the rounding of the landing.
@@ -237,8 +227,8 @@ def chatter_matrix(model, run, transition, work):
     n = model.dimension
     slope, carried = work.error, work.second_error
     impulse = run.trail[IMPULSE]
-    speed_gradient(model, run, transition, run.count[MODE], run.clock[PHASE], run.y, slope, work)
-    model.guard_gradient(transition, run.clock[PHASE], run.y, model.parameters, work.gradient)
+    speed_gradient(model, run, transition, run.mode, run.phase, run.y, slope, work)
+    model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
     coupling = 0.0
     for i in range(n):
         carried[i] = 0.0
@@ -274,7 +264,7 @@ def along_mean(model, run, transition, t, x, direction, out, work):
 @njit(**KERNEL)
 def drift_with_mean(model, run, transition, span, work):
     """Carry the columns of ``work.saltation`` along the mean field for a short time, to its second order."""
-    n, t = model.dimension, run.clock[PHASE] + 0.5 * span
+    n, t = model.dimension, run.phase + 0.5 * span
     middle, column, image = work.trial, work.error, work.second_error
     for i in range(n):
         middle[i] = 0.5 * (run.y[i] + work.settled[i])
@@ -299,9 +289,9 @@ def add_change_of_duration(model, method, run, target, span, work):
     through its energy; its derivative, that of the instant of the limit, goes to ``run.instant``. To be
     called after ``chatter_matrix``, whose slope and gradient it uses.
     """
-    n, transition = model.dimension, run.count[LAST_FIRED]
-    ratio, speed = run.clock[RESTITUTION], run.trail[BEFORE, n]
-    limit, side = run.clock[PHASE] + span, -far_side(model, run, transition)
+    n, transition = model.dimension, run.last_fired
+    ratio, speed = run.restitution, run.trail[BEFORE, n]
+    limit, side = run.phase + span, -far_side(model, run, transition)
     mean = work.trial
     pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
     model.flow(target, limit, work.settled, model.parameters, work.field_after)
@@ -350,7 +340,7 @@ def drift_is_known(model, run, target, span, work):
     It is where that Jacobian does not change until the limit in ``work.settled``, or changes too little to
     matter. The Jacobian at the limit is left in ``work.jacobian``.
     """
-    n, t = model.dimension, run.clock[PHASE]
+    n, t = model.dimension, run.phase
     model.flow_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
     model.flow_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
     constant = True

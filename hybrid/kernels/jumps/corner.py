@@ -16,22 +16,12 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.onset import BY_SPEED, JUMPING
 from hybrid.kernels.events.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 from hybrid.kernels.types.codes import (
-    JUMPS,
-    LAST_FIRED,
-    LAST_STEP,
-    LOCKED,
-    MODE,
     NO_MODE,
     NO_TRANSITION,
-    ORDER_MATTERED,
-    PHASE,
-    PHASE_OF_RUN,
-    PREVIOUS_MODE,
-    SIMULTANEOUS,
     STALE,
-    STEPS,
 )
-from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, RECORD, RUN, WORK
+from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, RUN, TASK, WORK
+from hybrid.kernels.types.task import task_of
 
 MOST_JUMPS = 50
 # States that differ by less than this, relative to their sizes, came out the same.
@@ -45,20 +35,20 @@ def enter(model, run, work):
     One whose guard a reset has taken the state beyond is locked to this instant, not to its guard.
     Transitions that only the start of a run fires come before all others.
     """
-    mode, t, left = run.count[MODE], run.clock[PHASE], run.count[PREVIOUS_MODE]
-    if run.count[STEPS] == 0:
+    mode, t, left = run.mode, run.phase, run.previous_mode
+    if run.steps == 0:
         model.flow(mode, t, run.y, model.parameters, work.field)
         widen_scale(model, run, work)
     came = STARTED if left == NO_MODE else LANDED
-    fired = run.count[LAST_FIRED] if run.count[JUMPS] > 0 else NO_TRANSITION
+    fired = run.last_fired if run.jumps > 0 else NO_TRANSITION
     fires = take_sides(model, run, mode, t, run.y, came, left, fired, run.side, run.due, run.on_guard, work)
     excluded = beyond_at_start(model, run, mode, t, work) if came == STARTED else NO_TRANSITION
     if excluded != NO_TRANSITION:
-        run.count[LOCKED] = 1
+        run.locked = 1
         return excluded
-    run.count[LOCKED] = 0
+    run.locked = 0
     if fires >= 0:
-        run.count[LOCKED] = 1 if run.on_guard[fires] == 0 else 0
+        run.locked = 1 if run.on_guard[fires] == 0 else 0
     else:
         end_instant(model, mode, run.due)
     return fires
@@ -67,8 +57,8 @@ def enter(model, run, work):
 @njit(**KERNEL)
 def settle(model, run, first, out, work):
     """State ``(n,)`` after ``first`` and all that it sets off at the same instant; returns the mode."""
-    n, t = model.dimension, run.clock[PHASE]
-    mode, fired = run.count[MODE], first
+    n, t = model.dimension, run.phase
+    mode, fired = run.mode, first
     side, due, zero = run.rehearsal[0], run.rehearsal[1], run.rehearsal[2]
     for i in range(side.shape[0]):
         side[i], due[i], zero[i] = run.side[i], run.due[i], run.on_guard[i]
@@ -115,7 +105,7 @@ def turns_back(model, run, transition, before, work):
     """
     if run.on_guard[transition] == BY_SPEED and run.side[transition] != before:
         return False
-    mode, t = run.count[MODE], run.clock[PHASE]
+    mode, t = run.mode, run.phase
     model.flow(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     if abs(speed) > speed_rounding(model, run, mode, t, work):
@@ -124,8 +114,8 @@ def turns_back(model, run, transition, before, work):
     return acceleration * before > acceleration_rounding(model, run, t, work)
 
 
-@njit(int64(MODEL, RUN, RECORD, int64, WORK), **PART)
-def first_in_order(model, run, record, fired, work):
+@njit(int64(TASK, int64), **PART)
+def first_in_order(task, fired):
     """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
 
     Notes whether order matters. None if ``fired`` may not fire or has only touched, and no other is due: the
@@ -133,7 +123,8 @@ def first_in_order(model, run, record, fired, work):
     rounding alone, so its side is left to the next step: the crossing is behind, and cannot be found where it
     was refused.
     """
-    mode, t, before = run.count[MODE], run.clock[PHASE], run.side[fired]
+    _, model, _, run, record, work = task_of(task)
+    mode, t, before = run.mode, run.phase, run.side[fired]
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
     direction = model.direction[fired]
     # A guard that is not affine has been proved to change its sign here.
@@ -165,8 +156,8 @@ def first_in_order(model, run, record, fired, work):
             first = other
         elif not matters:
             matters = order_matters(model, run, first, other, work)
-    run.count[SIMULTANEOUS] += 1 if together > 1 else 0
-    run.count[ORDER_MATTERED] += 1 if matters else 0
+    run.simultaneous += 1 if together > 1 else 0
+    run.order_mattered += 1 if matters else 0
     if touched or chosen == NO_TRANSITION:
         run.side[fired] = 0
     if chosen == NO_TRANSITION:
@@ -174,5 +165,5 @@ def first_in_order(model, run, record, fired, work):
             other = model.outgoing[slot]
             if run.due[other] == 1:
                 run.side[other], run.due[other] = 0, 0
-        run.count[PHASE_OF_RUN], run.clock[LAST_STEP] = STALE, 0.0
+        run.stage, run.last_step = STALE, 0.0
     return chosen

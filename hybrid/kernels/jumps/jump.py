@@ -41,38 +41,15 @@ from hybrid.kernels.jumps.locked import (
 )
 from hybrid.kernels.jumps.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
 from hybrid.kernels.types.codes import (
-    CHATTERING,
-    CYCLE,
     ENTERING,
     GRAZING,
-    ILL_CONDITIONED,
-    ILL_CONDITIONED_GROWTH,
-    JUMPS,
-    JUMPS_HERE,
-    LARGEST_SALTATION,
-    LAST_FIRED,
-    LAST_JUMP_CYCLE,
-    LAST_JUMP_PHASE,
-    LAST_KIND,
-    LAST_TRANSVERSALITY,
     LIMIT_OF_CHATTER,
-    LOCKED,
-    LOG_DETERMINANT,
-    MAP_IS_KNOWN,
-    MODE,
     NO_MODE,
     NO_TRANSITION,
-    PHASE,
-    PHASE_OF_RUN,
-    PREVIOUS_MODE,
-    RESTITUTION,
-    ROUND,
-    SINCE_ENTRY,
-    SINGULAR_JUMPS,
-    STRAIN,
     TRANSVERSE,
 )
-from hybrid.kernels.types.layout import ENTRY, KERNEL, METHOD, MODEL, PART, RECORD, RUN, VECTOR, WORK
+from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, TASK, VECTOR, WORK
+from hybrid.kernels.types.task import task_of
 
 
 @njit(**KERNEL)
@@ -125,22 +102,25 @@ def remember_jump(model, run, record, transition, transversality, kind, known, x
 
     Its matrix is ``work.saltation``, unless that is not ``known``: it follows from the rest.
     """
-    n, slot = model.dimension, record.used[1]
-    if slot == record.jump_time.shape[0]:
+    n, slot = model.dimension, record.jumps
+    if slot == record.jump_phase.shape[0]:
         return
-    record.jump_time[slot, 0], record.jump_time[slot, 1] = run.clock[PHASE], transversality
-    record.jump_place[slot, 0], record.jump_place[slot, 1] = run.count[CYCLE], transition
-    record.jump_place[slot, 2], record.jump_place[slot, 3] = kind, 1 if known else 0
+    record.jump_phase[slot] = run.phase
+    record.jump_cycle[slot] = run.cycle
+    record.jump_transition[slot] = transition
+    record.jump_transversality[slot] = transversality
+    record.jump_kind[slot] = kind
+    record.jump_has_matrix[slot] = 1 if known else 0
     for i in range(n):
         record.jump_states[slot, 0, i] = run.y[i]
         record.jump_states[slot, 1, i] = x_plus[i]
-    record.used[1] = slot + 1
+    record.jumps = slot + 1
     if known:
-        matrix = record.jump_saltation[record.used[3]]
+        matrix = record.jump_saltation[record.matrices]
         for i in range(n):
             for j in range(n):
                 matrix[i, j] = work.saltation[i, j]
-        record.used[3] += 1
+        record.matrices += 1
 
 
 @njit(**KERNEL)
@@ -156,9 +136,9 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
         for j in range(n):
             work.jacobian[i, j] = work.saltation[i, j]
     log_determinant = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
-    run.clock[LOG_DETERMINANT] += log_determinant
-    run.clock[STRAIN] += strain(work.saltation, n, log_determinant)
-    anew = orthonormal and (apart or not run.clock[STRAIN] < STRAINED)
+    run.log_determinant += log_determinant
+    run.strain += strain(work.saltation, n, log_determinant)
+    anew = orthonormal and (apart or not run.strain < STRAINED)
     if anew:
         orthonormalise(run.y, n, tangents, run.growth, 0.0)
     before = run.growth[0]
@@ -166,7 +146,7 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
     if not anew:
         return 0.0
     orthonormalise(run.y, n, tangents, run.growth, COLLAPSED)
-    run.clock[STRAIN] = 0.0
+    run.strain = 0.0
     return run.growth[0] - before
 
 
@@ -178,13 +158,13 @@ def is_grazing(model, method, run, transition, transversality, work):
     if it comes from there. The saltation matrix is then an extrapolation of a square root from beside its
     branch point.
     """
-    acceleration = guard_acceleration(model, run, transition, run.count[MODE], run.clock[PHASE], run.y, work)
+    acceleration = guard_acceleration(model, run, transition, run.mode, run.phase, run.y, work)
     band = error_band(method, run, work.gradient, model.dimension)
     if transversality * transversality <= 2.0 * abs(acceleration) * band:
         return True
     # Inside such a dip the steps, and with them the sizes that the tolerances refer to, are those of the dip.
-    way_in = run.clock[LAST_TRANSVERSALITY]
-    grazed = run.count[LAST_KIND] == GRAZING and run.count[LAST_FIRED] == transition
+    way_in = run.last_transversality
+    grazed = run.last_kind == GRAZING and run.last_fired == transition
     return grazed and way_in * transversality < 0.0 and abs(transversality) <= 2.0 * abs(way_in)
 
 
@@ -195,9 +175,9 @@ def judge(run, n, work):
     for i in range(n):
         for j in range(n):
             largest = max(largest, abs(work.saltation[i, j]))
-    run.clock[LARGEST_SALTATION] = max(run.clock[LARGEST_SALTATION], largest)
+    run.largest_saltation = max(run.largest_saltation, largest)
     if not largest < math.inf:
-        run.count[SINGULAR_JUMPS] += 1
+        run.singular_jumps += 1
 
 
 @njit(**KERNEL)
@@ -206,24 +186,24 @@ def move(model, run, transition, target, x_plus):
     for i in range(model.dimension):
         run.y[i] = x_plus[i]
         run.scale[i] = max(run.scale[i], abs(x_plus[i]))
-    here = run.clock[LAST_JUMP_PHASE] == run.clock[PHASE] and run.clock[LAST_JUMP_CYCLE] == run.count[CYCLE]
-    run.count[JUMPS_HERE] = run.count[JUMPS_HERE] + 1 if here else 1
-    run.clock[LAST_JUMP_PHASE] = run.clock[PHASE]
-    run.clock[LAST_JUMP_CYCLE] = run.count[CYCLE]
-    run.recent[slot_of(run, run.count[JUMPS])] = transition
-    run.count[JUMPS] += 1
-    run.count[LAST_FIRED] = transition
-    run.stay[run.count[MODE]], run.clock[SINCE_ENTRY] = run.clock[SINCE_ENTRY], 0.0
-    run.count[PREVIOUS_MODE] = run.count[MODE]
-    run.count[MODE] = target
-    run.count[PHASE_OF_RUN] = ENTERING
+    here = run.last_jump_phase == run.phase and run.last_jump_cycle == run.cycle
+    run.jumps_here = run.jumps_here + 1 if here else 1
+    run.last_jump_phase = run.phase
+    run.last_jump_cycle = run.cycle
+    run.recent[slot_of(run, run.jumps)] = transition
+    run.jumps += 1
+    run.last_fired = transition
+    run.stay[run.mode], run.since_entry = run.since_entry, 0.0
+    run.previous_mode = run.mode
+    run.mode = target
+    run.stage = ENTERING
     remember_visit(model, run)
 
 
 @njit(**KERNEL)
 def leave(model, run, transition, transversality, work):
     """Put the run behind a jump to ``work.new``."""
-    mode, target = run.count[MODE], model.target[transition]
+    mode, target = run.mode, model.target[transition]
     if mode == target and model.marker[transition] == 0:
         remember_impulse(model, run, transition, transversality, work)
     move(model, run, transition, mode if target == NO_MODE else target, work.new)
@@ -232,7 +212,7 @@ def leave(model, run, transition, transversality, work):
 @njit(**KERNEL)
 def cross_without_map(model, run, transition, mode, work):
     """``cross`` where nobody asks for a saltation matrix: the state after the jump, and no derivatives."""
-    t, target = run.clock[PHASE], model.target[transition]
+    t, target = run.phase, model.target[transition]
     model.flow(mode, t, run.y, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     model.reset(transition, t, run.y, model.parameters, work.new)
@@ -246,7 +226,7 @@ def cross_without_map(model, run, transition, mode, work):
 def cross_with_map(model, run, transition, mode, tangents, work):
     """Cross a guard that says when, and begin an instant; returns the transversality."""
     n = model.dimension
-    transversality = saltation(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+    transversality = saltation(model, transition, mode, run.phase, run.y, work.new, work)
     change_of_instant(run, n, transversality, work)
     begin_instant(run, n, tangents, work)
     return transversality
@@ -256,33 +236,34 @@ def cross_with_map(model, run, transition, mode, tangents, work):
 def recall_map(model, run, tangents, work):
     """Make up for the tangent map of the jump that began this instant, if nobody has asked for it."""
     n = model.dimension
-    if run.count[LAST_FIRED] == NO_TRANSITION:
+    if run.last_fired == NO_TRANSITION:
         begin_at_start(run, n, tangents)
-    if run.count[MAP_IS_KNOWN] == 1:
+    if run.map_is_known == 1:
         return
-    fired, mode, x_minus = run.count[LAST_FIRED], run.count[PREVIOUS_MODE], run.instant[:n]
-    transversality = saltation(model, fired, mode, run.clock[PHASE], x_minus, work.new, work)
+    fired, mode, x_minus = run.last_fired, run.previous_mode, run.instant[:n]
+    transversality = saltation(model, fired, mode, run.phase, x_minus, work.new, work)
     change_of_instant(run, n, transversality, work)
     keep_map(run, n, work)
 
 
-@njit(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK), **PART)
-def jump(model, method, run, record, transition, tangents, orthonormal, work):
+@njit(void(TASK, int64), **PART)
+def jump(task, transition):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record.
 
     Without tangent vectors a saltation matrix is only made where it does not follow from the states at the
     jump, of those that are locked to another.
     """
-    n, mode = model.dimension, run.count[MODE]
-    asked = tangents > 0 or record.jump_time.shape[0] > 0
-    locked = run.count[LOCKED] == 1 and asked
+    _, model, method, run, record, work = task_of(task)
+    n, mode, tangents = model.dimension, run.mode, task.tangents
+    asked = tangents > 0 or record.jump_phase.shape[0] > 0
+    locked = run.locked == 1 and asked
     known = tangents > 0 or locked
-    run.count[LOCKED] = 0
+    run.locked = 0
     # A locked jump inherits the grazing flag of the jump that triggered it.
-    kind = run.count[LAST_KIND] if locked else TRANSVERSE
+    kind = run.last_kind if locked else TRANSVERSE
     if locked:
         recall_map(model, run, tangents, work)
-        transversality = cross(model, transition, mode, run.clock[PHASE], run.y, work.new, work)
+        transversality = cross(model, transition, mode, run.phase, run.y, work.new, work)
         follow(run, n, work)
     elif known:
         transversality = cross_with_map(model, run, transition, mode, tangents, work)
@@ -292,8 +273,8 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
     if judged and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING
     if kind == GRAZING:
-        run.count[ILL_CONDITIONED] += 1
-    run.count[LAST_KIND], run.clock[LAST_TRANSVERSALITY] = kind, transversality
+        run.ill_conditioned += 1
+    run.last_kind, run.last_transversality = kind, transversality
     run.due[transition] = 0
     remember_jump(model, run, record, transition, transversality, kind, known, work.new, work)
     if locked:
@@ -302,18 +283,18 @@ def jump(model, method, run, record, transition, tangents, orthonormal, work):
         judge(run, n, work)
         if locked:
             restore_tangents(run, n, tangents)
-        grown = carry_tangents(model, run, tangents, orthonormal, kind == GRAZING, work)
+        grown = carry_tangents(model, run, tangents, task.orthonormal != 0, kind == GRAZING, work)
         if kind == GRAZING:
-            run.clock[ILL_CONDITIONED_GROWTH] += grown
+            run.ill_conditioned_growth += grown
     leave(model, run, transition, transversality, work)
 
 
 @njit(**KERNEL)
 def remember_flight(run, record, n, span, x_limit):
     """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
-    if record.used[0] == record.step_time.shape[0]:
+    if record.steps == record.step_phase.shape[0]:
         return
-    rows = record.step_coefficients[start_record(run, record, run.clock[PHASE], span)]
+    rows = record.step_coefficients[start_record(run, record, run.phase, span)]
     for k in range(rows.shape[0]):
         for i in range(n):
             rows[k, i] = run.y[i] if k == 0 else (x_limit[i] - run.y[i] if k == 1 else 0.0)
@@ -321,18 +302,20 @@ def remember_flight(run, record, n, span, x_limit):
 
 
 @njit(**KERNEL)
-def follow_impacts(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+def follow_impacts(task, transition, remaining):
     """``finish_chatter`` for impacts of one transition on one guard, with the tangent map."""
-    if run.count[MODE] != run.count[PREVIOUS_MODE] or model.marker[transition] == 1:
+    _, model, method, run, record, work = task_of(task)
+    tangents = task.tangents
+    if run.mode != run.previous_mode or model.marker[transition] == 1:
         return False
-    if not 0.0 < run.clock[RESTITUTION] < 1.0:
-        run.count[CHATTERING] = 0
+    if not 0.0 < run.restitution < 1.0:
+        run.chattering = 0
         return False
-    span = accumulation(model, method, run, transition, run.stay[run.count[MODE]], work)
+    span = accumulation(model, method, run, transition, run.stay[run.mode], work)
     if not 0.0 < span <= remaining:
         return False
     limit_mode = model.accumulates_to[transition]
-    target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
+    target = run.mode if limit_mode == NO_MODE else limit_mode
     steep = 0.0
     if tangents > 0:
         if not drift_is_known(model, run, target, span, work):
@@ -349,20 +332,21 @@ def follow_impacts(model, method, run, record, transition, remaining, tangents, 
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
     if tangents > 0:
         n = model.dimension
-        carry_tangents(model, run, tangents, orthonormal, False, work)
+        carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
         if not apart:
-            model.flow_jacobian(target, run.clock[PHASE], x_limit, model.parameters, work.jacobian)
+            model.flow_jacobian(target, run.phase, x_limit, model.parameters, work.jacobian)
             drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
             drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
-    run.count[ROUND] = 1
+    run.round = 1
     move(model, run, transition, target, x_limit)
     return True
 
 
 @njit(**KERNEL)
-def follow_rounds(model, method, run, record, remaining, tangents, work):
+def follow_rounds(task, remaining):
     """``finish_chatter`` for transitions that fire in turn; the tangent map of their limit is not known."""
-    n = model.dimension
+    _, model, method, run, record, work = task_of(task)
+    n, tangents = model.dimension, task.tangents
     left, turn = limit_of_rounds(model, method, run, work)
     if not 0.0 < left <= remaining:
         return False
@@ -370,7 +354,7 @@ def follow_rounds(model, method, run, record, remaining, tangents, work):
     if transition == NO_TRANSITION:
         return False
     limit_mode = model.accumulates_to[transition]
-    target = run.count[MODE] if limit_mode == NO_MODE else limit_mode
+    target = run.mode if limit_mode == NO_MODE else limit_mode
     remember_flight(run, record, n, left, work.settled)
     for i in range(n):
         for j in range(n):
@@ -378,37 +362,38 @@ def follow_rounds(model, method, run, record, remaining, tangents, work):
     forward(run, model.period, left)
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
     if tangents > 0:
-        run.count[SINGULAR_JUMPS] += 1
-        run.clock[LOG_DETERMINANT] = math.nan
+        run.singular_jumps += 1
+        run.log_determinant = math.nan
         for i in range(n, n * (1 + tangents)):
             run.y[i] = math.nan
     begin_instant(run, n, tangents, work)
     for j in range(n):
         run.instant[j] = math.nan
-    run.count[ROUND] = turn
+    run.round = turn
     move(model, run, transition, target, work.settled)
     return True
 
 
-@njit(boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK), **PART)
-def finish_chatter(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+@njit(boolean(TASK, int64, float64), **PART)
+def finish_chatter(task, transition, remaining):
     """After a jump: if its like accumulate before the end of the run, go to their limit; says whether it did.
 
     The limit is a jump of its own, into the mode that the transition names for it, if it names one.
     """
-    if follow_impacts(model, method, run, record, transition, remaining, tangents, orthonormal, work):
+    if follow_impacts(task, transition, remaining):
         return True
-    return follow_rounds(model, method, run, record, remaining, tangents, work)
+    return follow_rounds(task, remaining)
 
 
-@njit(void(MODEL, RUN, int64, int64, boolean, WORK), **PART)
-def rest(model, run, limit_mode, tangents, orthonormal, work):
+@njit(void(TASK, int64), **PART)
+def rest(task, limit_mode):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
-    transition = run.count[LAST_FIRED]
+    _, model, _, run, _, work = task_of(task)
+    transition, tangents = run.last_fired, task.tangents
     recall_map(model, run, tangents, work)
     chatter_matrix(model, run, transition, work)
     multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
     if tangents > 0:
-        carry_tangents(model, run, tangents, orthonormal, False, work)
-    run.count[PREVIOUS_MODE] = run.count[MODE]
-    run.count[MODE] = limit_mode
+        carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
+    run.previous_mode = run.mode
+    run.mode = limit_mode

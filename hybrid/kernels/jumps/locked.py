@@ -13,13 +13,6 @@ the next ``P``, whatever the guard of that jump does: its saltation matrix would
 from numba import njit
 
 from hybrid.kernels.arithmetic.tangent import multiply, solve
-from hybrid.kernels.types.codes import (
-    ILL_CONDITIONED_GROWTH,
-    ILL_CONDITIONED_GROWTH_BEFORE,
-    LOG_DETERMINANT,
-    LOG_DETERMINANT_BEFORE,
-    MAP_IS_KNOWN,
-)
 from hybrid.kernels.types.layout import KERNEL
 
 
@@ -30,8 +23,8 @@ def keep_tangents(run, n, tangents):
         run.before[i] = run.y[n + i]
     for c in range(tangents):
         run.growth_before[c] = run.growth[c]
-    run.clock[LOG_DETERMINANT_BEFORE] = run.clock[LOG_DETERMINANT]
-    run.clock[ILL_CONDITIONED_GROWTH_BEFORE] = run.clock[ILL_CONDITIONED_GROWTH]
+    run.log_determinant_before = run.log_determinant
+    run.ill_conditioned_growth_before = run.ill_conditioned_growth
 
 
 @njit(**KERNEL)
@@ -41,8 +34,8 @@ def restore_tangents(run, n, tangents):
         run.y[n + i] = run.before[i]
     for c in range(tangents):
         run.growth[c] = run.growth_before[c]
-    run.clock[LOG_DETERMINANT] = run.clock[LOG_DETERMINANT_BEFORE]
-    run.clock[ILL_CONDITIONED_GROWTH] = run.clock[ILL_CONDITIONED_GROWTH_BEFORE]
+    run.log_determinant = run.log_determinant_before
+    run.ill_conditioned_growth = run.ill_conditioned_growth_before
 
 
 @njit(**KERNEL)
@@ -68,7 +61,7 @@ def keep_map(run, n, work):
     for j in range(n):
         for i in range(n):
             run.instant[n + n * j + i] = work.saltation[i, j]
-    run.count[MAP_IS_KNOWN] = 1
+    run.map_is_known = 1
 
 
 @njit(**KERNEL)
@@ -76,7 +69,7 @@ def postpone_map(run, n):
     """Keep the state before a jump instead, for the case that another jump is locked to it."""
     for i in range(n):
         run.instant[i] = run.y[i]
-    run.count[MAP_IS_KNOWN] = 0
+    run.map_is_known = 0
 
 
 @njit(**KERNEL)
@@ -87,7 +80,7 @@ def begin_at_start(run, n, tangents):
         run.instant[i] = 0.0
     for i in range(n):
         run.instant[n + n * i + i] = 1.0
-    run.count[MAP_IS_KNOWN] = 1
+    run.map_is_known = 1
 
 
 @njit(**KERNEL)

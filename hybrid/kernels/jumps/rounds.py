@@ -8,7 +8,7 @@ the time that is left, and both are extrapolated to where none is left.
 from numba import njit
 
 from hybrid.kernels.events.guards import guard_value
-from hybrid.kernels.types.codes import CHATTERING, CYCLE, JUMPS, NO_MODE, NO_TRANSITION, PHASE
+from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import INLINE, KERNEL
 
 # Transitions in a round at most, and rounds that must have been seen.
@@ -35,16 +35,16 @@ def slot_of(run, jumps):
 @njit(**KERNEL)
 def remember_visit(model, run):
     """Keep the time and the state right after a jump."""
-    row, n = run.visits[slot_of(run, run.count[JUMPS])], model.dimension
+    row, n = run.visits[slot_of(run, run.jumps)], model.dimension
     for i in range(n):
         row[i] = run.y[i]
-    row[n], row[n + 1] = run.clock[PHASE], run.count[CYCLE]
+    row[n], row[n + 1] = run.phase, run.cycle
 
 
 @njit(**KERNEL)
 def time_before(model, run, back, further):
     """Time from the jump ``further`` before the last one to the one ``back`` before it."""
-    n, jumps = model.dimension, run.count[JUMPS]
+    n, jumps = model.dimension, run.jumps
     later, earlier = run.visits[slot_of(run, jumps - back)], run.visits[slot_of(run, jumps - further)]
     return later[n] - earlier[n] + model.period * (later[n + 1] - earlier[n + 1])
 
@@ -52,7 +52,7 @@ def time_before(model, run, back, further):
 @njit(**KERNEL)
 def fired_before(run, back):
     """Transition of the jump ``back`` before the last one."""
-    return run.recent[slot_of(run, run.count[JUMPS] - 1 - back)]
+    return run.recent[slot_of(run, run.jumps - 1 - back)]
 
 
 @njit(**KERNEL)
@@ -83,7 +83,7 @@ def transitions_in_turn(model, run):
     """
     for turn in range(1, MOST_IN_TURN + 1):
         seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
-        if run.count[JUMPS] <= seen:
+        if run.jumps <= seen:
             return 0
         left, _ = time_left_of_rounds(model, run, turn, 0)
         same = left > 0.0
@@ -92,14 +92,14 @@ def transitions_in_turn(model, run):
             if not same:
                 break
         if same:
-            return 0 if turn == 1 and run.count[CHATTERING] > 0 else turn
+            return 0 if turn == 1 and run.chattering > 0 else turn
     return 0
 
 
 @njit(**KERNEL)
 def extrapolate(model, run, turn, back, left, out):
     """The state at the limit into ``out (n,)``, from three jumps of one transition, ``back`` the last."""
-    jumps, visits = run.count[JUMPS], run.visits
+    jumps, visits = run.jumps, run.visits
     a = left
     b = a + time_before(model, run, back, back + turn)
     c = b + time_before(model, run, back + turn, back + 2 * turn)
@@ -147,7 +147,7 @@ def size_of_visits(model, run, seen, out):
     for i in range(model.dimension):
         out[i] = run.scale[i]
         for back in range(seen):
-            out[i] = max(out[i], abs(run.visits[slot_of(run, run.count[JUMPS] - back), i]))
+            out[i] = max(out[i], abs(run.visits[slot_of(run, run.jumps - back), i]))
 
 
 @njit(**KERNEL)
@@ -157,7 +157,7 @@ def limit_of_rounds(model, method, run, work):
     To be called after each jump. The limit is known once two estimates, a round apart, agree up to the
     tolerances, or once there is next to nothing left. The limit state goes to ``work.settled``.
     """
-    if run.count[JUMPS] <= FEWEST_JUMPS:
+    if run.jumps <= FEWEST_JUMPS:
         return 0.0, 0
     half = FEWEST_JUMPS // 2
     if not time_before(model, run, 0, half) < SHORTER * time_before(model, run, half, FEWEST_JUMPS):
@@ -181,7 +181,7 @@ def limit_of_rounds(model, method, run, work):
         agreed = agreed and abs(work.settled[i] - work.error[i]) <= tolerance
     if not (agreed or left <= NOTHING_LEFT * lasted):
         return 0.0, 0
-    if not is_limit(model, run, turn, run.clock[PHASE] + left, work):
+    if not is_limit(model, run, turn, run.phase + left, work):
         return 0.0, 0
     return left, turn
 

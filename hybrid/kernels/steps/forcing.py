@@ -18,22 +18,13 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program
 from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
-    CALM_CYCLE,
-    CALM_MODE,
-    CALM_UNTIL,
-    CALM_WAIT,
-    COARSE,
-    CYCLE,
     HIGH,
     HIGH_MIDDLE,
     LEAST_SLOPE,
     LOW,
     LOW_MIDDLE,
-    MODE,
     MOST_SLOPE,
     NARROW,
-    PHASE,
-    UNRESOLVED,
 )
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RUN, WORK
 
@@ -226,22 +217,22 @@ def _first_hidden(model, program, path, order, clock, start, nodes, h, tolerance
 @njit(**KERNEL)
 def _is_calm(model, run, mode, path, h, work):
     """Whether all forcing is monotone on the step and known to be so for longer."""
-    start = run.clock[PHASE]
-    known = run.count[CALM_MODE] == mode + 1 and run.count[CALM_CYCLE] == run.count[CYCLE]
-    if known and start + h <= run.clock[CALM_UNTIL]:
+    start = run.phase
+    known = run.calm_mode == mode + 1 and run.calm_cycle == run.cycle
+    if known and start + h <= run.calm_until:
         return True
-    run.count[CALM_WAIT] -= 1
-    if run.count[CALM_WAIT] > 0:
+    run.calm_wait -= 1
+    if run.calm_wait > 0:
         return False
     for forcing in range(model.first_forcing[mode], model.first_forcing[mode + 1]):
         program = model.target.shape[0] + forcing
         if has_program(model, program) and not _is_steady(
             model, program, path, 0, -1, start, AHEAD * h, 0.0, work
         ):
-            run.count[CALM_WAIT] = WAIT
+            run.calm_wait = WAIT
             return False
-    run.count[CALM_MODE], run.count[CALM_CYCLE] = mode + 1, run.count[CYCLE]
-    run.clock[CALM_UNTIL] = start + AHEAD * h
+    run.calm_mode, run.calm_cycle = mode + 1, run.cycle
+    run.calm_until = start + AHEAD * h
     return True
 
 
@@ -252,7 +243,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
     A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
     as its first place that is not explained has the length of the pulse.
     """
-    mode, start = run.count[MODE], run.clock[PHASE]
+    mode, start = run.mode, run.phase
     if clock < 0 and _is_calm(model, run, mode, path, h, work):
         return h
     rounding = 0.0 if clock >= 0 else measured_time(model, run, mode)
@@ -275,7 +266,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
             if place < explained:
                 explained, beyond = place, other
         if explained >= h:
-            run.count[COARSE] += 1 if coarse else 0
+            run.coarse += 1 if coarse else 0
             return h
         h = explained if 2.0 * explained >= beyond else beyond
         if not h > shortest:
@@ -286,8 +277,8 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
 @njit(**KERNEL)
 def _unresolved(run, longest, shortest):
     """The step where none is explained: the shortest, but after many of them what had been proposed."""
-    run.count[UNRESOLVED] += 1
-    return min(longest, shortest) if run.count[UNRESOLVED] <= MOST_UNRESOLVED else longest
+    run.unresolved += 1
+    return min(longest, shortest) if run.unresolved <= MOST_UNRESOLVED else longest
 
 
 @njit(float64(MODEL, METHOD, RUN, float64, WORK), **PART)
@@ -340,7 +331,7 @@ def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
     Over the step both may differ by some tolerances, and with ``noisy`` by what rounding of the state makes
     of the field besides.
     """
-    n, mode, start = model.dimension, run.count[MODE], run.clock[PHASE]
+    n, mode, start = model.dimension, run.mode, run.phase
     length, series = n * (1 + tangents), work.series
     field, other, missing = work.stages[0], work.stages[1], work.error
     for i in range(length):
@@ -380,10 +371,10 @@ def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
 @njit(float64(MODEL, METHOD, RUN, int64, int64, int64, float64, WORK), **PART)
 def explained_series(model, method, run, tangents, order, clock, h, work):
     """The length up to ``h`` of a step on which the series follows the forcing; nan if it is not finite."""
-    if not _is_finite(model, run.count[MODE], tangents, order, work):
+    if not _is_finite(model, run.mode, tangents, order, work):
         return math.nan
     nodes, longest = method.series_nodes, h
-    rounding = 0.0 if clock >= 0 else measured_time(model, run, run.count[MODE])
+    rounding = 0.0 if clock >= 0 else measured_time(model, run, run.mode)
     for _ in range(MOST_CUTS):
         h = _longest_explained(model, method, run, work.series, order, clock, nodes, h, work)
         for noisy in (False, True):

@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, types
+from numba import float64, njit, types
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
@@ -19,38 +19,21 @@ from hybrid.kernels.steps.step import (
     starting_step,
 )
 from hybrid.kernels.types.codes import (
-    DIVERGENCE,
     GO_ON,
-    GRAZING_GUARD,
-    GRAZING_PLACE,
-    GRAZING_VALUE,
-    LAST_RATIO,
-    LAST_STEP,
-    MODE,
-    NEXT_STEP,
     NO_TRANSITION,
     NON_FINITE,
-    PENDING,
-    PHASE,
-    PHASE_OF_RUN,
     READY,
-    REJECTED,
     STALE,
     STEP_TOO_SMALL,
-    STEPS,
 )
 from hybrid.kernels.types.layout import (
-    ATTEMPTS,
     EPSILON,
     INLINE,
     KERNEL,
-    METHOD,
-    MODEL,
     PART,
-    RECORD,
-    RUN,
-    WORK,
+    TASK,
 )
+from hybrid.kernels.types.task import task_of
 
 SAFETY = 0.9
 SHRINK = 0.2
@@ -76,7 +59,7 @@ def all_affine(model, mode):
 def remember_step(model, method, run, record, t, h, work):
     """Write the step just taken from ``run.y`` into the record; its stages are those of ``work``."""
     n, count = model.dimension, method.a.shape[0]
-    interpolation_stages(model, method, run.count[MODE], t, h, run.y, work)
+    interpolation_stages(model, method, run.mode, t, h, run.y, work)
     slot = start_record(run, record, t, h)
     rows = record.step_coefficients[slot]
     # Element by element: an array assignment brings its error message along, seconds of compilation.
@@ -96,7 +79,7 @@ def remember_step(model, method, run, record, t, h, work):
 @njit(**KERNEL)
 def remember_touch(model, method, run, record, t, h, work):
     """Remember the grazing at ``GRAZING_PLACE`` on the attempted step."""
-    theta = run.clock[GRAZING_PLACE]
+    theta = run.grazing_place
     interpolant_path(method, h, run.y, model.dimension, work)
     state_at(work.path, method.powers.shape[0] - 1, model.dimension, theta, work.state)
     remember_grazing(model, run, record, t + theta * h, work)
@@ -106,7 +89,7 @@ def remember_touch(model, method, run, record, t, h, work):
 def accept(model, method, run, tangents, h, correction, work):
     """Move the run to the end of the attempted step in ``work.new``."""
     n = model.dimension
-    mode = run.count[MODE]
+    mode = run.mode
     on_guard = 0
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         on_guard += run.on_guard[model.outgoing[slot]]
@@ -120,42 +103,44 @@ def accept(model, method, run, tangents, h, correction, work):
         total = 0.0
         for j in range(s + 1):
             total += method.quadrature[j] * work.stages[j, place]
-        run.clock[DIVERGENCE] += h * total + correction * work.stages[s, place]
+        run.divergence += h * total + correction * work.stages[s, place]
 
 
 @njit(**INLINE)
-def find_event(parts, model, method, run, record, tangents, h, work):
+def find_event(task, h):
     """Shorten the attempted step to its first event, if there is one.
 
     Returns its length, the Euler step that completes it, and the transition. A step whose guards
     are proved on a part only is cut to that. A crossing that the interpolant has and the solution has not is
     a grazing; the step is then searched again without that guard.
     """
-    mode, t = run.count[MODE], run.clock[PHASE]
+    attempts, model, method, run, record, work = task_of(task)
+    tangents = task.tangents
+    mode, t = run.mode, run.phase
     ignored = NO_TRANSITION
     for _ in range(2):
         interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
         theta, fired, proved = earliest_crossing(model, method, run, t, h, ignored, work)
-        if run.clock[GRAZING_PLACE] < min(theta, proved):
+        if run.grazing_place < min(theta, proved):
             remember_touch(model, method, run, record, t, h, work)
         if proved < min(theta, 1.0):
-            attempt_again(parts, model, method, mode, t, proved * h, run.y, tangents, work)
+            attempt_again(attempts, model, method, mode, t, proved * h, run.y, tangents, work)
             return proved * h, 0.0, NO_TRANSITION
         if fired == NO_TRANSITION:
             break
         direction = model.direction[fired]
         side = run.side[fired] if direction == 0 else -direction
         shortened, correction = land(
-            parts, model, method, fired, side, mode, t, h, theta, run.y, tangents, work
+            attempts, model, method, fired, side, mode, t, h, theta, run.y, tangents, work
         )
         if shortened != NOT_THERE:
             return shortened, correction, fired
         ignored = fired
-        attempt_again(parts, model, method, mode, t, h, run.y, tangents, work)
-        run.clock[GRAZING_PLACE], run.clock[GRAZING_VALUE] = theta, 0.0
-        run.count[GRAZING_GUARD] = fired
+        attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
+        run.grazing_place, run.grazing_value = theta, 0.0
+        run.grazing_guard = fired
         remember_touch(model, method, run, record, t, h, work)
     return h, 0.0, NO_TRANSITION
 
@@ -176,8 +161,8 @@ def growth_factor(method, run, h, ratio):
     such as the end of a Hertz contact, where each step would otherwise be tried too long.
     """
     factor = ratio ** (-method.exponent)
-    if run.clock[LAST_STEP] > 0.0:
-        trend = h / run.clock[LAST_STEP] * (run.clock[LAST_RATIO] / ratio) ** method.exponent
+    if run.last_step > 0.0:
+        trend = h / run.last_step * (run.last_ratio / ratio) ** method.exponent
         factor = min(factor, factor * trend)
     return min(GROW, max(SHRINK, SAFETY * factor))
 
@@ -197,55 +182,54 @@ def alignment_ratio(method, n, tangents, work):
     return (-0.5 * math.log(product) / CLOSEST) ** (1.0 / method.exponent)
 
 
-@njit(
-    types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK),
-    **PART,
-)
-def runge_kutta_step(parts, model, method, run, record, tangents, orthonormal, remaining, work):
+@njit(types.UniTuple(float64, 2)(TASK, float64), **PART)
+def runge_kutta_step(task, remaining):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
-    An event is left in ``PENDING``. A step that the error control rejects has the length zero.
+    The transition of an event is left in ``run.pending``. A rejected step has the length zero.
     """
+    attempts, model, method, run, record, work = task_of(task)
+    tangents = task.tangents
     length = model.dimension * (1 + tangents)
-    mode, t = run.count[MODE], run.clock[PHASE]
-    if run.count[PHASE_OF_RUN] == STALE:
+    mode, t = run.mode, run.phase
+    if run.stage == STALE:
         rates(model, mode, t, run.y, tangents, work.stages[0])
-        if run.clock[NEXT_STEP] <= 0.0:
-            run.clock[NEXT_STEP] = starting_step(model, method, mode, t, run.y, tangents, remaining, work)
-        if not run.clock[NEXT_STEP] > 0.0:
+        if run.next_step <= 0.0:
+            run.next_step = starting_step(model, method, mode, t, run.y, tangents, remaining, work)
+        if not run.next_step > 0.0:
             return NON_FINITE, 0.0
-        run.count[PHASE_OF_RUN] = READY
-    proposed = min(run.clock[NEXT_STEP], method.max_step)
+        run.stage = READY
+    proposed = min(run.next_step, method.max_step)
     last = proposed >= remaining
     h = remaining if last else proposed
     if is_forced(model, mode):
-        h = parts.explained_step(model, method, run, h, work)
+        h = attempts.explained_step(model, method, run, h, work)
         last = last and h == remaining
-    ratio = attempt(parts, model, method, mode, t, h, run.y, tangents, work)
-    if orthonormal and method.implicit != 0 and ratio <= 1.0:
+    ratio = attempt(attempts, model, method, mode, t, h, run.y, tangents, work)
+    if task.orthonormal != 0 and method.implicit != 0 and ratio <= 1.0:
         ratio = max(ratio, alignment_ratio(method, model.dimension, tangents, work))
-    run.count[STEPS] += 1
+    run.steps += 1
     if not ratio <= 1.0:
-        run.count[REJECTED] += 1
+        run.rejected += 1
         shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
-        run.clock[NEXT_STEP] = h * shrink
+        run.next_step = h * shrink
         if h * shrink <= 4.0 * EPSILON * measured_time(model, run, mode) or h * shrink < 1e-200:
             return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
         return GO_ON, 0.0
     grow = growth_factor(method, run, h, max(ratio, 1e-16))
-    run.clock[NEXT_STEP] = max(proposed, h * grow) if last else h * grow
-    run.clock[LAST_STEP], run.clock[LAST_RATIO] = h, max(ratio, 1e-16)
+    run.next_step = max(proposed, h * grow) if last else h * grow
+    run.last_step, run.last_ratio = h, max(ratio, 1e-16)
     fired, correction, whole = NO_TRANSITION, 0.0, h
     if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
-        h, correction, fired = find_event(parts, model, method, run, record, tangents, h, work)
+        h, correction, fired = find_event(task, h)
     if fired != NO_TRANSITION:
-        run.clock[NEXT_STEP] = min(run.clock[NEXT_STEP], LONGEST_AFTER_EVENT * h)
+        run.next_step = min(run.next_step, LONGEST_AFTER_EVENT * h)
     if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:
         run.first_step[mode] = h
-    if record.step_time.shape[0] > 0 and h > 0.0:
+    if record.step_phase.shape[0] > 0 and h > 0.0:
         remember_step(model, method, run, record, t, h, work)
     accept(model, method, run, tangents, h, correction, work)
-    run.count[PENDING] = fired
+    run.pending = fired
     if fired == NO_TRANSITION:
         if h < whole:
             sides_at(model, run, t + h, work)

@@ -16,7 +16,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.steps.step import attempt_again
-from hybrid.kernels.types.codes import GRAZING_PLACE, MODE, NO_TRANSITION
+from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
 # A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
@@ -81,9 +81,9 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
     brought up to date, to the end of the step, and guards that were left are no longer held to be zero at its
     start. ``work.path`` must hold the interpolant if any guard of the mode is not affine.
     """
-    mode, degree_of_path = run.count[MODE], method.powers.shape[0] - 1
+    mode, degree_of_path = run.mode, method.powers.shape[0] - 1
     earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
-    run.clock[GRAZING_PLACE] = NO_ROOT
+    run.grazing_place = NO_ROOT
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         if transition == ignored:

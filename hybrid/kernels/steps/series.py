@@ -35,27 +35,19 @@ from hybrid.kernels.steps.series_guards import (
 )
 from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
-    CRAWLING,
     DESINGULARISED,
-    DIVERGENCE,
     EXACT,
     GO_ON,
-    GRAZING_PLACE,
     HIGHEST_ORDER,
-    MODE,
     NARROW,
-    NEXT_STEP,
     NO_TRANSITION,
     NON_FINITE,
-    PENDING,
-    PHASE,
     ROOTED,
-    SINCE_ENTRY,
     STEP_TOO_SMALL,
-    STEPS,
     WIDE,
 )
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.task import task_of
 
 # Series that can be trusted to the last digit are cut off below rounding.
 EXACT_TOLERANCE = 1e-17
@@ -169,7 +161,7 @@ def accept_series(model, run, tangents, order, h, work):
     The values of the state at ``h``, and what they are sums of, have been left behind the series.
     """
     n, series = model.dimension, work.series
-    mode = run.count[MODE]
+    mode = run.mode
     first, last = model.first_outgoing[mode], model.first_outgoing[mode + 1]
     on_guard = 0
     for slot in range(first, last):
@@ -179,7 +171,7 @@ def accept_series(model, run, tangents, order, h, work):
         run.scale[i] = max(run.scale[i] if on_guard > 0 else 0.0, series[order + 2, i])
         run.y[i] = series[order + 1, i]
     if tangents > 0:
-        run.clock[DIVERGENCE] += series[order + 1, n + last - first + 1]
+        run.divergence += series[order + 1, n + last - first + 1]
         start, stride = model.tangent_start, model.tangent_columns[mode]
         for g in range(whole_registers(tangents, NARROW) // NARROW):
             evaluate(series, order, h, start + g * stride, NARROW * n)
@@ -214,7 +206,7 @@ def reach_guard(model, run, tangents, transition, t, longest, work):
     where more than ``longest`` would be needed.
     """
     field = work.stages[0]
-    rates_by_jacobian(model, run.count[MODE], t, run.y, tangents, work.jacobian, field)
+    rates_by_jacobian(model, run.mode, t, run.y, tangents, work.jacobian, field)
     speed = guard_speed(model, transition, t, run.y, field, work.gradient)
     if speed == 0.0:
         return 0.0
@@ -239,13 +231,14 @@ def project_on_guard(model, run, transition, t, work):
 
 
 @njit(**KERNEL)
-def series_step(parts, model, method, run, record, tangents, remaining, work):
+def series_step(task, remaining):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
-    An event is left in ``PENDING``.
+    The transition of an event is left in ``run.pending``.
     """
-    n = model.dimension
-    mode, t, series = run.count[MODE], run.clock[PHASE], work.series
+    attempts, model, method, run, record, work = task_of(task)
+    n, tangents = model.dimension, task.tangents
+    mode, t, series = run.mode, run.phase, work.series
     kind, degree = model.propagator[mode], model.degree[mode]
     exact = kind == EXACT
     order = HIGHEST_ORDER if exact else method.order
@@ -257,7 +250,7 @@ def series_step(parts, model, method, run, record, tangents, remaining, work):
     front = whole_registers(n + guards + 2, NARROW)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
-    run.count[STEPS] += 1
+    run.steps += 1
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
     h = math.inf
     if degree == 0:
@@ -273,7 +266,7 @@ def series_step(parts, model, method, run, record, tangents, remaining, work):
     else:
         h = min(h, 1e100)
     if is_forced(model, mode):
-        h = parts.explained_series(model, method, run, tangents, order, clock, h, work)
+        h = attempts.explained_series(model, method, run, tangents, order, clock, h, work)
         if not h > 0.0:
             return NON_FINITE, 0.0
     evaluate_with_sizes(series, order, h, 0, front)
@@ -288,8 +281,8 @@ def series_step(parts, model, method, run, record, tangents, remaining, work):
     fired, cut = NO_TRANSITION, False
     if guards > 0:
         theta, fired, proved = earliest_on_series(model, method, run, order, t, h, clock, work)
-        if run.clock[GRAZING_PLACE] < min(theta, proved):
-            s = run.clock[GRAZING_PLACE] * h
+        if run.grazing_place < min(theta, proved):
+            s = run.grazing_place * h
             state_at(series, order, n, s, work.state)
             remember_grazing(model, run, record, time_at(series, order, clock, t, 1.0, s), work)
         cut = proved < min(theta, 1.0)
@@ -298,17 +291,17 @@ def series_step(parts, model, method, run, record, tangents, remaining, work):
         if cut or fired != NO_TRANSITION:
             h *= theta
             evaluate_with_sizes(series, order, h, 0, front)
-            run.count[PENDING] = fired
+            run.pending = fired
     span = h if clock < 0 else min(series[order + 1, clock], remaining)
     if clock >= 0:
-        crawls = fired == NO_TRANSITION and span <= CRAWL * run.clock[SINCE_ENTRY] and span < remaining
-        run.count[CRAWLING] = run.count[CRAWLING] + 1 if crawls else 0
-        if run.count[CRAWLING] > MOST_CRAWLING:
+        crawls = fired == NO_TRANSITION and span <= CRAWL * run.since_entry and span < remaining
+        run.crawling = run.crawling + 1 if crawls else 0
+        if run.crawling > MOST_CRAWLING:
             return STEP_TOO_SMALL, 0.0
     finest = 4.0 * EPSILON * measured_time(model, run, mode)
     if fired == NO_TRANSITION and not span > finest and span < remaining:
         return STEP_TOO_SMALL, 0.0
-    if record.step_time.shape[0] > 0 and span > 0.0:
+    if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
     if cut:
@@ -328,7 +321,7 @@ def as_far_as_last_time(model, run, mode):
     The event that ends it is found on the way; a longer step would only make it harder to find. A stay that
     was next to nothing says nothing of this one.
     """
-    left, beyond = run.stay[mode] - run.clock[SINCE_ENTRY], AHEAD * run.stay[mode]
+    left, beyond = run.stay[mode] - run.since_entry, AHEAD * run.stay[mode]
     if left > 0.0 and beyond > NEXT_TO_NOTHING * measured_time(model, run, mode):
         return left + beyond
     return math.inf
@@ -340,6 +333,6 @@ def unhurried(series, n, run):
     size, pace = 0.0, 0.0
     for i in range(n):
         size, pace = max(size, abs(series[0, i])), max(pace, abs(series[1, i]))
-    h = max(run.clock[NEXT_STEP], LONG * size / pace if pace * size > 0.0 else 1.0)
-    run.clock[NEXT_STEP] = min(2.0 * h, 1e50)
+    h = max(run.next_step, LONG * size / pace if pace * size > 0.0 else 1.0)
+    run.next_step = min(2.0 * h, 1e50)
     return h

@@ -21,9 +21,7 @@ from hybrid.kernels.events.path import value_at
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
-    GRAZING_PLACE,
     HIGHEST_ORDER,
-    MODE,
     NARROW,
     NO_TRANSITION,
     ROOTED,
@@ -311,10 +309,10 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
     remainder of the series; what it is a sum of stands behind the series. For any other guard its own
     expression is bounded on the series of the state.
     """
-    mode, series = run.count[MODE], work.series
+    mode, series = run.mode, work.series
     kind = model.propagator[mode]
     earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
-    run.clock[GRAZING_PLACE] = NO_ROOT
+    run.grazing_place = NO_ROOT
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]

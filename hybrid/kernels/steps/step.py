@@ -2,10 +2,9 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, types, void
+from numba import float64, int64, njit, types, void
 
 from hybrid.kernels.types.layout import (
-    ATTEMPTS,
     ENTRY,
     INLINE,
     KERNEL,
@@ -13,8 +12,7 @@ from hybrid.kernels.types.layout import (
     METHOD,
     MODEL,
     PART,
-    RECORD,
-    RUN,
+    TASK,
     VECTOR,
     WORK,
 )
@@ -217,8 +215,8 @@ def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
     return attempt(parts, model, method, mode, t, h, y, tangents, work)
 
 
-@njit(types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK), **PART)
-def no_step(parts, model, method, run, record, tangents, orthonormal, remaining, work):
+@njit(types.UniTuple(float64, 2)(TASK, float64), **PART)
+def no_step(task, remaining):
     """Stands in for the step of a Runge-Kutta method where every mode has a series."""
     return math.nan, 0.0
 

@@ -147,28 +147,89 @@ class Method(Structure):
 METHOD = Method.numba_type
 
 
-class Run(Structure):
+COUNTERS = (
+    "mode",
+    "cycle",
+    "jumps",
+    "steps",
+    "rejected",
+    "stage",
+    "last_fired",
+    "jumps_here",
+    "singular_jumps",
+    "pending",
+    "previous_mode",
+    "chattering",
+    "chatter_jumps",
+    "grazings",
+    "ill_conditioned",
+    "simultaneous",
+    "order_mattered",
+    "grazing_guard",
+    "last_kind",
+    "locked",
+    "map_is_known",
+    "unproved",
+    "at_rest",
+    "round",
+    "crawling",
+    "indistinct",
+    "unchecked",
+    "unresolved",
+    "coarse",
+    "calm_mode",
+    "calm_cycle",
+    "calm_wait",
+)
+NUMBERS = (
+    "phase",
+    "next_step",
+    "last_jump_cycle",
+    "last_jump_phase",
+    "divergence",
+    "log_determinant",
+    "largest_saltation",
+    "last_step",
+    "last_ratio",
+    "ill_conditioned_growth",
+    "grazing_place",
+    "grazing_value",
+    "restitution",
+    "last_transversality",
+    "log_determinant_before",
+    "ill_conditioned_growth_before",
+    "strain",
+    "since_entry",
+    "phase_low",
+    "calm_until",
+)
+
+
+class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     """The mutable state of one trajectory: all that a run needs to be taken up again.
 
-    ``count`` and ``clock`` have the slots named in ``codes``; ``y (n (1 + k),)``; ``side (transitions,)`` is
-    the sign each guard of the mode was last known to have; ``on_guard (transitions,)`` is 1 where the guard
-    vanishes at the last event or entry and has not been left since, 2 where its speed does too, 3 where its
-    acceleration does as well; ``due (transitions,)`` is 1 where the guard has been crossed at this instant
-    and its transition has not fired; ``recent`` are the last transitions that fired, jump ``j`` at ``j``
-    modulo its length, and ``visits (64, n + 2)`` the states right after them, the phases and the cycles;
-    ``rehearsal (3, transitions)`` is scratch for jumps that are only tried;
-    ``first_step (modes,)`` remembers the step a mode began with and ``stay (modes,)`` how long the last stay
-    in it was; ``scale (n,)`` the size of the components over the last step,
-    against which rounding is judged; ``growth (k,)`` sums the logarithms of the lengths taken out of the
-    tangent vectors by orthonormalisation. ``trail (3, n + 1)`` follows the jumps of one transition to their
-    limit. The last three serve the jumps that one jump sets off at once: ``before (n k,)`` and
-    ``growth_before (k,)`` are the tangent vectors and their growth before it, ``instant (n (1 + n),)`` what
-    it and they make of a tangent vector since, first the derivative of their instant and then the columns of
-    the tangent map; or, where ``MAP_IS_KNOWN`` is 0, the state before it, from which these follow.
+    - ``y (n (1 + k),)``: the state, then the tangent vectors one after another.
+    - ``side (transitions,)``: the sign that each guard of the mode last had.
+    - ``on_guard (transitions,)``: 1 if the guard vanishes at the last event or entry and has not been left
+      since; 2 if its speed vanishes too, 3 if its acceleration does as well.
+    - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
+    - ``recent``: the last transitions that fired; jump ``j`` is at ``j`` modulo the length.
+    - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
+    - ``rehearsal (3, transitions)``: scratch for jumps that are only tried.
+    - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
+    - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
+    - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
+      vectors.
+    - ``trail (3, n + 1)``: follows the jumps of one transition to their limit.
+    - ``before (n k,)``, ``growth_before (k,)``: the tangent vectors and their growth before a jump that sets
+      off others at the same instant.
+    - ``instant (n (1 + n),)``: the derivative of that instant, then the columns of the tangent map of its
+      jumps so far. If ``map_is_known`` is 0, the first ``n`` numbers are the state before the jump instead,
+      and the map is computed when it is needed.
     """
 
-    count: INDICES
-    clock: VECTOR
+    counters: INDICES
+    numbers: VECTOR
     y: VECTOR
     side: INDICES
     on_guard: INDICES
@@ -237,15 +298,27 @@ class Work(Structure):
 WORK = Work.numba_type
 
 
-class Record(Structure):
+class Record(
+    Structure,
+    used=("steps", "jumps", "grazings", "matrices"),
+    step_time=("step_phase", "step_low", "step_length"),
+    step_place=("step_cycle", "step_mode", "step_jumps"),
+    jump_time=("jump_phase", "jump_transversality"),
+    jump_place=("jump_cycle", "jump_transition", "jump_kind", "jump_has_matrix"),
+    grazing_time=("grazing_phase", "grazing_value", "grazing_acceleration"),
+    grazing_place=("grazing_cycle", "grazing_transition", "grazing_jumps"),
+):
     """Room for what a run is asked to remember; arrays of length zero remember nothing.
 
-    ``used (4,)`` counts the steps, jumps, grazings and saltation matrices in it. A step: ``(phase, length,
-    what the phase lost in rounding)`` of its start, ``(cycle, mode, jump count)`` and polynomials ``(d + 1, n
-    + 1)`` of a place on [0, 1], the state and the time since. A jump: its phase and transversality, ``(cycle,
-    transition, kind, known)`` and the states ``(2, n)`` before and after. The saltation matrices ``(n, n)``
-    are those of the jumps where they are known, in order. A grazing: ``(phase, value, acceleration)`` of the
-    guard, ``(cycle, transition, jump count)`` and the state.
+    ``steps, jumps, grazings, matrices`` count the entries in use.
+
+    - A step: the phase of its start and what that has lost in rounding, its length, cycle, mode and the
+      number of jumps before it; polynomials ``(d + 1, n + 1)`` in a variable on [0, 1], of the state and of
+      the time since the start.
+    - A jump: its phase and cycle, the transition, its transversality and kind, the states ``(2, n)`` before
+      and after, and whether its saltation matrix ``(n, n)`` is recorded. The matrices follow in order.
+    - A grazing: its phase and cycle, the transition, the number of jumps before it, the guard's value and
+      acceleration, and the state.
     """
 
     used: INDICES
@@ -279,6 +352,26 @@ class Attempts(Structure):
 ATTEMPTS = Attempts.numba_type
 
 
+class Task(Structure):
+    """All that belongs to one run: the model and the method, its state, its memory and its record.
+
+    ``tangents`` is how many tangent vectors are carried; with ``orthonormal`` not zero they are
+    orthonormalised whenever they come too close to each other.
+    """
+
+    attempts: ATTEMPTS
+    model: MODEL
+    method: METHOD
+    run: RUN
+    record: RECORD
+    work: WORK
+    tangents: int64
+    orthonormal: int64
+
+
+TASK = Task.numba_type
+
+
 class Parts(Structure):
     """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
 
@@ -286,25 +379,18 @@ class Parts(Structure):
     a Runge-Kutta method need not even be compiled where every mode has a series.
     """
 
-    attempts: ATTEMPTS
-    runge_kutta_step: types.FunctionType(
-        types.UniTuple(float64, 2)(ATTEMPTS, MODEL, METHOD, RUN, RECORD, int64, boolean, float64, WORK)
-    )
+    runge_kutta_step: types.FunctionType(types.UniTuple(float64, 2)(TASK, float64))
     enter: types.FunctionType(int64(MODEL, RUN, WORK))
-    jump: types.FunctionType(void(MODEL, METHOD, RUN, RECORD, int64, int64, boolean, WORK))
-    finish_chatter: types.FunctionType(
-        boolean(MODEL, METHOD, RUN, RECORD, int64, float64, int64, boolean, WORK)
-    )
-    rest: types.FunctionType(void(MODEL, RUN, int64, int64, boolean, WORK))
-    first_in_order: types.FunctionType(int64(MODEL, RUN, RECORD, int64, WORK))
+    jump: types.FunctionType(void(TASK, int64))
+    finish_chatter: types.FunctionType(boolean(TASK, int64, float64))
+    rest: types.FunctionType(void(TASK, int64))
+    first_in_order: types.FunctionType(int64(TASK, int64))
 
 
 PARTS = Parts.numba_type
 
 # The driver itself comes as an argument to those who call it, for the same reason.
-ADVANCE = types.FunctionType(
-    int64(PARTS, MODEL, METHOD, RUN, RECORD, int64, boolean, int64, float64, int64, int64, WORK)
-)
+ADVANCE = types.FunctionType(int64(PARTS, TASK, int64, float64, int64, int64))
 
 # How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning in
 # comparisons (``math.isfinite`` takes the difference of a number and itself, which may be taken for zero).

@@ -21,6 +21,7 @@ from numba.extending import (
     NativeValue,
     infer_getattr,
     lower_getattr_generic,
+    lower_setattr_generic,
     models,
     register_model,
     typeof_impl,
@@ -36,11 +37,16 @@ MOST_SPARES = 4
 
 
 class StructureType(types.Type):
-    """The numba type of a structure: its name and the numba types of its ``fields``."""
+    """The numba type of a structure: its name, the numba types of its ``fields``, and its named entries.
 
-    def __init__(self, name, fields):
+    ``entries`` maps a name to the array field that holds it and to its index there: a number of a vector, or
+    a column of a matrix.
+    """
+
+    def __init__(self, name, fields, entries):
         super().__init__(name)
         self.fields = fields
+        self.entries = entries
 
     def place(self, field):
         """First word of a field in the table."""
@@ -57,11 +63,21 @@ class Structure:
 
     ``table`` holds the fields' words: a number itself, the address of a function or of another structure,
     the address and the shape of an array. The fields are fixed; ``replace`` makes a changed copy.
+
+    Numbers that change during a run are entries of an array. They have names, in the order of the entries:
+    after ``class Run(Structure, counters=("mode", "cycle"))``, ``run.mode`` reads and writes
+    ``run.counters[0]``, in a kernel and in Python. The columns of a matrix have names in the same way.
     """
 
-    def __init_subclass__(cls):
-        """Derive the numba type from the annotations."""
-        cls.numba_type = StructureType(cls.__name__, cls.__annotations__)
+    def __init_subclass__(cls, **named_entries):
+        """Derive the numba type from the annotations and from the names of entries."""
+        entries = {
+            name: (field, index) for field, names in named_entries.items() for index, name in enumerate(names)
+        }
+        cls.numba_type = StructureType(cls.__name__, cls.__annotations__, entries)
+        for name, (field, index) in entries.items():
+            setattr(cls, name, _entry(field, index, cls.__annotations__[field].ndim))
+        cls._entries = entries
         # Underscored: a field may have any other name.
         cls._words = {name: _words_of(name, kind) for name, kind in cls.__annotations__.items()}
         cls._places = {name: cls.numba_type.place(name) for name in cls.__annotations__}
@@ -96,6 +112,11 @@ class Structure:
         self._memory[:] = saved
 
     def __setattr__(self, name, value):
+        entry = self._entries.get(name)
+        if entry is not None:
+            array = getattr(self, entry[0])
+            array[entry[1] if array.ndim == 1 else (slice(None), entry[1])] = value
+            return
         raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
 
     def replace(self, **changes):
@@ -104,7 +125,11 @@ class Structure:
         copy.__dict__.update(self.__dict__)
         for name, value in changes.items():
             place, words = self._places[name], self._words[name](value)
-            table[place : place + len(words)] = words
+            if len(words) == 1:
+                # Ten times as fast as a slice.
+                table[place] = words[0]
+            else:
+                table[place : place + len(words)] = words
             copy.__dict__[name] = value
         copy._fill(table)
         return copy
@@ -190,6 +215,13 @@ class Layout:
         return made
 
 
+def _entry(field, index, ndim):
+    """The property that reads a named entry of an array field."""
+    if ndim > 1:
+        return property(lambda structure: getattr(structure, field)[:, index])
+    return property(lambda structure: getattr(structure, field).item(index))
+
+
 def _check_fields(kind, given):
     fields = kind.numba_type.fields
     if set(given) != fields.keys():
@@ -252,6 +284,9 @@ class _Fields(AttributeTemplate):
     key = StructureType
 
     def generic_resolve(self, structure, field):
+        if field in structure.entries:
+            kind = structure.fields[structure.entries[field][0]]
+            return kind.dtype if kind.ndim == 1 else _column_type(kind)
         return _seen_by_kernels(structure.fields.get(field))
 
 
@@ -264,18 +299,61 @@ def _seen_by_kernels(kind):
 
 @lower_getattr_generic(StructureType)
 def _field(context, builder, structure, address, field):
+    if field in structure.entries:
+        return _entry_of(context, builder, structure, address, field)
     kind = structure.fields[field]
     place = structure.place(field)
 
     def word(offset, llvm_type):
-        table = builder.bitcast(address, llvm_type.as_pointer())
-        loaded = builder.load(builder.gep(table, [context.get_constant(types.intp, place + offset)]))
-        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return loaded
+        return _word(context, builder, address, place + offset, llvm_type)
 
     if isinstance(kind, types.Array):
         return _array(context, builder, kind, word)
     return word(0, context.get_value_type(_seen_by_kernels(kind)))
+
+
+@lower_setattr_generic(StructureType)
+def _set_entry(context, builder, signature, arguments, field):
+    structure, _ = signature.args
+    address, value = arguments
+    builder.store(value, _place_of_entry(context, builder, structure, address, field))
+
+
+def _column_type(kind):
+    """The type of a column of a matrix: its numbers lie a row apart."""
+    return kind.copy(ndim=1, layout="A")
+
+
+def _entry_of(context, builder, structure, address, name):
+    """The value of a named entry of a vector, or the named column of a matrix."""
+    field, _ = structure.entries[name]
+    kind = structure.fields[field]
+    if kind.ndim == 1:
+        return builder.load(_place_of_entry(context, builder, structure, address, name))
+    place, integer = structure.place(field), context.get_value_type(types.intp)
+    rows, width = (_word(context, builder, address, place + axis, integer) for axis in (1, 2))
+    itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    column = context.make_array(_column_type(kind))(context, builder)
+    data = _place_of_entry(context, builder, structure, address, name)
+    strides = [builder.mul(width, itemsize)]
+    populate_array(column, data=data, shape=[rows], strides=strides, itemsize=itemsize, meminfo=None)
+    return column._getvalue()
+
+
+def _place_of_entry(context, builder, structure, address, name):
+    """Address of a named entry."""
+    field, index = structure.entries[name]
+    pointer = context.get_value_type(structure.fields[field].dtype).as_pointer()
+    array = _word(context, builder, address, structure.place(field), pointer)
+    return builder.gep(array, [context.get_constant(types.intp, index)], inbounds=True)
+
+
+def _word(context, builder, address, place, llvm_type):
+    """A word of the table, which never changes."""
+    table = builder.bitcast(address, llvm_type.as_pointer())
+    loaded = builder.load(builder.gep(table, [context.get_constant(types.intp, place)]))
+    loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return loaded
 
 
 def _array(context, builder, kind, word):

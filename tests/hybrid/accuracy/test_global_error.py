@@ -203,8 +203,8 @@ def test_jumps_agree_up_to_the_first_that_differs(one, other, agreeing):
 
 
 class Jumped:
-    def __init__(self, transition):
-        self.transition = transition
+    def __init__(self, transition_index):
+        self.transition_index = transition_index
 
     def __len__(self):
-        return len(self.transition)
+        return len(self.transition_index)

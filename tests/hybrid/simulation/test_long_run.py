@@ -52,8 +52,8 @@ def test_the_phase_of_impacts_stays_over_thousands_of_periods():
     record = trajectory.no_record()
     for count in (10, 100, 3000):
         assert trajectory.advance_to(count, phase + 0.5 * period, record) == codes.DONE
-        assert trajectory.run.count[codes.CYCLE] == count
-        assert trajectory.run.clock[codes.PHASE] == phase + 0.5 * period
+        assert trajectory.run.cycle == count
+        assert trajectory.run.phase == phase + 0.5 * period
         impact = trajectory.run.clock[[codes.LAST_JUMP_CYCLE, codes.LAST_JUMP_PHASE]]
         assert abs((impact[0] - count) * period + impact[1] - phase) < 1e-11
 

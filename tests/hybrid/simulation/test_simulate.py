@@ -299,12 +299,13 @@ class TestRunsKnowNothingOfOneAnother:
     def test_what_is_written_into_an_arc_stays_there(self, oscillator):
         first = simulate(oscillator, (0.1, 0.3), (0.0, 9.0), tangent=True)
         kept = first.x.copy(), first.parameters.copy()
-        for array in (first.x, first.parameters, first.fundamental, first.jumps.x_plus):
+        for array in (first.x, first.fundamental, first.jumps.x_plus):
             array[:] = np.nan
         first.propagators.clear()
+        first.parameters.clear()
         again = simulate(oscillator, (0.1, 0.3), (0.0, 9.0), tangent=True)
         np.testing.assert_array_equal(again.x, kept[0])
-        np.testing.assert_array_equal(again.parameters, kept[1])
+        assert again.parameters == kept[1]
         assert np.isfinite(again.fundamental).all()
         assert again.propagators
 

@@ -161,3 +161,49 @@ class TestLayout:
     def test_missing_fields_are_named(self):
         with pytest.raises(TypeError, match="Box has the fields places, parcel; got places"):
             Layout(Box, {"places": (2,)})
+
+
+class Place(Structure, counters=("mode", "cycle"), numbers=("phase",), table_of=("first", "second", "third")):
+    counters: types.int64[::1]
+    numbers: types.float64[::1]
+    table_of: types.float64[:, ::1]
+
+
+PLACE = Place.numba_type
+
+
+@numba.njit(types.void(PLACE, types.float64[::1]))
+def go_on(place, out):
+    place.mode += 3
+    place.cycle = place.mode * 2
+    place.phase = place.phase + 0.5
+    for row in range(place.second.shape[0]):
+        place.second[row] = 10.0 * row + place.first[row]
+    out[0], out[1] = place.phase, place.third[1]
+
+
+class TestNamedEntries:
+    def place(self):
+        table = np.arange(12.0).reshape(4, 3)
+        return Place(counters=np.array([1, 0]), numbers=np.array([0.25]), table_of=table)
+
+    def test_kernels_read_and_write_them(self):
+        place, out = self.place(), np.zeros(2)
+        go_on(place, out)
+        assert (place.mode, place.cycle, place.phase) == (4, 8, 0.75)
+        assert place.counters.tolist() == [4, 8]
+        assert out.tolist() == [0.75, 5.0]
+        assert place.second.tolist() == [0.0, 13.0, 26.0, 39.0]
+        assert place.table_of[:, 0].tolist() == [0.0, 3.0, 6.0, 9.0]
+        assert place.third.tolist() == [2.0, 5.0, 8.0, 11.0]
+
+    def test_python_reads_and_writes_them(self):
+        place = self.place()
+        place.cycle = 7
+        place.third = [1.0, 2.0, 3.0, 4.0]
+        assert place.counters.tolist() == [1, 7]
+        assert place.table_of[:, 2].tolist() == [1.0, 2.0, 3.0, 4.0]
+        with pytest.raises(AttributeError, match="Place.numbers is fixed"):
+            place.numbers = np.zeros(1)
+        with pytest.raises(AttributeError, match="Place.time is fixed"):
+            place.time = 1.0
