@@ -203,7 +203,7 @@ class TestNamedEntries:
         place.third = [1.0, 2.0, 3.0, 4.0]
         assert place.counters.tolist() == [1, 7]
         assert place.table_of[:, 2].tolist() == [1.0, 2.0, 3.0, 4.0]
-        with pytest.raises(AttributeError, match="Place.numbers is fixed"):
+        with pytest.raises(AttributeError, match=r"Place\.numbers is fixed"):
             place.numbers = np.zeros(1)
-        with pytest.raises(AttributeError, match="Place.time is fixed"):
+        with pytest.raises(AttributeError, match=r"Place\.time is fixed"):
             place.time = 1.0
