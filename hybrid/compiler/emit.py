@@ -22,7 +22,8 @@ from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.emitted import Emitted, Propagator, Series
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
-from hybrid.compiler.propagators import Boundary, known_positive, propagator
+from hybrid.compiler.propagators.choice import propagator
+from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
 from hybrid.errors import ModelError

@@ -1,0 +1,75 @@
+"""Half-integer powers of one guard, such as a Hertz contact, on a clock of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy
+
+from hybrid.compiler.emitted import Propagator, Series
+from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
+from hybrid.compiler.propagators.writing import CLOCK, Body, harmonics_of, names_of_state, seeds_of
+from hybrid.compiler.taylor.roots import ROOT, in_roots, on_clock, slope_along
+from hybrid.kernels.types.codes import DESINGULARISED
+from hybrid.symbolic.derivatives import directional, divergence
+from hybrid.symbolic.nodes import replaced
+from hybrid.symbolic.printer import assignments
+from hybrid.symbolic.tracing import Symbols
+
+
+def desingularised(mode: Equations) -> Propagator | str:
+    """Series on the clock ``dt = w ds``, where ``w`` is the square root of the guard."""
+    if not mode.bases:
+        return "it has no half-integer power of a guard"
+    if len(mode.bases) > 1:
+        return "it has fractional powers of more than one guard"
+    [z] = mode.bases
+    written = _write_desingularised(mode.field, mode.boundaries, mode.guards, z, mode.symbols)
+    reason = "half-integer powers of a guard, on the clock dt = w ds"
+    return Propagator(DESINGULARISED, 0, reason, written, tuple(mode.held))
+
+
+def _write_desingularised(
+    field: Sequence[sympy.Expr],
+    boundaries: Sequence[Boundary],
+    guards: Sequence[sympy.Expr],
+    z: sympy.Expr,
+    symbols: Symbols,
+) -> Series:
+    """Series on the clock ``dt = w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
+
+    All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
+    with a speed of zero too it would stay there. What it is started at is below the rounding of ``z``.
+
+    A guard is a small difference of states, and its rounding is felt: by the energy, and a thousandfold by
+    the tangent vectors. The root has none of that. So a step goes on with the root that the last one ended
+    with, ``z`` is its square, and only a root that has drifted from the states is taken from them again.
+    """
+    harmonics = harmonics_of(field, symbols)
+    field = [replaced(rate, harmonics) for rate in field]
+    # The time since the start comes behind the states among what is advanced.
+    body = Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
+    clock, (root, *driven) = body.column(CLOCK), body.rows.values()
+    seeds = seeds_of(symbols)
+    slope = slope_along(field, z, symbols)
+    rates = [on_clock(rate, z) for rate in field]
+    tangents = [on_clock(along, z) for along in directional(field, seeds)]
+    trace = on_clock(divergence(field, symbols.x), z)
+    # Where z is zero its root crosses zero, with a slope.
+    roots = in_terms_of_root(boundaries, z, ROOT, symbols)
+    crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
+    columns, starts = names_of_state(symbols)
+    body.start_root("root", z, min(roots))
+    turning = [ROOT * replaced(function.diff(symbols.t), harmonics) for function in harmonics]
+    begun = [f"start{i}" for i in range(len(harmonics))]
+    body.preamble += assignments(begun, list(harmonics))
+    return body.assemble(
+        [*symbols.x, None, ROOT, *harmonics.values()],
+        [*columns, clock, root, *driven],
+        [*starts, "0.0", "root", *begun],
+        [*rates, ROOT, in_roots(slope / 2, z), *turning],
+        crossing,
+        trace,
+        tangents,
+        seeds,
+    )

@@ -1,0 +1,134 @@
+"""The equations of a mode as propagators need them: field, guards, and the guards whose roots the field has.
+
+What a guard says of the states inside its mode is used: where ``x1 - x2 >= 0`` in the whole mode,
+``max(x1 - x2, 0)`` is ``x1 - x2`` there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+
+import attrs
+import sympy
+
+from hybrid.compiler.taylor.roots import is_multiple, singular_bases
+from hybrid.symbolic.derivatives import partial_derivatives
+from hybrid.symbolic.expressions import ZERO
+from hybrid.symbolic.nodes import mentions, nodes
+from hybrid.symbolic.signs import sign_of, simplified
+from hybrid.symbolic.tracing import Symbols
+
+ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
+
+
+@attrs.frozen
+class Boundary:
+    """A guard of a mode: its expression, and its sign inside the mode if the mode ends there, else 0."""
+
+    guard: sympy.Expr | None
+    inside: int
+    is_affine: bool = False
+
+
+def known_positive(boundaries: Iterable[Boundary]) -> list[sympy.Expr]:
+    """What is positive or zero in the whole mode, since it ends where its guards say."""
+    return [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
+
+
+def columns_of_guards(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy.Expr]:
+    """What the columns of the guards hold; zero for a guard that is bounded by its program instead."""
+    pairs = zip(boundaries, held, strict=True)
+    return [b.guard if is_held and b.guard is not None else ZERO for b, is_held in pairs]
+
+
+@attrs.frozen
+class Equations:
+    """A mode: its field, its guards, and what a series of it needs to know of them.
+
+    Attributes
+    ----------
+    field
+        The rates, simplified by the signs of the guards inside the mode.
+    boundaries
+        The guards.
+    symbols
+        Those of time, state and parameters.
+    bases
+        Guards whose half-integer powers the field has.
+    held
+        For each guard, whether the series of the mode hold it.
+    """
+
+    field: Sequence[sympy.Expr]
+    boundaries: Sequence[Boundary]
+    symbols: Symbols
+    bases: Sequence[sympy.Expr]
+    held: Sequence[bool]
+
+    @cached_property
+    def guards(self) -> list[sympy.Expr]:
+        """What the columns of the guards hold."""
+        return columns_of_guards(self.boundaries, self.held)
+
+    @cached_property
+    def jacobian(self) -> list[list[sympy.Expr]]:
+        """``D_x f``."""
+        return partial_derivatives(self.field, self.symbols.x)
+
+    @cached_property
+    def is_affine(self) -> bool:
+        """Whether the field is affine in the state, with constant coefficients."""
+        return not any(mentions(entry, self.symbols.variables) for row in self.jacobian for entry in row)
+
+    @cached_property
+    def has_elementary_forcing(self) -> bool:
+        """Whether the field has polynomials, harmonics and exponentials of time only."""
+        return all(_elementary(entry, self.symbols) for entry in self.field)
+
+
+def equations_of(field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], symbols: Symbols) -> Equations:
+    """The equations of a mode from its traced field and its guards.
+
+    Raises
+    ------
+    NoSeries
+        If the field has a fractional power of an expression that is no guard.
+    """
+    known = known_positive(boundaries)
+    field = [simplified(entry, known) for entry in field]
+    bases = singular_bases(field, known, symbols)
+    held = tuple(_is_held(boundary, bases, symbols) for boundary in boundaries)
+    return Equations(field, boundaries, symbols, bases, held)
+
+
+def _is_held(boundary: Boundary, bases: Sequence[sympy.Expr], symbols: Symbols) -> bool:
+    """Whether the series of a mode hold the guard: an affine one, and one whose root they may hold."""
+    guard = boundary.guard
+    if guard is None:
+        return False
+    return boundary.is_affine or any(is_multiple(guard, z, symbols) for z in bases)
+
+
+def in_terms_of_root(
+    boundaries: Sequence[Boundary], z: sympy.Expr, root: sympy.Symbol, symbols: Symbols
+) -> dict[int, sympy.Expr]:
+    """By place, the guards that are multiples of ``z``: the root with the sign of the guard in the mode."""
+    return {
+        place: (boundary.inside or sign_of(boundary.guard, [z]) or 1) * root
+        for place, boundary in enumerate(boundaries)
+        if boundary.guard is not None and is_multiple(boundary.guard, z, symbols)
+    }
+
+
+def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
+    """Whether it depends on time by polynomials and by harmonics and exponentials of linear functions."""
+    for node in nodes(entry):
+        if not mentions(node, (symbols.t,)) or node.is_Symbol or node.is_Add or node.is_Mul:
+            continue
+        if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
+            continue
+        if isinstance(node, ELEMENTARY) and not mentions(node.args[0].diff(symbols.t), (symbols.t,)):
+            continue
+        return False
+    return True

@@ -1,0 +1,64 @@
+"""Roots of guards that are smooth in time, such as the level of a tank that empties."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import sympy
+
+from hybrid.compiler.emitted import Propagator, Series
+from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
+from hybrid.compiler.propagators.writing import Body, names_of_state, seeds_of
+from hybrid.compiler.taylor.roots import Root, in_roots, regular_root
+from hybrid.compiler.taylor.series import ONE_THEN_ZERO
+from hybrid.kernels.types.codes import ROOTED
+from hybrid.symbolic.derivatives import directional, divergence
+from hybrid.symbolic.tracing import Symbols
+
+
+def rooted(mode: Equations) -> Propagator | str:
+    """Series in time of the state and of those roots of guards that are smooth in time."""
+    candidates = (regular_root(mode.field, z, place, mode.symbols) for place, z in enumerate(mode.bases))
+    roots = [root for root in candidates if root is not None]
+    if not roots:
+        return "no root of a guard in it is smooth in time"
+    written = _write_rooted(mode.field, mode.boundaries, mode.guards, roots, mode.symbols)
+    reason = "half-integer powers of a guard, whose root is smooth"
+    return Propagator(ROOTED, 0, reason, written, tuple(mode.held))
+
+
+def _write_rooted(
+    field: Sequence[sympy.Expr],
+    boundaries: Sequence[Boundary],
+    guards: Sequence[sympy.Expr],
+    roots: Sequence[Root],
+    symbols: Symbols,
+) -> Series:
+    """Series in time of the states and of the roots of guards, whose half-integer powers are theirs."""
+    body = Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
+    seeds = seeds_of(symbols)
+
+    def in_all_roots(expression: sympy.Expr) -> sympy.Expr:
+        for root in roots:
+            expression = in_roots(expression, root.base, root.symbol)
+        return expression
+
+    signed: dict[int, sympy.Expr] = {}
+    names = [f"root_{root.symbol}" for root in roots]
+    for name, root in zip(names, roots, strict=True):
+        places = in_terms_of_root(boundaries, root.base, root.symbol, symbols)
+        body.start_root(name, root.base, min(places))
+        signed |= places
+    crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
+    columns, starts = names_of_state(symbols)
+    trace = divergence(field, symbols.x)
+    return body.assemble(
+        [*symbols.x, *(root.symbol for root in roots)],
+        [*columns, *body.rows.values()],
+        [*starts, *names],
+        [*(in_all_roots(rate) for rate in field), *(in_all_roots(root.rate) for root in roots)],
+        crossing,
+        in_all_roots(trace),
+        [in_all_roots(along) for along in directional(field, seeds)],
+        seeds,
+    )

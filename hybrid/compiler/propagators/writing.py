@@ -1,0 +1,182 @@
+"""The statements of a series: columns, loops over the orders, and how they are put one into the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import sympy
+
+from hybrid.compiler.emitted import Series
+from hybrid.compiler.propagators.equations import ELEMENTARY
+from hybrid.compiler.taylor.loops import StateLoop, TangentLoop, indented, padded
+from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences
+from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.symbolic.constants import Constants
+from hybrid.symbolic.derivatives import directional, divergence
+from hybrid.symbolic.nodes import mentions, nodes_of
+from hybrid.symbolic.printer import assignments
+from hybrid.symbolic.tracing import Symbols
+
+# Columns behind those of the guards: the time since the step's start, the integral of div f. All these are
+# written and evaluated as whole vectors; the others follow, the root of a desingularised mode first.
+CLOCK, DIVERGENCE, OTHERS = range(3)
+# The square root of a guard is started from no less than this share of the sizes it is a difference of.
+FLOOR = 1e-17
+# Share of those sizes below which the guard and the square of a root differ by rounding.
+SAME_ROOT = 1e-13
+
+
+def write_series(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols) -> Series:
+    """The series of a field in time, without and with tangent vectors."""
+    body = Body(symbols, guards, (), ONE_THEN_ZERO)
+    seeds = seeds_of(symbols)
+    tangents = directional(field, seeds)
+    trace = divergence(field, symbols.x)
+    return body.assemble(symbols.x, *names_of_state(symbols), field, guards, trace, tangents, seeds)
+
+
+def harmonics_of(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr, sympy.Symbol]:
+    """Symbols for the sines, cosines and exponentials of linear functions of time, closed under ``d/dt``.
+
+    On a clock of their own they are states like others: their rates share the factor of all rates.
+    """
+    found: dict[sympy.Expr, sympy.Symbol] = {}
+    for node in sorted(nodes_of(ELEMENTARY, *field), key=sympy.default_sort_key):
+        slope = node.args[0].diff(symbols.t)
+        if slope == 0 or mentions(slope, (symbols.t,)) or mentions(node, symbols.x):
+            continue
+        for function in PAIRS.get(node.func, (node.func,))[:2]:
+            found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))
+    return found
+
+
+def seeds_of(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:
+    """The component of a tangent vector that belongs to each state."""
+    return {x: sympy.Symbol(f"v{i}", real=True) for i, x in enumerate(symbols.x)}
+
+
+def names_of_state(symbols: Symbols) -> tuple[list[str], list[str]]:
+    """Columns of the state, and what its components start from, as text."""
+    n = len(symbols.x)
+    return [str(i) for i in range(n)], [f"x[{i}]" for i in range(n)]
+
+
+class Body:
+    """The body of one mode: allots columns, and puts the loops one into the other.
+
+    Parameters
+    ----------
+    others
+        Symbols besides the states, each of which has a column.
+    time
+        Text of the coefficients of time from the first on; the prefix of the local variables goes into it.
+    """
+
+    def __init__(
+        self, symbols: Symbols, guards: Sequence[sympy.Expr], others: Iterable[sympy.Symbol], time: str
+    ) -> None:
+        self.symbols, self.time = symbols, time
+        self.n = len(symbols.x)
+        self.behind_guards = self.n + len(guards)
+        self.columns = padded(self.behind_guards + OTHERS, WIDE)
+        self.rows = {symbol: self.allot() for symbol in others}
+        self.constants = Constants()
+        self.preamble: list[str] = []
+        self.at_start: dict[sympy.Expr, str] = {}
+
+    def column(self, place: int) -> str:
+        """A column behind those of the guards."""
+        return str(self.behind_guards + place)
+
+    def start_root(self, name: str, z: sympy.Expr, place: int) -> None:
+        """Statements for the value ``name`` that the root of ``z``, the guard in a place, starts from."""
+        size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
+        self.at_start[z] = f"{name}*{name}"
+        self.preamble += [
+            *assignments(["z", "size"], [z, size]),
+            f"last = abs(out[order + 1, {self.n + place}])",
+            # Anything as close to the root as this is one, whoever left it there.
+            f"same = abs(last*last - z) <= {SAME_ROOT}*size < z",
+            f"{name} = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
+        ]
+
+    def allot(self) -> str:
+        """A new column."""
+        self.columns += 1
+        return str(self.columns - 1)
+
+    def assemble(
+        self,
+        names: Sequence[sympy.Symbol | None],
+        columns: list[str],
+        starts: list[str],
+        rates: Sequence[sympy.Expr],
+        guards: Sequence[sympy.Expr],
+        trace: sympy.Expr,
+        tangents: Sequence[sympy.Expr],
+        seeds: dict[sympy.Symbol, sympy.Symbol],
+    ) -> Series:
+        """The series without and with tangent vectors.
+
+        Those without know nothing of what only tangent vectors need: the products in their rates, and the
+        divergence.
+        """
+        free = self.columns
+        alone = self._state("s", names, columns, starts, rates, guards)
+        self._place_pairs(alone.block)
+        width, self.columns = self.columns, free
+        names, rates = [*names, None], [*rates, trace]
+        columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, "0.0"]
+        moved = self._state("a", names, columns, starts, rates, guards)
+        vectors = Recurrences(
+            dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, moved.block, lanes=True
+        )
+        vectors.expect(seeds.values(), tangents)
+        carried = TangentLoop(list(seeds.values()), vectors)
+        carried.compute(tangents)
+        self._place_pairs(moved.block)
+        together = [*moved.higher(), *carried.higher()]
+        shared = [*self.preamble, *self.constants.statements(), "o = 0"]
+        return Series(
+            (*shared, *alone.first(), *_each_order(alone.higher())),
+            (groups(self.n), *shared, *moved.first(), *carried.first(), *_each_order(together)),
+            padded(max(width, self.columns), WIDE),
+            0,
+            carried.columns,
+        )
+
+    def _state(
+        self,
+        prefix: str,
+        names: Sequence[sympy.Symbol | None],
+        columns: list[str],
+        starts: list[str],
+        rates: Sequence[sympy.Expr],
+        guards: Sequence[sympy.Expr],
+    ) -> StateLoop:
+        """The loop of the state, and of what else there are ``rates`` for; local names have a prefix."""
+        state = {x: str(i) for i, x in enumerate(self.symbols.x)}
+        time = self.symbols.t, self.time.format(prefix)
+        block = Recurrences(
+            {**state, **self.rows}, time, self.allot, prefix, self.constants, at_start=self.at_start
+        )
+        block.expect(names, rates)
+        moved = StateLoop(names, columns, rates, starts, block)
+        crossing = {str(self.n + place): block.coefficient(guard) for place, guard in enumerate(guards)}
+        moved.write_front(self.behind_guards + OTHERS, crossing)
+        return moved
+
+    def _place_pairs(self, block: Recurrences) -> None:
+        for factors in "ab" if block.common_left is None else "b":
+            self.columns = padded(self.columns, WIDE)
+            self.preamble.append(f"{block.prefix}{factors} = {self.columns}")
+            self.columns += padded(len(block.pairs))
+
+
+def groups(n: int) -> str:
+    """The statement that counts the groups of tangent vectors that are worked on at once."""
+    return f"groups = (len(x)//{n} + {NARROW - 2})//{NARROW}"
+
+
+def _each_order(statements: Iterable[str]) -> list[str]:
+    return ["for o in range(1, order + 1):", *indented(["shrink = 1.0/o", *statements])]
