@@ -21,7 +21,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels.types.codes import NARROW, NO_MODE, RUNGE_KUTTA
 from hybrid.system.functions import CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of
-from hybrid.system.periodicity import period_fault
+from hybrid.system.periodicity import period_at, period_fault
 
 if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
@@ -172,7 +172,7 @@ class CompiledSystem:
         values = self.system.parameter_values(parameters)
         # Runs may share a model.
         values.flags.writeable = False
-        period = self.system.period_at(values) or 0.0
+        period = period_at(self.system.period, self.system.variables, values) or 0.0
         if parameters and not self.emitted.proved_period:
             self._check_period(values, period)
         changes: dict[str, Any] = {"parameters": values, "period": period}

@@ -144,10 +144,10 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     places = np.empty((count, 3), dtype=np.int64)
     kernel = entry(load_kernels("hybrid.kernels.events.sections").strobe)
     record, bursts = trajectory.no_record(), Bursts([trajectory])
-    task = trajectory.task(record, tangents=False)
     first, total, code = int(trajectory.run.cycle) + 1, 0, codes.GO_ON
     # Points need no tangent vectors, which the trajectory may have.
     plain = attrs.evolve(trajectory, tangents=0)
+    task = plain.task(record)
     while code == codes.GO_ON:
         done, code = kernel(
             address(load_kernels().advance),

@@ -180,18 +180,22 @@ class Trajectory:
             )
         )
 
-    def task(self, record: Any, *, orthonormal: bool = False, tangents: bool = True) -> Any:
-        """What the driver works on: this run and a record, perhaps without the tangent vectors.
+    def task(self, record: Any, *, orthonormal: bool = False) -> Any:
+        """What the driver works on: this run and a record.
 
         With ``orthonormal`` these are orthonormalised whenever they come too close to each other.
         """
-        changes: dict[str, Any] = {"run": self.run, "record": record, "work": self.work}
+        # A run may go on without the tangent vectors that it began with.
+        changes: dict[str, Any] = {
+            "run": self.run,
+            "record": record,
+            "work": self.work,
+            "tangents": self.tangents,
+        }
         if self.model is not self.plan.model:
             changes["model"] = self.model
         if orthonormal:
             changes["orthonormal"] = 1
-        if not tangents:
-            changes["tangents"] = 0
         return self.plan.task.replace(**changes)
 
     def release(self) -> None:

@@ -196,11 +196,9 @@ class HybridSystem(Portable):
 
     def forcing_period(self, overrides: Mapping[str, float] | None = None) -> float | None:
         """Forcing period at the given parameters, or None if the system declares none."""
-        return None if self.period is None else self.period_at(self.parameter_values(overrides))
-
-    def period_at(self, values: np.ndarray) -> float | None:
-        """Forcing period at a parameter vector ``(m,)``, or None if the system declares none."""
-        return period_at(self.period, self.variables, values)
+        if self.period is None:
+            return None
+        return period_at(self.period, self.variables, self.parameter_values(overrides))
 
     def _check_graph(self) -> None:
         if not self.modes:

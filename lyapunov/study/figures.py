@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lyapunov.floquet import floquet_exponents
+from lyapunov.plot import COLOURS, INK, plot_convergence, plot_phase_portrait, style
 from lyapunov.study.paper import ROWS
+from lyapunov.study.regimes import Panel, plot_regimes
 from lyapunov.study.report import histories, paper_columns
 from lyapunov.study.runs import Regime
 from lyapunov.study.tangents import Trap
-from lyapunov.floquet import floquet_exponents
-from lyapunov.plot import COLOURS, INK, plot_convergence, plot_phase_portrait, style
-from lyapunov.study.regimes import Panel, plot_regimes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,9 +80,7 @@ def convergence(regime: Regime) -> Figure:
         points = {name: _printed(theirs[name]) for name in names if name in theirs}
         points = {name: point for name, point in points.items() if len(point[0])}
         shown = {name: ours[name] for name in names}
-        plot_convergence(
-            shown, points=points, points_label="paper", truth=truth, truth_label=label, ax=ax
-        )
+        plot_convergence(shown, points=points, points_label="paper", truth=truth, truth_label=label, ax=ax)
         if names != ("(9)",):
             _fit_height(ax, list(shown.values()), [point[1] for point in points.values()], truth)
         ax.set_title(title)

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from hybrid.display.tables import table
+from lyapunov.floquet import floquet_exponents
+from lyapunov.statistics import running_tapered_mean
 from lyapunov.study.paper import DOUBTFUL, PAPER, ROWS
 from lyapunov.study.runs import STARTS, Regime
 from lyapunov.study.tangents import TRAP_OMEGA, Explanation, Trap
-from lyapunov.floquet import floquet_exponents
-from lyapunov.statistics import running_tapered_mean
 
 # An explanation is worth the name if it leaves at most this part of the disagreement.
 EXPLAINS = 0.5
@@ -64,7 +64,14 @@ def regime_text(regime: Regime) -> str:
                 row.append(number(theirs[name][ROWS.index(M)] if M in ROWS else None))
     expected = f"; the paper: {PAPER[regime.omega].regime}, {PAPER[regime.omega].expected}" if theirs else ""
     title = f"omega = {regime.omega:.2f} rad/s: {regime.kind}{expected}"
-    parts = [title, "-" * len(title), table(headings, rows, numbers=True), "", *_starts(regime), *_spectrum(regime)]
+    parts = [
+        title,
+        "-" * len(title),
+        table(headings, rows, numbers=True),
+        "",
+        *_starts(regime),
+        *_spectrum(regime),
+    ]
     parts += _orbit(regime) + _trouble(regime)
     return "\n".join(parts)
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from hybrid import DOP853, HybridSystem, Mode, Taylor, Tsit5, periodic_orbit, simulate
 from hybrid.solvers import Solver
-from lyapunov.study.paper import DOUBTFUL
-from lyapunov.study.runs import STARTS, Settings
 from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import lyapunov_spectrum
+from lyapunov.study.paper import DOUBTFUL
+from lyapunov.study.runs import STARTS, Settings
 
 TOLERANCES = tuple(10.0**-digits for digits in range(4, 11))
 LOOSE = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
@@ -113,9 +113,7 @@ def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
     return Trap(truth, np.array(TOLERANCES), np.array(inside), np.array(outside))
 
 
-def _uncontrolled_exponents(
-    extended: HybridSystem, omega: float, solver: Solver, periods: int
-) -> np.ndarray:
+def _uncontrolled_exponents(extended: HybridSystem, omega: float, solver: Solver, periods: int) -> np.ndarray:
     """Exponents ``(4,)`` by QR of tangent vectors that the error control does not see, from start I.
 
     One column at a time: the steps follow the state alone, so they are the same for all.

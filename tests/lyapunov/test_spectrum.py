@@ -382,3 +382,13 @@ def test_vectors_that_only_rounding_tells_apart_are_reported():
     status = status_of(trajectory, hybrid.kernels.types.codes.DONE)
     assert status.code == hybrid.StatusCode.INDISTINCT_TANGENTS
     assert "2 times only rounding was left" in status.message
+
+
+def test_steps_and_jumps_are_counted_per_interval():
+    """As a run of the same length counts them, with the same tangent vectors."""
+    system = models.impact_oscillator()
+    spectrum = lyapunov.lyapunov_spectrum(system, (0.3, 0.2), intervals=40, transient=0)
+    arc = hybrid.simulate(system, (0.3, 0.2), (0.0, 40 * spectrum.interval), tangent=True)
+    assert spectrum.jumps_per_interval * 40 == pytest.approx(len(arc.jumps), abs=1e-9)
+    # The end of an interval cuts a step in two.
+    assert arc.steps <= spectrum.steps_per_interval * 40 <= arc.steps + 40

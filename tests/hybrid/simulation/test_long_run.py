@@ -54,8 +54,8 @@ def test_the_phase_of_impacts_stays_over_thousands_of_periods():
         assert trajectory.advance_to(count, phase + 0.5 * period, record) == codes.DONE
         assert trajectory.run.cycle == count
         assert trajectory.run.phase == phase + 0.5 * period
-        impact = trajectory.run.clock[[codes.LAST_JUMP_CYCLE, codes.LAST_JUMP_PHASE]]
-        assert abs((impact[0] - count) * period + impact[1] - phase) < 1e-11
+        run = trajectory.run
+        assert abs((run.last_jump_cycle - count) * period + run.last_jump_phase - phase) < 1e-11
 
 
 def test_energy_drifts_by_the_tolerance_and_at_the_tightest_hardly():

@@ -173,3 +173,35 @@ def test_what_cannot_be_traced_is_told():
     fails(lambda t, x, p: (np.where(x.a > 0),), "np.where needs both values")
     fails(lambda t, x, p: np.linalg.inv(np.outer(x, x)), "Error", state=2)
     fails(lambda t, x, p: (x.a / 0,), "not a real number")
+
+
+@pytest.mark.parametrize(
+    "ufunc", [np.sin, np.tan, np.arctan, np.sinh, np.tanh, np.cbrt, np.cos, np.cosh, np.abs]
+)
+@pytest.mark.parametrize(
+    "negative", [lambda a: -a, lambda a: -2.0 * a, lambda a: -a * a * a, lambda a: a * -1]
+)
+def test_a_negative_argument(ufunc, negative):
+    """Odd functions change their sign with that of a product too, even ones do not."""
+    for a in (0.4, -1.3):
+        found = evaluate(traced_scalar(lambda u, v: ufunc(negative(u))), 0.0, np.array([a, 0.0]), [])
+        assert found[0] == pytest.approx(float(ufunc(negative(a))), rel=1e-15)
+
+
+def test_all_symbols_are_real():
+    symbols = model_symbols(2, 3)
+    assert all(each.is_real for each in (symbols.t, *symbols.x, *symbols.p))
+    assert [each.name for each in (*symbols.x, *symbols.p)] == ["x[0]", "x[1]", "p[0]", "p[1]", "p[2]"]
+
+
+@pytest.mark.parametrize("x", [-2.0, 0.25, 3.0])
+def test_piecewise_with_and_without_a_default(x):
+    def with_default(a, b):
+        return np.piecewise(a, [a < 0, a > 1], [lambda z: -z, lambda z: z * z, 7.0])
+
+    def without(a, b):
+        return np.piecewise(a, [a < 0, a > 1], [lambda z: -z, lambda z: z * z])
+
+    for function in (with_default, without):
+        found = evaluate(traced_scalar(function), 0.0, np.array([x, 0.0]), [])
+        assert found[0] == function(np.array([x]), None)[0]

@@ -256,10 +256,13 @@ class EventsTwice(Engine):
     def simulate(self, system, x0, t_span, **options):
         arc = hybrid.simulate(system, x0, t_span, **options)
         jumps = arc.jumps
+        columns = [each for each in attrs.fields(type(jumps)) if each.type == "np.ndarray"]
         twice = {
-            name: np.repeat(getattr(jumps, f"_{name}"), 2, axis=0)
-            for name in ("time", "place", "states", "recorded")
+            each.alias: np.repeat(getattr(jumps, each.name), 2, axis=0)
+            for each in columns
+            if each.name != "_parameters"
         }
+        assert len(twice) > 3
         return attrs.evolve(arc, jumps=attrs.evolve(jumps, **twice))
 
 
