@@ -1,7 +1,7 @@
-"""Properties that every hybrid system has, checked on drawn runs: for the library's models and for yours.
+"""Properties that every hybrid system must have, checked on randomly drawn runs of a model.
 
-``check_system(system)`` checks them all. Each is also a function of one :class:`Case` for tests of your own,
-``@given(cases(system))``.
+``check_system(system)`` checks all of them. Each property is also a function of one :class:`Case`, for your
+own tests with ``@given(cases(system))``.
 """
 
 from hybrid.testing.case import Case, Engine, PropertyError, Run, discard

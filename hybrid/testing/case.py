@@ -1,4 +1,4 @@
-"""One run to judge properties by: how it is carried out, found fit, and told when a property fails."""
+"""One example for the properties: how its run is computed, accepted, and described when a property fails."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
-# The same run with tolerances this much looser tells how far its end can be trusted.
+# The run is repeated with tolerances looser by this factor, to estimate the error at its end.
 LOOSER = 100.0
-# A run is cut short after this many jumps: more of them show nothing new.
+# A run is cut short after this many jumps: more jumps test nothing new.
 MOST_JUMPS = 5
-# A run whose end moves by more than this with the tolerances, relative to its size, proves nothing.
+# A run is discarded if looser tolerances move its end by more than this, relative to its size.
 SENSITIVE = 1e-6
 
 
 class PropertyError(AssertionError):
-    """A property that every system has does not hold; the text tells the case and what is likely wrong."""
+    """A property that every system must have fails; the message gives the case and the likely cause."""
 
 
 def discard(reason: str) -> NoReturn:
-    """Give an example up that can be neither right nor wrong; Hypothesis draws another one."""
+    """Discard an example that cannot be judged; Hypothesis then draws another one."""
     raise UnsatisfiedAssumption(reason)
 
 
 def as_case(case: object) -> Case:
-    """A case, or an ArgumentError."""
+    """Return a case, or raise an ArgumentError."""
     return arguments.instance("case", case, Case, "Draw one with hybrid.testing.cases.")
 
 
 class Engine:
-    """What solves and linearises: the library, unless a subclass puts something else to the test."""
+    """Computes runs and derivatives: with the library, unless a subclass tests something else."""
 
     def simulate(
         self, system: HybridSystem, x0: Any, t_span: tuple[float, float], **options: Any
@@ -71,7 +71,7 @@ class Engine:
         x: np.ndarray,
         parameters: np.ndarray,
     ) -> np.ndarray:
-        """The derivative ``(rows, n + 1)`` that runs use of the field of a mode, a guard or a reset."""
+        """The derivative ``(rows, n + 1)`` of a field, guard or reset, as runs use it."""
         return compile_system(system).derivative(function, index, t, x, parameters)
 
     def value(
@@ -83,7 +83,7 @@ class Engine:
         x: np.ndarray,
         parameters: np.ndarray,
     ) -> np.ndarray:
-        """The values ``(rows,)`` that runs use of a field, a guard, its condition or a reset."""
+        """The values ``(rows,)`` of a field, guard, condition or reset, as runs use them."""
         return compiled_value(compiled, function, index, t, x, parameters)
 
 
@@ -92,18 +92,18 @@ LIBRARY = Engine()
 
 @attrs.frozen(eq=False)
 class Run:
-    """A run that is fit to be judged by.
+    """A run that properties can be judged on.
 
     Attributes
     ----------
     arc
-        The run, every jump of it transverse.
+        The run; all its jumps are transverse.
     t1
-        Its end, before the first chatter, grazing or status that ended it.
+        End of the run, before any chatter, grazing or status that would end it.
     error
-        By how much its end moves with the tolerances, ``(n,)``.
+        Change of the end state with looser tolerances, ``(n,)``.
     scale
-        Sizes of the components along it, ``(n,)``.
+        Sizes of the components along the run, ``(n,)``.
     """
 
     arc: HybridArc
@@ -113,7 +113,7 @@ class Run:
 
     @property
     def tolerance(self) -> np.ndarray:
-        """How close the ends of two runs that should be the same must be, ``(n,)``."""
+        """Largest allowed difference between the ends of two runs that should agree, ``(n,)``."""
         return 1e-9 * self.scale + LOOSER * self.error
 
 
@@ -126,19 +126,20 @@ class Case:
     system
         The model.
     parameters
-        All of its values, by name.
+        Values of all parameters, by name.
     mode
-        Where the run starts; None if the guards allow the state in no mode.
+        Mode in which the run starts; None if no mode allows the state.
     x0, t0, t1
-        State ``(n,)`` at the start, and the span of time.
+        State ``(n,)`` at the start, and the time span.
     fraction
-        Between 0 and 1: which jump is looked at, where the run is split or cut, how guards are scaled.
+        Between 0 and 1: selects the jump to examine, where to split or cut the run, and the factor of the
+        guards.
     passable
-        Names of transitions through whose guard the state may go on in the same mode.
+        Names of transitions whose guard the state may cross and stay in the same mode.
     solver
         Method and tolerances of every run.
     engine
-        What carries them out.
+        Computes the runs.
     """
 
     system: HybridSystem
@@ -156,7 +157,7 @@ class Case:
         return f"Case({self.told()})"
 
     def told(self) -> str:
-        """The case in words, only those parameters named that are not as declared."""
+        """The case in words; names only the parameters that differ from the declared values."""
         changed = [
             f"{name} = {value:.10g}"
             for name, value in self.parameters.items()
@@ -181,14 +182,14 @@ class Case:
         return self.system.parameter_values(self.parameters)
 
     def evaluate(self, function: Any, t: float, x: Any) -> np.ndarray:
-        """A model function in plain Python, as a flat array; discards the example where it is not finite."""
+        """Evaluate a model function in plain Python, as a flat array; discard the example if not finite."""
         values = evaluate(self.system.variables, function, t, np.asarray(x, dtype=float), self.values)
         if values is None:
             discard("a model function is not finite")
         return np.asarray(values)
 
     def slope(self, function: ModelFunction, owner: str, t: float, x: np.ndarray) -> np.ndarray:
-        """The derivative ``(rows, n + 1)`` that runs use of a function of the mode or transition named."""
+        """The derivative ``(rows, n + 1)``, as runs use it, of a function of mode or transition ``owner``."""
         system = self.system
         index = system.mode_index(owner) if function.kind == "field" else system.transition_index(owner)
         slope = self.engine.derivative(system, function, index, t, x, self.values)
@@ -202,7 +203,7 @@ class Case:
         return attrs.evolve(self.solver, rtol=LOOSER * self.solver.rtol, atol=LOOSER * self.solver.atol)
 
     def transition(self, jump: Jump) -> Transition:
-        """The transition that a jump took."""
+        """The transition of a jump."""
         return self.system.transitions[self.system.transition_index(jump.transition)]
 
     def simulate(
@@ -214,7 +215,7 @@ class Case:
         extra: Mapping[str, float] | None = None,
         **options: Any,
     ) -> HybridArc:
-        """The run of this case, or of a changed system, from its start or from another one, to ``t1``."""
+        """Run this case or a changed system to ``t1``, from the start of the case or from another start."""
         t0, x0, mode = start or (self.t0, self.x0, self.mode)
         arc = self.engine.simulate(
             system or self.system,
@@ -230,10 +231,10 @@ class Case:
 
     @cached_property
     def run(self) -> Run:
-        """The run, if it is fit to be judged by; an example that is not is discarded.
+        """The run of the case; the example is discarded if its run cannot be judged.
 
-        A run that chatters, grazes or ends early is cut short before that. It is not fit if two guards are
-        reached together, or if its events or its end hang on the tolerances.
+        A run that chatters, grazes or ends early is cut short before that. A run cannot be judged if two
+        guards are reached together, or if its events or its end depend on the tolerances.
         """
         found = self._run
         if isinstance(found, str):
@@ -253,7 +254,7 @@ class Case:
             t1 = _before_trouble(arc)
             arc = self.simulate(t1)
         if not is_clean(arc):
-            return f"the run is not fit: {arc.status}" if not arc.status.ok else "the run grazes or chatters"
+            return f"the run failed: {arc.status}" if not arc.status.ok else "the run grazes or chatters"
         if not np.all(arc.jumps.transversality):
             return "a guard is reached without speed"
         last = arc.jumps.t[-1] if len(arc.jumps) else self.t0
@@ -261,23 +262,23 @@ class Case:
             return "the run ends at an event"
         other = self.simulate(t1, solver=self.looser)
         if not np.array_equal(other.jumps.transition_index, arc.jumps.transition_index):
-            return "the events of the run hang on the tolerances"
+            return "the events of the run depend on the tolerances"
         size = np.abs(arc.x).max(axis=0)
         scale = np.maximum(size, 1e-3 * size.max() if size.any() else 1.0)
         error = np.abs(arc.x[-1] - other.x[-1])
         if not np.all(error <= SENSITIVE * scale):
-            return "the end of the run hangs on the tolerances"
+            return "the end of the run depends on the tolerances"
         return Run(arc, t1, error, scale)
 
     def the_jump(self) -> Jump:
-        """One of the jumps of the run; the example is discarded if it has none."""
+        """The jump of the run that ``fraction`` selects; the example is discarded if the run has no jump."""
         jumps = self.run.arc.jumps
         if not len(jumps):
             discard("no event on the run")
         return jumps[int(self.fraction * len(jumps))]
 
     def fail(self, property_name: str, *lines: str, hint: str) -> NoReturn:
-        """Raise a PropertyError that tells the case."""
+        """Raise a PropertyError that describes the case."""
         told = "\n".join(f"  {line}" for line in lines)
         name = self.system.name or "the system"
         raise PropertyError(
@@ -287,12 +288,12 @@ class Case:
 
 
 def is_clean(arc: HybridArc) -> bool:
-    """Whether a run reached its end, and every jump of it was transverse."""
+    """Whether a run reached its end with transverse jumps only."""
     return arc.status.ok and not arc.grazings and not np.any(arc.jumps.kind != "transverse")
 
 
 def _before_trouble(arc: HybridArc) -> float:
-    """A time well before the first grazing, chatter or status, in the middle between two jumps."""
+    """A time before the first grazing, chatter or failure, midway between two jumps."""
     bad = np.flatnonzero(arc.jumps.kind != "transverse")
     clean = arc.jumps.t[: bad[0]] if len(bad) else arc.jumps.t
     touched = min((grazing.t for grazing in arc.grazings), default=np.inf)
@@ -304,7 +305,7 @@ def _before_trouble(arc: HybridArc) -> float:
 
 
 def lies_beyond(case: Case) -> str:
-    """Which guards forbid the start of a case, in words."""
+    """In words: the guards that forbid the start of a case."""
     told = []
     for transition in case.system.transitions:
         value = guard_beyond(case, transition, case.t0, case.x0)
@@ -314,7 +315,7 @@ def lies_beyond(case: Case) -> str:
 
 
 def guard_beyond(case: Case, transition: Transition, t: float, x: Any) -> float:
-    """The guard times its direction: negative before it fires; -inf if it fires both ways or only marks."""
+    """The guard times its direction, negative before it fires; -inf for a two-way guard or a marker."""
     direction = transition.guard.direction
     if direction == 0 or transition.is_marker:
         return -np.inf
@@ -335,13 +336,13 @@ def matrix_told(matrix: np.ndarray) -> str:
 
 
 def mode_after(jump: Jump) -> str:
-    """The mode that a jump leads to; runs are cut before a jump that ends them."""
+    """The mode that a jump leads to; a judged run contains no jump that ends the run."""
     assert jump.target is not None
     return jump.target
 
 
 def stretches(case: Case) -> Iterator[tuple[int, str | None, float, float]]:
-    """Between events: how many came before, the mode, start and length; the shortest are left out."""
+    """Stretches between events: number of events before, mode, start, length; very short ones are skipped."""
     jumps, t1 = case.run.arc.jumps, case.run.t1
     times = [case.t0, *jumps.t, t1]
     for j in range(len(times) - 1):

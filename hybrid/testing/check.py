@@ -1,4 +1,4 @@
-"""Every property of one system, in one call."""
+"""Check every property of one system in one call."""
 
 from __future__ import annotations
 
@@ -54,22 +54,22 @@ from hybrid.testing.saltation import (
 from hybrid.testing.strategies import Ranges, cases
 from hybrid.testing.units import UNITS, check_units
 
-# A property that was judged on fewer of its examples than this was hardly checked.
+# A property is reported as hardly checked if less than this share of its examples could be judged.
 HARDLY = 0.1
 
 
 @attrs.frozen
 class PropertyReport:
-    """What became of one property.
+    """Result for one property.
 
     Attributes
     ----------
     name
         The property, as a sentence.
     examples
-        How many it was judged on, and held.
+        Number of examples on which the property was checked and held.
     discarded
-        How many examples could not be judged, by reason.
+        Number of examples that could not be judged, by reason.
     """
 
     name: str
@@ -78,7 +78,7 @@ class PropertyReport:
 
     @property
     def checked(self) -> bool:
-        """Whether there was any example to judge it on."""
+        """Whether the property was checked on any example."""
         return self.examples > 0
 
     def __str__(self) -> str:
@@ -94,20 +94,21 @@ class PropertyReport:
 
 @attrs.frozen
 class SystemReport:
-    """What :func:`check_system` looked at; everything in it held.
+    """What :func:`check_system` checked; every property held.
 
     Attributes
     ----------
     properties
-        One :class:`PropertyReport` each.
+        One :class:`PropertyReport` per property.
     unfit
-        How many runs could not be judged, by reason; only the functions themselves were looked at.
+        Number of runs that could not be judged, by reason; only the model functions were checked at their
+        starts.
     jumps
         How often each transition was taken, by name.
     visits
         How often each mode was entered or started in, by name.
     discontinuities
-        Where fields jump, by mode: tangent vectors are not valid beyond.
+        Where the field of a mode is discontinuous, by mode: tangent vectors are not valid beyond.
     """
 
     name: str
@@ -119,12 +120,12 @@ class SystemReport:
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Properties that no example could be judged on."""
+        """Properties that were checked on no example."""
         return tuple(found.name for found in self.properties if not found.checked)
 
     @property
     def never_seen(self) -> tuple[str, ...]:
-        """Transitions that were never taken and modes that no run was in."""
+        """Transitions that no run took and modes that no run visited."""
         return tuple(name for count in (self.jumps, self.visits) for name in count if not count[name])
 
     def __str__(self) -> str:
@@ -138,7 +139,7 @@ class SystemReport:
                 "Make its pieces modes joined by guards there."
             )
         if self.never_seen:
-            lines.append(f"- Never seen: {', '.join(self.never_seen)}. Give ranges that lead there.")
+            lines.append(f"- Never seen: {', '.join(self.never_seen)}. Give ranges that reach them.")
         return "\n".join(lines)
 
 
@@ -161,43 +162,43 @@ def check_system(
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
 ) -> SystemReport:
-    """Check on drawn runs every property that a hybrid system has, and report the smallest failure in words.
+    """Check every property of a hybrid system on drawn runs, and report the smallest failure in words.
 
-    The same program draws the same runs each time. One that chatters, grazes, reaches two guards together or
-    hangs on the tolerances is cut short before that, or discarded; the report counts them.
+    The same runs are drawn each time. A run that chatters, grazes, reaches two guards together or depends on
+    the tolerances is cut short before that or discarded; the report counts the discarded runs.
 
     Parameters
     ----------
     system
         The model.
     states, parameters
-        Ranges ``(low, high)``, numbers or strategies by name. States are drawn from -2 to 2, parameters from
-        within a fifth of their values, where they are left out.
+        Ranges ``(low, high)``, numbers or strategies by name. By default states are drawn from -2 to 2, and
+        parameters within a fifth of their declared values.
     t_span
-        Runs lie in it; by default two forcing periods, or a span that is guessed from the fields.
+        Time span that contains the runs; by default two forcing periods, or a span estimated from the fields.
     mode
-        The only one that runs start in; by default any whose guards allow the state.
+        Mode that runs start in; by default any mode whose guards allow the state.
     elastic
-        Names of the components whose sign turns with time, or the involution of the state, of a system that
-        conserves energy: it must run backwards to where it started. Left out, this is not checked.
+        For a system that conserves energy: names of the components that change sign when time is reversed,
+        or the involution of the state. The reversed run must return to its start. Not checked by default.
     passable
-        Names of transitions through whose guards the state may go on in the same mode.
+        Names of transitions whose guard the state may cross and stay in the same mode.
     examples
-        How many runs are drawn.
+        Number of runs to draw.
     solver
         Method and tolerances, which should be tight.
     engine
-        What solves and linearises.
+        Computes runs and derivatives.
 
     Returns
     -------
     SystemReport
-        Which properties were checked, on how many examples, and why others could not be judged.
+        The properties checked, the number of examples of each, and why examples were discarded.
 
     Raises
     ------
     PropertyError
-        If a property fails, or if no run at all could be judged.
+        If a property fails, or if no run could be judged.
     ModelError
         If the model cannot be compiled, or an argument does not fit it (ArgumentError).
 
@@ -249,7 +250,7 @@ def check_system(
 
 
 def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int) -> None:
-    """Judge drawn cases; the smallest one that fails is the one that is told."""
+    """Judge drawn cases; raise the failure of the smallest case that fails."""
 
     @hypothesis_settings(
         max_examples=examples,
@@ -277,7 +278,7 @@ def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples
 
 
 class _Tally:
-    """Judges cases by every property until one fails, from then on by that one alone, which then shrinks."""
+    """Checks cases for every property until one fails, then for that one only, so that it can shrink."""
 
     def __init__(self, system: HybridSystem, properties: dict[str, Callable[[Case], None]]) -> None:
         self.system = system
@@ -323,8 +324,8 @@ class _Tally:
             reasons = "".join(f"\n  {count} times: {why}" for why, count in self.unfit.most_common(3))
             raise PropertyError(
                 f"{name}: none of {self.unfit.total()} runs could be judged.{reasons}\n"
-                "  likely: ranges of states that no mode allows, a guard with the wrong direction, or a span "
-                "of time that does not suit the model. Give states=, t_span= or mode=."
+                "  likely: ranges of states that no mode allows, a guard with the wrong direction, or a time "
+                "span that does not suit the model. Give states=, t_span= or mode=."
             )
         found = [PropertyReport(name, self.held[name], self.discarded[name]) for name in self.properties]
         if without_elastic:

@@ -9,21 +9,21 @@ from hybrid.testing.case import Case, as_case, discard, stretches
 
 CROSSINGS = "Each change of sign of a guard in its direction fires once"
 
-# Between two events a guard is looked at in so many places.
+# A guard is evaluated at these places between two events, as shares of the stretch.
 PLACES = np.linspace(0.0, 1.0, 65)[1:-1]
-# Two jumps of one transition closer than this, as a share of the run, are the same event twice.
+# Two jumps of one transition are the same event if closer than this share of the run.
 AT_ONCE = 1e-12
 
 
 def check_crossings(case: Case) -> None:
-    """Between two events no guard changes its sign in its direction, and no event happens twice.
+    """Between two events no guard crosses zero in its direction, and no event happens twice.
 
-    Guards with a condition are left out: a crossing that the condition refuses does not fire.
+    Guards with a condition are skipped: a crossing that the condition refuses does not fire.
 
     Raises
     ------
     PropertyError
-        If a crossing does not fire, or fires twice.
+        If a crossing does not fire or fires twice.
     """
     as_case(case)
     run = case.run
@@ -39,7 +39,7 @@ def check_crossings(case: Case) -> None:
 
 
 def _check_doubled(case: Case) -> None:
-    """No transition fires twice at one time but for another in between."""
+    """Fail if a transition fires twice in a row at the same time."""
     jumps = case.run.arc.jumps
     for before, after in zip(jumps, list(jumps)[1:], strict=False):
         apart = after.t - before.t
@@ -47,12 +47,12 @@ def _check_doubled(case: Case) -> None:
             case.fail(
                 CROSSINGS,
                 f"{after.transition!r} fired at t = {before.t:.15g} and again at t = {after.t:.15g}",
-                hint="an event that is found again where it has just fired.",
+                hint="the solver finds an event again right after it has fired.",
             )
 
 
 def _check_between(case: Case, transition: Transition, times: np.ndarray, states: np.ndarray) -> None:
-    """A guard keeps its sign between two events, or changes it against its direction."""
+    """Fail if a guard crosses zero in its direction between two events."""
     values = np.array(
         [case.evaluate(transition.guard.function, t, x)[0] for t, x in zip(times, states, strict=True)]
     )
@@ -64,7 +64,7 @@ def _check_between(case: Case, transition: Transition, times: np.ndarray, states
         first = changes[0]
         case.fail(
             CROSSINGS,
-            f"guard of {transition.name!r} in mode {transition.source!r}: it changes its sign between "
-            f"t = {times[first]:.10g} and t = {times[first + 1]:.10g}, and nothing fires",
-            hint="an event that is missed: a guard that is looked at in too few places.",
+            f"guard of {transition.name!r} in mode {transition.source!r} changes sign between "
+            f"t = {times[first]:.10g} and t = {times[first + 1]:.10g}, but no transition fires",
+            hint="the solver misses an event because it evaluates the guard at too few times.",
         )

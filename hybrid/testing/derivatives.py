@@ -1,4 +1,4 @@
-"""Derivatives agree however they were found."""
+"""Given, traced and numerical derivatives agree."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ DERIVATIVES = "Given, traced and numerical derivatives agree"
 
 
 def check_derivatives(case: Case) -> None:
-    """Given and traced derivatives equal the complex step, or central differences where there is none.
+    """Given and traced derivatives equal the complex step, or central differences where it is unavailable.
 
-    Every field, guard and reset is looked at, at the start of the case; kinks are passed over, and points at
-    which a function is not finite.
+    Every field, guard and reset is checked at the start of the case. Kinks, and points where a function is
+    not finite, are skipped.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def check_derivatives(case: Case) -> None:
                     DERIVATIVES,
                     f"{whose}: {fault}",
                     hint="a slip in the derivative; or a number in it where the function has a parameter. "
-                    "Leave it out: the library derives it.",
+                    "Omit the derivative: the library computes it.",
                 )
     if not seen:
         discard("no model function is finite at the start")

@@ -1,4 +1,4 @@
-"""What every event of a run must satisfy."""
+"""Properties of every event of a run."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from hybrid.testing.saltation import event_told
 JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
 SIDES = "A mode ends where its guards say"
 
-# Where a run is looked at between its events.
+# A run is evaluated at these places between two events, as shares of the stretch.
 INNER = np.linspace(0.02, 0.98, 7)
 
 
 def check_jumps(case: Case) -> None:
-    """At each jump the guard is zero and crosses in its direction, and the state after is the reset's.
+    """At each jump the guard is zero and crosses in its direction, and the state after it is the reset's.
 
     Raises
     ------
     PropertyError
-        If one of these is not so.
+        If a jump violates one of these.
     """
     as_case(case)
     run = case.run
@@ -33,12 +33,12 @@ def check_jumps(case: Case) -> None:
         transition = case.transition(jump)
         told = event_told(case, jump)
         if jump.source != mode:
-            case.fail(JUMPS, told, f"the mode was {mode!r}", hint="events that fire out of turn.")
+            case.fail(JUMPS, told, f"the mode was {mode!r}", hint="events that fire in the wrong order.")
         mode = mode_after(jump)
         slope = case.slope(guard_function(transition), jump.transition, jump.t, jump.x_minus)
         value = float(case.evaluate(transition.guard.function, jump.t, jump.x_minus)[0])
         band = np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1] * jump.t)
-        # What the guard passes in the time to which that of an event can be known.
+        # Change of the guard over the uncertainty of the event time.
         band += abs(jump.transversality) * (run.t1 - case.t0)
         # A reset may land beyond a guard, which then fires at the same instant.
         landed = jump.t == previous and value * transition.guard.direction > 0.0
@@ -60,13 +60,13 @@ def check_jumps(case: Case) -> None:
             case.fail(
                 JUMPS,
                 told,
-                f"wanted {case.state_told(wanted)} after it, which is the reset",
+                f"wanted {case.state_told(wanted)} after it, the value of the reset",
                 hint="a state that is moved after the reset (a nudge off the guard).",
             )
 
 
 def _guard_jumps(case: Case, jump: Jump) -> bool:
-    """Whether a guard changes its sign at an event by jumping: it differs a moment before and after."""
+    """Whether a guard is discontinuous at an event: its signs just before and just after differ."""
     transition = case.transition(jump)
     field = case.evaluate(case.system.modes[case.system.mode_index(jump.source)].field, jump.t, jump.x_minus)
     moment = 1e-9 * (case.run.t1 - case.t0)
@@ -78,12 +78,12 @@ def _guard_jumps(case: Case, jump: Jump) -> bool:
 
 
 def check_sides(case: Case) -> None:
-    """Between events no guard of the mode is beyond zero in its direction, those of the passable ones apart.
+    """Between events no guard of the mode is beyond zero in its direction, except passable ones.
 
     Raises
     ------
     PropertyError
-        If a mode goes on beyond a guard that ends it.
+        If a mode continues beyond a guard that ends it.
     """
     as_case(case)
     run = case.run
@@ -114,5 +114,6 @@ def check_sides(case: Case) -> None:
                     f"{beyond * transition.guard.direction:.6g} at t = {t:.10g}, {case.state_told(x)}",
                     event_told(case, run.arc.jumps[j - 1]) if j else "no event before",
                     hint="a guard with the wrong direction, or a reset with the wrong sign that leaves the "
-                    "state beyond it; or a transition that may be passed: say so with passable=.",
+                    "state beyond the guard. If the state may cross this guard and stay in the mode, name "
+                    "the transition in passable=.",
                 )

@@ -1,4 +1,4 @@
-"""The functions that run are the functions that were written, and repeat as declared."""
+"""Compiled functions equal the model's Python functions and have the declared period."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def check_compiled(case: Case) -> None:
             case.fail(
                 COMPILED,
                 fault,
-                hint="a function that depends on more than the values of its arguments.",
+                hint="a function whose result depends on more than its arguments.",
             )
 
 
@@ -42,7 +42,7 @@ def check_period(case: Case) -> None:
     Raises
     ------
     PropertyError
-        If one has not.
+        If a value differs.
     """
     as_case(case)
     system, x = case.system, np.array(case.x0)
@@ -56,6 +56,6 @@ def check_period(case: Case) -> None:
             case.fail(
                 PERIOD,
                 fault,
-                hint="a number in the period where a function has a parameter; or time that enters a "
-                "function outside of its forcing.",
+                hint="a number in the period where a function has a parameter, or time that enters a "
+                "function outside its forcing.",
             )

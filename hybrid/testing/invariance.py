@@ -1,4 +1,4 @@
-"""What must not change when a system is written or run differently."""
+"""Runs must not change when a system is written or run differently."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ SPLIT = "A run that is split and resumed goes on as if it had not been"
 SAMPLES = "Samples, also exactly at an event, change nothing and are the states after it"
 ELASTIC = "An elastic system runs backwards to where it started"
 
-# Runs are compared to this, relative to the size of the state, where rounding is all they differ by.
+# Runs that differ only by rounding must agree to this, relative to the size of the state.
 ROUNDING = 1e-9
 
 
 def check_cut(case: Case) -> None:
-    """A plane across the flow, at which nothing happens, changes neither the run nor its tangents.
+    """An identity transition on a plane across the flow changes neither the run nor its tangents.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def check_cut(case: Case) -> None:
     """
     as_case(case)
     if case.passable:
-        discard("in a second copy of a mode a passable transition would fire anew")
+        discard("a passable transition would fire again in the copy of its mode")
     run = case.run
     times = [case.t0, *run.arc.jumps.t, run.t1]
     j = int(case.fraction * (len(times) - 1))
@@ -44,7 +44,7 @@ def check_cut(case: Case) -> None:
     x, mode = run.arc(t), _mode_after(case, j)
     speed = case.evaluate(case.system.modes[case.system.mode_index(mode)].field, t, x) / run.scale
     if not speed.any():
-        discard("the state rests where it would be cut")
+        discard("the state is at rest where the run would be cut")
     normal = speed / np.linalg.norm(speed) / run.scale
     offset = float(normal @ x)
     height = float(normal @ np.array(case.x0)) - offset
@@ -63,7 +63,7 @@ def check_cut(case: Case) -> None:
         discard("the run touches the cut")
     cuts = [jump for jump in arc.jumps if jump.transition in variant.cuts]
     if not cuts:
-        case.fail(CUT, f"the cut at t = {t:.10g} was never crossed", hint="events that are missed.")
+        case.fail(CUT, f"the cut at t = {t:.10g} was never crossed", hint="the solver misses events.")
     for cut in cuts:
         if not np.all(
             np.abs(cut.saltation - np.eye(len(normal))) * run.scale / run.scale[:, None] <= ROUNDING
@@ -72,15 +72,15 @@ def check_cut(case: Case) -> None:
                 CUT,
                 f"wanted the identity as saltation matrix at the cut, t = {cut.t:.10g}",
                 f"got {matrix_told(cut.saltation)}",
-                hint="a term of the saltation matrix that does not vanish with the jump of the field.",
+                hint="a term of the saltation matrix that does not vanish where the field is continuous.",
             )
     fired = [variant.original[name] for name in _fired(arc) if name not in variant.cuts]
-    hint = "events that act on what they should not."
+    hint = "an event that changes more than its reset says."
     compare(case, CUT, arc, fired, variant.original[str(arc.mode[-1])], hint)
 
 
 def check_names(case: Case) -> None:
-    """Other names of modes and transitions lead to the same run.
+    """Different names of modes and transitions give the same run.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def check_names(case: Case) -> None:
 
 
 def check_order(case: Case) -> None:
-    """The opposite order of the transitions leads to the same run, unless two guards are reached together.
+    """The reverse order of the transitions gives the same run, unless two guards are reached together.
 
     Raises
     ------
@@ -108,12 +108,12 @@ def check_order(case: Case) -> None:
     if len(case.system.transitions) < 2:
         discard("there are no two transitions")
     arc = case.simulate(case.run.t1, system=reordered(case.system))
-    hint = "the first guard listed wins, not the first one reached; or two guards overlap."
+    hint = "the first guard listed wins, not the first guard reached; or two guards overlap."
     compare(case, ORDER, arc, _fired(arc), str(arc.mode[-1]), hint)
 
 
 def check_scale(case: Case) -> None:
-    """Guards multiplied by a positive number, from 1/1000 to 1000, lead to the same run.
+    """Guards multiplied by a positive number, from 1/1000 to 1000, give the same run.
 
     Raises
     ------
@@ -123,17 +123,18 @@ def check_scale(case: Case) -> None:
     as_case(case)
     variant = altered(case.system)
     if variant.resets_stay:
-        discard("a model function cannot be traced, and so cannot be changed")
+        discard("a model function cannot be traced, so it cannot be changed")
     factor = 10.0 ** (6.0 * case.fraction - 3.0)
     arc = case.simulate(case.run.t1, system=variant.system, extra=variant.scaled(factor))
-    hint = f"events found by an absolute tolerance on the guard; here all guards are times {factor:.3g}."
+    hint = f"events found with an absolute tolerance on the guard; all guards are multiplied by {factor:.3g}."
     compare(case, SCALE, arc, _fired(arc), str(arc.mode[-1]), hint)
 
 
 def check_split(case: Case) -> None:
-    """A run that ends anywhere, also at an event, and goes on from there is the run in one piece.
+    """A run that is split at any time, also at an event, and resumed equals the run in one piece.
 
-    Not at the event of a passable transition: the state just after it does not show that it has happened.
+    The run is not split at the event of a passable transition: the state just after the event does not show
+    that the event has happened.
 
     Raises
     ------
@@ -149,24 +150,24 @@ def check_split(case: Case) -> None:
         first = case.simulate(t)
         second = case.simulate(run.t1, start=(t, first.x[-1], str(first.mode[-1])))
         fired = [*_fired(first), *_fired(second)]
-        hint = f"events that fire twice or are lost near a start; the run was split at t = {t:.17g}."
+        hint = f"events fire twice or are lost near a start; the run was split at t = {t:.17g}."
         compare(case, SPLIT, second, fired, str(second.mode[-1]), hint)
 
 
 def check_samples(case: Case) -> None:
-    """Samples change neither the events nor the end, and at an event they are the state after it.
+    """Samples change neither the events nor the end, and a sample at an event is the state after it.
 
     Raises
     ------
     PropertyError
-        If they do not.
+        If an event or the end changes, or if a sample is wrong.
     """
     as_case(case)
     run = case.run
     jumps = {jump.t: jump.x_plus for jump in run.arc.jumps}
     times = np.unique([case.t0 + case.fraction * (run.t1 - case.t0), *jumps, run.t1])
     arc = case.simulate(run.t1, samples=times)
-    hint = "samples that steer the steps, or are taken on the wrong side of an event."
+    hint = "samples that change the steps, or are taken on the wrong side of an event."
     compare(case, SAMPLES, arc, _fired(arc), str(arc.mode[-1]), hint)
     for t, x in zip(arc.t, arc.x, strict=True):
         wanted = jumps.get(float(t), run.arc(t))
@@ -180,21 +181,21 @@ def check_samples(case: Case) -> None:
 
 
 def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.ndarray]) -> None:
-    """An autonomous elastic system, its velocities turned round at the end, runs back to its start.
+    """An autonomous elastic system with its velocities reversed at the end runs back to its start.
 
     Parameters
     ----------
     case
-        With parameters at which the system is elastic.
+        Its parameters must make the system elastic.
     flip
-        Names of the components that change their sign with time, or the involution of the state.
+        Names of the components that change sign when time is reversed, or the involution of the state.
 
     Raises
     ------
     PropertyError
         If the run does not come back.
     ArgumentError
-        If there is no such component.
+        If a name in ``flip`` is no component of the state.
     """
     turn = turned("flip", as_case(case).system, flip)
     if not all(compile_system(case.system).emitted.autonomous):
@@ -204,7 +205,7 @@ def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.nd
     arc = case.simulate(run.t1, start=start)
     other = case.simulate(run.t1, start=start, solver=case.looser)
     if not arc.status.ok or len(other.jumps) != len(arc.jumps):
-        discard("the events of the run backwards hang on the tolerances")
+        discard("the events of the run backwards depend on the tolerances")
     back = turn(arc.x[-1])
     error = np.abs(turn(other.x[-1]) - back)
     if not np.all(np.abs(back - np.array(case.x0)) <= run.tolerance + 100.0 * error):
@@ -219,7 +220,7 @@ def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.nd
 def turned(
     name: str, system: HybridSystem, flip: Iterable[str] | Callable[[np.ndarray], np.ndarray]
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """The involution of the state that ``flip`` is, or that changes the sign of the components it names."""
+    """The involution of the state: ``flip`` itself, or the sign change of the components named in it."""
     if callable(flip):
         return flip
     known = system.state_names
@@ -243,7 +244,7 @@ def _fired(arc: HybridArc) -> list[str]:
 
 
 def compare(case: Case, property_name: str, arc: HybridArc, fired: list[str], mode: str, hint: str) -> None:
-    """Fail unless a run has the events, the mode and the state at the end that the run of the case has."""
+    """Fail unless a run has the same events, final mode and final state as the run of the case."""
     run: Run = case.run
     wanted = _fired(run.arc)
     end = run.arc.x[-1]

@@ -1,4 +1,4 @@
-"""What saltation matrices and tangent vectors must satisfy."""
+"""Properties of saltation matrices and tangent vectors."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 def check_saltation(case: Case) -> None:
-    """Saltation and fundamental matrix equal central differences of the flow from before an event to after.
+    """Saltation and fundamental matrix equal central differences of the flow across an event.
 
-    The differences are extrapolated (Richardson); how well they converge, and how fast the guard is crossed,
-    sets the tolerance.
+    The differences are extrapolated (Richardson). Their convergence and the speed at which the guard is
+    crossed set the tolerance.
 
     Raises
     ------
@@ -38,13 +38,13 @@ def check_saltation(case: Case) -> None:
     window = _Window(case, jump)
     differences, tolerance = window.differences()
     hint = (
-        "a saltation matrix without its rank-one term, with a sign or a time term missing; or a derivative "
-        "given by hand."
+        "a saltation matrix without its rank-one term, with a wrong sign or without a time term; or a wrong "
+        "derivative given by hand."
     )
     found = [
         ("fundamental matrix of the run across the event", window.fundamental(), "simulate(tangent=True)")
     ]
-    # A run from just after a passable transition would begin with it.
+    # A run that starts just after a passable transition would fire the transition again.
     if not any(jump.transition in case.passable for jump in window.jumps):
         if len(window.jumps) == 1:
             xi = _saltation(case, jump)
@@ -71,12 +71,12 @@ def check_saltation(case: Case) -> None:
 
 
 def check_extension(case: Case) -> None:
-    """Adding a multiple of the guard to a reset, which is nothing on the guard, changes no saltation matrix.
+    """Adding a multiple of the guard to a reset does not change a saltation matrix: it is zero on the guard.
 
     Raises
     ------
     PropertyError
-        If one changes.
+        If a saltation matrix changes.
     """
     as_case(case)
     jump = case.the_jump()
@@ -85,7 +85,7 @@ def check_extension(case: Case) -> None:
         discard("the event only marks a crossing")
     variant = altered(case.system)
     if variant.resets_stay:
-        discard("a model function cannot be traced, and so cannot be changed")
+        discard("a model function cannot be traced, so it cannot be changed")
     slope = _guard_slope(case, jump)
     x_scale = case.run.scale
     size = np.sum(np.abs(slope) * x_scale)
@@ -112,17 +112,17 @@ def check_extension(case: Case) -> None:
             event_told(case, jump),
             f"wanted {matrix_told(wanted)}",
             f"got {matrix_told(got)} with {matrix_told(added)} times the guard added to the reset",
-            hint="a saltation matrix that is only the derivative of the reset, or lacks a time term.",
+            hint="a saltation matrix that is only the derivative of the reset or lacks a time term.",
         )
 
 
 def check_continuity(case: Case) -> None:
-    """The saltation matrix is the identity where there is no reset and both fields are the same.
+    """The saltation matrix is the identity where there is no reset and both fields are equal.
 
     Raises
     ------
     PropertyError
-        If it is not.
+        If a saltation matrix there is not the identity.
     """
     as_case(case)
     looked_at = 0
@@ -141,10 +141,10 @@ def check_continuity(case: Case) -> None:
                     CONTINUITY,
                     event_told(case, jump),
                     f"got {matrix_told(xi)}",
-                    hint="a term of the saltation matrix that does not vanish with the jump of the field.",
+                    hint="a term of the saltation matrix that does not vanish where the field is continuous.",
                 )
     if not looked_at:
-        discard("field or state jump at every event")
+        discard("the field or the state jumps at every event")
 
 
 def check_flow_direction(case: Case) -> None:
@@ -153,7 +153,7 @@ def check_flow_direction(case: Case) -> None:
     Raises
     ------
     PropertyError
-        If it is not so.
+        If the two sides differ.
     """
     as_case(case)
     looked_at = 0
@@ -180,18 +180,18 @@ def check_flow_direction(case: Case) -> None:
                     hint="a rank-one term of the saltation matrix that is missing or has the wrong sign.",
                 )
     if not looked_at:
-        discard("no event, or one whose guard or reset depends on time")
+        discard("no event whose guard and reset are independent of time")
 
 
 def check_sum_rule(case: Case) -> None:
-    """``log|det Phi|`` is the integral of ``div f`` and the sum of ``log|det Xi|`` along the run (Liouville).
+    """``log|det Phi|`` equals the integral of ``div f`` plus the sum of ``log|det Xi|`` (Liouville).
 
-    Divided by the length of a long run these are the sum of the exponents and what it must be.
+    Divided by the length of a long run, the left side is the sum of the Lyapunov exponents.
 
     Raises
     ------
     PropertyError
-        If they differ.
+        If the two sides differ.
     """
     as_case(case)
     run = case.run
@@ -212,12 +212,12 @@ def check_sum_rule(case: Case) -> None:
             f"wanted {jumps + flow:.10g}: {flow:.10g} from the divergence, {jumps:.10g} from "
             f"{len(determinants)} jumps",
             f"got {got:.10g}, the logarithm of the determinant of the fundamental matrix",
-            hint="tangent vectors that miss a jump, or a derivative of a field that is wrong.",
+            hint="tangent vectors that miss a jump, or a wrong derivative of a field.",
         )
 
 
 def _divergence(case: Case) -> tuple[float, float]:
-    """Integral of ``div f`` along the run, by Gauss quadrature over each step; and of its magnitude."""
+    """Integrals of ``div f`` and of its magnitude along the run, by Gauss quadrature over each step."""
     arc, system = case.run.arc, case.system
     compiled, parameters = compile_system(system), system.parameter_values(case.parameters)
     total = size = 0.0
@@ -236,7 +236,7 @@ def _divergence(case: Case) -> tuple[float, float]:
 
 
 class _Window:
-    """The time around one jump, or around several at one instant, in which flows are differenced."""
+    """The time window around one jump, or several jumps at one instant, for differences of the flow."""
 
     def __init__(self, case: Case, jump: Jump) -> None:
         self.case, self.run = case, case.run
@@ -258,10 +258,10 @@ class _Window:
         self.start = self.run.arc(self.begin)
 
     def differences(self) -> tuple[np.ndarray, np.ndarray]:
-        """Derivative of the state at the end in that at the start, and the tolerance of its scaled form."""
+        """Derivative of the end state by the start state, and the tolerance of its scaled form."""
         scale, jump = self.run.scale, self.jump
         slope = np.abs(_guard_slope(self.case, jump))
-        # The displaced runs must cross inside the window, too.
+        # The displaced runs must also cross the guard inside the window.
         shift = slope * scale / abs(jump.transversality)
         step = min(STEP, 0.1 * self.width / float(shift.max())) if shift.any() else STEP
         if step < 1e-7:
@@ -272,7 +272,7 @@ class _Window:
         noise = 20.0 * (self.case.solver.rtol + 1e-13) / step
         tolerance = 2.0 * spread + (noise + 1e-7) * size
         if not tolerance.max() <= 1e-2 * size:
-            discard("the finite differences do not converge: nearly a grazing")
+            discard("the finite differences do not converge near a grazing")
         return (4.0 * fine - coarse) / 3.0, tolerance
 
     def _central(self, step: float) -> np.ndarray:
@@ -290,7 +290,7 @@ class _Window:
         if not arc.status.ok or [jump.transition for jump in arc.jumps] != [
             jump.transition for jump in self.jumps
         ]:
-            discard("a run beside this one has other events")
+            discard("a displaced run has other events")
         return np.asarray(arc.x[-1])
 
     def fundamental(self) -> np.ndarray:
@@ -300,7 +300,7 @@ class _Window:
         return arc.fundamental
 
     def through(self, xi: np.ndarray) -> np.ndarray:
-        """Tangent maps up to just before the jump and from just after it, with a matrix between them."""
+        """The matrix ``xi`` between the tangent maps up to just before the jump and from just after it."""
         case, jump, last = self.case, self.jump, self.last
         gap = 1e-6 * self.width
         before = case.simulate(jump.t - gap, start=(self.begin, self.start, jump.source), tangent=True)
@@ -311,19 +311,19 @@ class _Window:
         return np.asarray(after.fundamental @ xi @ rest @ before.fundamental)
 
     def product(self) -> np.ndarray:
-        """The saltation matrices of all jumps of the instant, multiplied."""
+        """Product of the saltation matrices of all jumps at the instant."""
         product = self.jump.saltation
         for jump in self.jumps[1:]:
             product = jump.saltation @ product
         return product
 
     def invertible(self) -> bool:
-        """Whether the product has to be the tangent map: all matrices but the last can be inverted."""
+        """Whether all matrices but the last can be inverted, so that the product must be the tangent map."""
         conditions = [np.linalg.cond(self.scaled(jump.saltation)) for jump in self.jumps[:-1]]
         return all(condition < 1e6 for condition in conditions)
 
     def scaled(self, matrix: np.ndarray) -> np.ndarray:
-        """A map between states, in units of their sizes."""
+        """A map between states, in units of the sizes of the components."""
         return np.asarray(matrix * self.run.scale / self.run.scale[:, None])
 
 

@@ -1,4 +1,4 @@
-"""Small systems made up by chance: piecewise affine, forced or not, every crossing transverse."""
+"""Small random systems: piecewise affine, forced or autonomous, with transverse crossings only."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ HUNDREDTHS = 100
 
 
 def small_systems() -> SearchStrategy[HybridSystem]:
-    r"""Piecewise-affine systems of two or three states and one or two modes with transverse crossings.
+    r"""Piecewise-affine systems with two or three states, one or two modes and transverse crossings.
 
     .. math::
 
         \dot s = v_k + c_k \cdot y, \qquad \dot y = A_k y + b_k + F_k \cos(w t)
 
     A transition fires where :math:`s` rises through a level, :math:`1 + m \cos(w t)` or 2, and its reset is
-    affine in :math:`y`. The speed :math:`v_k` is at least 1/2, all else in :math:`\dot s` is small as
-    long as :math:`|y|` is; :math:`A_k` is damped. Without forcing :math:`F_k` and :math:`m` are left out.
+    affine in :math:`y`. The speed :math:`v_k` is at least 1/2; the other term of :math:`\dot s` is small
+    while :math:`|y|` is small. The diagonal of :math:`A_k` is not positive. Systems without forcing have no
+    :math:`F_k` and no :math:`m`.
 
     All coefficients are parameters of the system, and systems of one shape share their compiled code.
     """
@@ -41,7 +42,7 @@ def small_systems() -> SearchStrategy[HybridSystem]:
     return system()
 
 
-# By the first letter of a coefficient's name: its range, smallest magnitude first.
+# First letter of a coefficient's name to its range.
 _RANGES = {
     "v": (0.5, 2.0),
     "w": (1.0, 2.0),
@@ -63,7 +64,7 @@ def _coefficients(name: str) -> SearchStrategy[float]:
 
 @cache
 def _template(others: int, modes: int, forced: bool) -> HybridSystem:
-    """A system of one shape: ``others`` components beside ``s``; its coefficients are to be drawn."""
+    """A system of one shape, with ``others`` components besides ``s`` and placeholder coefficients."""
     rows = range(others)
     names: list[str] = ["w"] if forced else []
 

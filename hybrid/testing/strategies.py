@@ -22,7 +22,7 @@ from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
 Range = tuple[float, float] | float | SearchStrategy[float]
 Ranges = Mapping[str, Range]
 
-# Values lie on a grid of this many steps to either side: they print short and shrink to the middle.
+# Values lie on a grid of this many steps to either side, so that they print short and shrink to the middle.
 GRID = 500
 RANGES = "map names to ranges, or be a strategy"
 STARTS_TRIED = 4
@@ -31,20 +31,20 @@ STARTS_TRIED = 4
 def states(
     system: HybridSystem, ranges: Ranges | SearchStrategy[Any] | None = None
 ) -> SearchStrategy[tuple[float, ...]]:
-    """States ``(n,)`` of a system as tuples.
+    """States ``(n,)`` of a system, as tuples.
 
     Parameters
     ----------
     system
         The model.
     ranges
-        By component: a range ``(low, high)``, a number to keep it fixed, or a strategy; -2 to 2 where left
-        out. Or one strategy for the whole state.
+        By component: a range ``(low, high)``, a number to keep the component fixed, or a strategy; -2 to 2 by
+        default. Or one strategy for the whole state.
 
     Raises
     ------
     ArgumentError
-        If there is no such component, or a range is not one.
+        If a component does not exist, or a range is invalid.
     """
     return _states("ranges", system, ranges)
 
@@ -65,20 +65,20 @@ def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tupl
 def parameters(
     system: HybridSystem, ranges: Ranges | SearchStrategy[Any] | None = None
 ) -> SearchStrategy[dict[str, float]]:
-    """Parameter values of a system, all of them, by name.
+    """Values of all parameters of a system, by name.
 
     Parameters
     ----------
     system
         The model.
     ranges
-        By name: a range ``(low, high)``, a number to keep it fixed, or a strategy; within a fifth of the
-        declared value where left out. Or one strategy of dictionaries.
+        By name: a range ``(low, high)``, a number to keep the parameter fixed, or a strategy; within a fifth
+        of the declared value by default. Or one strategy of dictionaries.
 
     Raises
     ------
     ArgumentError
-        If there is no such parameter, or a range is none.
+        If a parameter does not exist, or a range is invalid.
     """
     return _parameters("ranges", system, ranges)
 
@@ -111,30 +111,30 @@ def cases(
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
 ) -> SearchStrategy[Case]:
-    """Runs of a system to check properties on, each from a mode whose guards allow its start.
+    """Runs of a system for the properties, each starting in a mode whose guards allow the start.
 
     Parameters
     ----------
     system
         The model.
     states, parameters
-        Ranges or strategies, as of :func:`states` and :func:`parameters`.
+        Ranges or strategies, as for :func:`states` and :func:`parameters`.
     t_span
-        Runs start in the first half of it and last a fifth of what is left or more. By default two forcing
-        periods from 0, or about as long as the state needs to cross its ranges ten times.
+        Runs start in the first half of this span and last at least a fifth of the remaining time. By default
+        two forcing periods from 0, or about as long as the state needs to cross its default ranges ten times.
     mode
-        The only one to start in; by default any mode that allows the state.
+        Mode to start in; by default any mode that allows the state.
     passable
-        Names of transitions through whose guard the state may go on in the same mode, as through a membrane.
+        Names of transitions whose guard the state may cross and stay in the same mode, as with a membrane.
     solver
-        Method and tolerances. They should be tight: what they leave open cannot be judged.
+        Method and tolerances, which should be tight: a run that depends on them cannot be judged.
     engine
-        What solves and linearises.
+        Computes runs and derivatives.
 
     Raises
     ------
     ArgumentError
-        If a name does not exist, or a range or the span is none.
+        If a name does not exist, or a range or the span is invalid.
     """
     if mode is not None:
         as_system("system", system).mode_index(mode)
@@ -183,7 +183,7 @@ def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float
 
 
 def _allowed(case: Case) -> list[str]:
-    """Modes none of whose guards the start of a case is on or beyond."""
+    """Modes that allow the start of a case: it is on or beyond none of their guards."""
     beyond = {
         transition.source
         for transition in case.system.transitions

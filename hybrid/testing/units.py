@@ -1,4 +1,4 @@
-"""The same system with its state and its time measured in other units: a run must be the same."""
+"""The same system with state and time in other units: runs must be the same."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybrid.testing.invariance import compare
 
 UNITS = "The units of the state and of the time do not matter"
 
-# Units are powers of two up to this exponent: they change no rounding.
+# Units are powers of two up to this exponent, so that they do not change rounding.
 LARGEST_EXPONENT = 40
 
 
@@ -28,7 +28,7 @@ class Measured:
     Attributes
     ----------
     system
-        The system; with its own parameters as declared it is the original one.
+        The system; with its parameters as declared it equals the original.
     state, time
         Names of the parameters that hold the units of the state and of the time.
     """
@@ -42,14 +42,14 @@ _MEASURED: WeakKeyDictionary[HybridSystem, Measured] = WeakKeyDictionary()
 
 
 def measured(system: HybridSystem) -> Measured:
-    """The system with the freedom to choose its units, made once."""
+    """The system with its units as parameters, cached."""
     if system not in _MEASURED:
         _MEASURED[system] = _measured(system)
     return _MEASURED[system]
 
 
 def check_units(case: Case) -> None:
-    """Other units of the state and of the time, with the absolute tolerance in these, lead to the same run.
+    """Other units of state and time, with the absolute tolerance in those units, give the same run.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def check_units(case: Case) -> None:
     """
     as_case(case)
     if compile_system(case.system).emitted.opaque:
-        discard("a model function cannot be traced, and so cannot be changed")
+        discard("a model function cannot be traced, so it cannot be changed")
     run, variant = case.run, measured(case.system)
     exponent = round(LARGEST_EXPONENT * (2.0 * case.fraction - 1.0))
     state, time = 2.0**exponent, 2.0 ** (-exponent // 2)
@@ -77,7 +77,7 @@ def check_units(case: Case) -> None:
         attrs.evolve(arc, x=arc.x / state),
         [jump.transition for jump in arc.jumps],
         str(arc.mode[-1]),
-        f"a threshold that has a unit; here lengths are times {state:.3g} and times are times {time:.3g}.",
+        f"a threshold that has a unit; states are multiplied by {state:.3g}, times by {time:.3g}.",
     )
 
 

@@ -1,4 +1,4 @@
-"""The same system written differently: what follows from it must not change."""
+"""The same system written differently: its runs must not change."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ AGAIN = " (copy)"
 
 @attrs.frozen(eq=False)
 class Altered:
-    """A system in which guards can be scaled, resets changed off the guard and flows cut, by parameters.
+    """A system whose parameters can scale guards, change resets off the guard and cut flows.
 
-    Each mode is there twice with the same field, and crossing the plane ``w . x = c`` leads from one to the
-    other without a reset. As long as ``w`` is zero nothing ever does.
+    Each mode exists twice with the same field. Crossing the plane ``w . x = c`` leads from one copy to the
+    other without a reset. While ``w`` is zero the plane is never crossed.
 
     Attributes
     ----------
     system
-        The altered system; with its own parameters as declared it is the original one.
+        The altered system; with its parameters as declared it behaves as the original.
     resets_stay
-        Whether guards and resets are those of the original, since tracing cannot follow one of them.
+        Whether the original guards and resets are kept because a model function cannot be traced.
     normal, multiples
-        Names of the parameters that hold ``w``, and the multiples of the guard added to a reset, ``(n,)``.
+        Names of the parameters for ``w``, and for the multiples of the guard added to each reset, ``(n,)``.
     offset, factor
-        Names of the parameters that hold ``c`` and the factor of all guards.
+        Names of the parameters for ``c``, and for the factor of all guards.
     cuts
         Names of the transitions at the plane.
     original
-        Names of modes and of transitions that the original has, by those of the second copy and by their own.
+        Maps each name of a mode or transition, and the name of its copy, to the name in the original.
     """
 
     system: HybridSystem
@@ -68,14 +68,14 @@ _REORDERED: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
 
 
 def altered(system: HybridSystem) -> Altered:
-    """The system with the freedom to alter it, made once."""
+    """The system with parameters to alter it, cached."""
     if system not in _ALTERED:
         _ALTERED[system] = _altered(system)
     return _ALTERED[system]
 
 
 def renamed(system: HybridSystem) -> HybridSystem:
-    """The system with names of modes and transitions in the opposite alphabetical order, made once."""
+    """The system with its modes and transitions renamed to reverse their alphabetical order, cached."""
     if system not in _RENAMED:
         _RENAMED[system] = attrs.evolve(
             system,
@@ -96,12 +96,12 @@ def renamed(system: HybridSystem) -> HybridSystem:
 
 
 def new_name(names: tuple[str, ...], name: str) -> str:
-    """The name that a mode or transition has in the renamed system."""
+    """The name of a mode or transition in the renamed system."""
     return f"{len(names) - sorted(names).index(name):03d} {name}"
 
 
 def reordered(system: HybridSystem) -> HybridSystem:
-    """The system with its transitions listed the other way round, made once."""
+    """The system with its transitions in reverse order, cached."""
     if system not in _REORDERED:
         _REORDERED[system] = attrs.evolve(system, transitions=system.transitions[::-1])
     return _REORDERED[system]
@@ -161,7 +161,7 @@ def _free_name(system: HybridSystem, name: str) -> str:
 
 
 def _unaware_of_more(system: HybridSystem) -> Callable[[Any], Any]:
-    """Turns a model function into one that sees only the parameters of the system it was written for."""
+    """Return a wrapper that passes a model function only the parameters of the original system."""
     names = tuple(system.parameters)
 
     def unaware(function: Callable[..., Any] | None) -> Callable[..., Any] | None:
@@ -175,7 +175,7 @@ def _unaware_of_more(system: HybridSystem) -> Callable[[Any], Any]:
 def _freed(
     transition: Transition, unaware: Callable[[Any], Any], factor: str, multiples: tuple[str, ...]
 ) -> Transition:
-    """A transition whose guard has a factor, and whose reset has multiples of the guard added."""
+    """A transition with a factor on its guard, and with multiples of the guard added to its reset."""
     g, gradient = unaware(transition.guard.function), unaware(transition.guard.gradient)
     reset = None if transition.reset is None else unaware(transition.reset.function)
 

@@ -1,4 +1,4 @@
-"""The library's own systems have every property, and so have systems made up by chance."""
+"""The library's own systems and randomly drawn systems have every property."""
 
 import subprocess
 import sys
@@ -41,7 +41,7 @@ from tests.cases import systems
 
 BALL = models.bouncing_ball()
 
-# What is said of a system that has no such thing.
+# Properties that are not checked for a system without a continuous event, a second transition or elasticity.
 NOT_CONTINUOUS, ONE_TRANSITION, NOT_ELASTIC = CONTINUITY, ORDER, ELASTIC
 
 
@@ -50,7 +50,7 @@ BUCK = {"states": {"v": (11.4, 12.4), "i": (0.4, 0.7), "tau": (0.0, 0.5)}, "t_sp
 
 
 def friction():
-    """A block on a belt, Filippov's sliding mode derived."""
+    """A block on a belt, with the sliding mode from ``hybrid.filippov``."""
     return hybrid.filippov(
         state=("x", "v"),
         parameters={"belt": 0.2, "friction": 1.0},
@@ -218,7 +218,7 @@ class TestStrategies:
 
 class TestReport:
     def test_what_could_not_be_judged_is_said(self):
-        """Above 0.4 the ball does not come down within the tenth of a second given."""
+        """From above 0.4 the ball does not reach the floor within the time span of 0.1 s."""
         report = check_system(
             models.bouncing_ball(), examples=5, states={"q": (0.4, 1.0), "v": 0.0}, t_span=(0.0, 0.1)
         )
@@ -226,7 +226,7 @@ class TestReport:
         assert report.never_seen == ("bounce",)
         text = str(report)
         assert f"NOT CHECKED: {JUMPS}: no event on the run." in text
-        assert "Never seen: bounce. Give ranges that lead there." in text
+        assert "Never seen: bounce. Give ranges that reach them." in text
         assert "elastic= is not given" in text
 
     def test_hardly_checked(self):
@@ -239,7 +239,7 @@ class TestReport:
             check_system(models.bouncing_ball(), states={"q": (-2.0, -1.0)}, examples=5)
 
     def test_a_wall_that_may_be_passed(self):
-        """A membrane that costs speed one way: the state goes on beyond the guard, in the same mode."""
+        """A membrane that takes speed in one direction: the state crosses the guard and stays in the mode."""
         membrane = HybridSystem(
             state=("q", "v"),
             modes=[Mode("free", lambda t, x, p: (x.v, -x.q))],
@@ -253,13 +253,13 @@ class TestReport:
                 )
             ],
         )
-        with pytest.raises(PropertyError, match="say so with passable="):
+        with pytest.raises(PropertyError, match="name the transition in passable="):
             check_system(membrane, examples=20)
         assert not check_system(membrane, examples=20, passable=("membrane",)).never_seen
 
 
 def test_chatter_is_cut_short():
-    """From 1 m the ball comes to rest after four seconds; the run is judged up to its second impact or so."""
+    """From 1 m the ball comes to rest after four seconds; the run is cut before t = 3 and has four jumps."""
     ball = models.bouncing_ball()
     case = Case(ball, dict(ball.parameters), "flight", (1.0, 0.0), 0.0, 10.0)
     assert len(case.run.arc.jumps) == 4

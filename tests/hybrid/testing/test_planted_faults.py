@@ -1,4 +1,4 @@
-"""Each property catches the faults that it is there for, planted in the library or in a model."""
+"""Each property detects the faults it is meant for, planted in the library or in a model."""
 
 from collections.abc import Callable
 from functools import cache
@@ -46,7 +46,7 @@ NUDGE = 1e-6
 
 
 def found(check, system, engine=None, **options):
-    """What the property says of a faulty engine or model, of at most 200 examples."""
+    """The message of the property for a faulty engine or model, from at most 200 examples."""
     engine = engine or Engine()
 
     @settings(
@@ -68,7 +68,7 @@ def found(check, system, engine=None, **options):
 
 
 def box(*, floor=-1, reset=lambda t, x, p: (x.q, -p.e * x.v), jacobian=None):
-    """A damped body between two walls; of the wall at 0 what a user may get wrong is to be given."""
+    """A damped body between two walls; the arguments set what a user may get wrong at the wall at 0."""
     return HybridSystem(
         name="box",
         state=("q", "v"),
@@ -101,7 +101,7 @@ IN_THE_BOX = {"states": {"q": (0.1, 0.9), "v": (-2.0, 2.0)}}
 
 
 class Saltation(Engine):
-    """Saltation matrices by a formula that gets ``(D_x R, D_t R, D_x g, D_t g, f_minus, f_plus)``."""
+    """Saltation matrices from a formula of ``(D_x R, D_t R, D_x g, D_t g, f_minus, f_plus)``."""
 
     def __init__(self, formula: Callable[..., np.ndarray]) -> None:
         self.formula = formula
@@ -152,7 +152,7 @@ def field_before_twice(DxR, DtR, Dxg, Dtg, f_minus, f_plus):
 
 
 class Distorted(Engine):
-    """Solves another system than it is asked to: ``distort`` makes it from the one asked for."""
+    """Solves the system that ``distort`` makes from the given system."""
 
     def __init__(self, distort: Callable[[HybridSystem], HybridSystem]) -> None:
         self.distorted = cache(distort)
@@ -166,7 +166,7 @@ def with_transitions(system, change):
 
 
 def nudged(transition):
-    """After the reset the first component is a little further."""
+    """The reset moves the first component a little further."""
     reset = transition.reset
 
     def further(t, x, p):
@@ -177,14 +177,14 @@ def nudged(transition):
 
 
 def turned(transition):
-    """The guard fires the other way."""
+    """The guard fires in the opposite direction."""
     return attrs.evolve(
         transition, guard=attrs.evolve(transition.guard, direction=-transition.guard.direction)
     )
 
 
 def late(transition):
-    """The guard is met at a fixed distance from zero."""
+    """The guard fires at a fixed distance from zero."""
     function, direction = transition.guard.function, transition.guard.direction
     return attrs.evolve(
         transition, guard=Guard(lambda t, x, p: function(t, x, p) - direction * NUDGE, direction)
@@ -208,7 +208,7 @@ def first_in_list_late(system):
 
 
 class Displaced(Engine):
-    """Every run starts a little beside where it should, as if a start on a guard needed help."""
+    """Every run starts slightly displaced, as if a start on a guard needed a nudge."""
 
     def simulate(self, system, x0, t_span, **options):
         return hybrid.simulate(system, np.array(x0) + NUDGE, t_span, **options)
@@ -236,7 +236,7 @@ class SampledBefore(Engine):
 
 
 class TangentsLost(Engine):
-    """Tangent vectors pass jumps as if nothing happened to them."""
+    """The last jump leaves tangent vectors unchanged."""
 
     def simulate(self, system, x0, t_span, **options):
         arc = hybrid.simulate(system, x0, t_span, **options)
@@ -251,7 +251,7 @@ def deaf(transition):
 
 
 class EventsTwice(Engine):
-    """Every event is found again where it has just fired."""
+    """Every event is found a second time right after it has fired."""
 
     def simulate(self, system, x0, t_span, **options):
         arc = hybrid.simulate(system, x0, t_span, **options)
@@ -267,14 +267,14 @@ class EventsTwice(Engine):
 
 
 class DerivativeOfNoughtPointNine(Engine):
-    """Derivatives are nine tenths of what they should be."""
+    """Derivatives are 0.9 times the right value."""
 
     def derivative(self, *arguments):
         return 0.9 * super().derivative(*arguments)
 
 
 class ValuesOff(Engine):
-    """One of the compiled functions is off by a little where the first component is negative."""
+    """One compiled function is slightly wrong where the first component is negative."""
 
     def __init__(self, name):
         self.name = name
@@ -323,7 +323,7 @@ def test_wrong_saltation_matrices(check, system, fault, text):
         (check_order, BOX, Distorted(first_in_list_late), "first guard listed"),
         (check_sides, BALL, Distorted(lambda s: with_transitions(s, turned)), "goes below zero"),
         (check_jumps, BOX, Distorted(lambda s: with_transitions(s, turned)), "in the wrong direction"),
-        (check_crossings, BALL, Distorted(lambda s: with_transitions(s, deaf)), "and nothing fires"),
+        (check_crossings, BALL, Distorted(lambda s: with_transitions(s, deaf)), "but no transition fires"),
         (check_crossings, BALL, EventsTwice(), "and again at"),
         (check_split, BALL, Displaced(), "was split at"),
         (check_units, BALL, Displaced(), "a threshold that has a unit"),
@@ -360,11 +360,11 @@ def fails(system, **options):
 
 class TestFaultsOfAModel:
     def test_a_number_where_the_jacobian_needs_a_parameter(self):
-        """Right at the parameters declared, and so accepted when the system is made."""
+        """The Jacobian is right at the declared parameters, so it is accepted when the system is made."""
         told = fails(box(jacobian=lambda t, x, p: ((0.0, 1.0), (-1.0, -0.1))), **IN_THE_BOX)
         assert "Given, traced and numerical derivatives agree: this does not hold for box" in told
         assert "entry D_v of v is -0.1" in told
-        # The smallest case: one step of the grid from the declared value, nothing else changed.
+        # The smallest case: one grid step from the declared value, all else unchanged.
         assert "parameters c = 0.10004, the others as declared" in told
         assert "q = 0.5, v = 0" in told
 
@@ -384,7 +384,7 @@ class TestFaultsOfAModel:
             attrs.evolve(TABLE, transitions=[attrs.evolve(hit, guard=guard)])
 
     def test_a_number_where_the_period_needs_a_parameter(self):
-        """Right at the parameters declared, and so accepted when the system is made."""
+        """The period is right at the declared parameters, so it is accepted when the system is made."""
         shaken = attrs.evolve(TABLE, period=2 * np.pi / 5.0)
         assert "one period later" in found(check_period, shaken)
         told = fails(shaken)
@@ -404,14 +404,14 @@ class TestFaultsOfAModel:
         assert "guard of 'floor', which ends mode 'flight' where it goes below zero" in told
 
     def test_a_guard_in_the_wrong_direction(self):
-        """Then no start inside is allowed, which is not taken for success."""
+        """No start between the walls is allowed; the check must fail, not pass."""
         told = fails(box(floor=+1), **IN_THE_BOX)
         assert "box: none of" in told
         assert "it lies beyond guard 'floor' of mode 'flight'" in told
         assert "a guard with the wrong direction" in told
 
     def test_a_nudge_after_the_reset(self):
-        """Each adds to the energy of the ball, forwards and backwards."""
+        """Each nudge adds energy to the ball, forwards and backwards in time."""
         elastic = {"parameters": {"e": 1.0}, "elastic": ("v",)}
         assert ELASTIC not in check_system(BALL, examples=5, **elastic).unchecked
         told = fails(with_transitions(BALL, nudged), **elastic)
