@@ -1,4 +1,4 @@
-"""The vibro-impact study of Bazhenov, Pogorelova and Postnikova (2017), computed: ``python -m lyapunov``."""
+"""Recomputes the vibro-impact study of Bazhenov, Pogorelova and Postnikova (2017): ``python -m lyapunov``."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ from lyapunov.study.tangents import explanations, tolerance_study
 SOLVERS = {solver.__name__: solver for solver in (Taylor, DOP853, Tsit5)}
 
 EPILOG = f"""
-For each frequency: the two-orbit formulas (7), (8) and (9) of the paper and Benettin's method (10), after
-M = {", ".join(map(str, ROWS))} periods, beside the figures printed in the paper; the renormalised
-two-orbit estimate and the tapered mean, which converge; the whole spectrum with its standard error and the
-sum rule; Floquet exponents of the orbit of one period. Then the trap of this system, tangent vectors
-outside the error control; and what may explain the paper's own figures.
+For each frequency, the study prints:
+the two-orbit formulas (7), (8) and (9) of the paper and Benettin's method (10) after
+M = {", ".join(map(str, ROWS))} periods, beside the figures of the paper;
+the renormalised two-orbit estimate and the tapered mean, which converge;
+the whole spectrum with its standard error and the sum rule; and the Floquet exponents of the orbit of one
+period. It then shows the error of tangent vectors outside the error control, and tests candidate
+explanations of the paper's figures.
 
 Starts: {"; ".join(f"{start.label}, {start.text}" for start in STARTS)}.
 
-The folder receives, for each frequency, exponents_*.csv, portrait_*.png and convergence_*.png; and
+The folder receives exponents_*.csv, portrait_*.png and convergence_*.png for each frequency, and
 regimes.png, tolerances.csv, tolerances.png and explanations.csv. Exponents are in 1/s.
 """
 
@@ -51,20 +53,20 @@ def parser() -> argparse.ArgumentParser:
         type=int,
         default=10_000,
         metavar="M",
-        help="forcing periods averaged over (default: %(default)s)",
+        help="forcing periods to average over (default: %(default)s)",
     )
     options.add_argument(
         "--transient",
         type=int,
         default=1_000,
-        help="forcing periods run before, not counted (default: %(default)s)",
+        help="forcing periods to discard at the start (default: %(default)s)",
     )
     options.add_argument("--solver", choices=SOLVERS, default="Taylor", help="method (default: %(default)s)")
     options.add_argument(
-        "--rtol", type=float, default=1e-9, help="relative tolerance a step (default: %(default)s)"
+        "--rtol", type=float, default=1e-9, help="relative tolerance per step (default: %(default)s)"
     )
     options.add_argument(
-        "--atol", type=float, default=1e-11, help="absolute tolerance a step (default: %(default)s)"
+        "--atol", type=float, default=1e-11, help="absolute tolerance per step (default: %(default)s)"
     )
     options.add_argument(
         "--output",
@@ -76,7 +78,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the study as the command line asks; returns the exit status."""
+    """Run the study with the options of the command line; return the exit status."""
     options = parser().parse_args(arguments)
     started = time.perf_counter()
     try:
@@ -92,14 +94,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(omegas: Sequence[float], settings: Settings, folder: Path) -> None:
-    """Compute, print and write, each table as soon as it is there."""
+    """Compute, print and write each table as soon as it is ready."""
     system = models.vibroimpact()
     solver = settings.solver
     print(
         f"Vibro-impact system, {settings.intervals} periods after {settings.transient}, "
         f"{type(solver).__name__} at rtol = {solver.rtol:g}, atol = {solver.atol:g}.\n"
-        "First exponent, 1/s, after M periods. (7) to (10): as in the paper. two-orbit: tapered mean for a\n"
-        "renormalised companion. tapered: tapered mean of Benettin's growths.\n",
+        "First exponent, 1/s, after M periods. (7) to (10): formulas of the paper. two-orbit: tapered mean\n"
+        "for a renormalised companion. tapered: tapered mean of Benettin's growth rates.\n",
         flush=True,
     )
     regimes = []

@@ -1,4 +1,4 @@
-"""Exponents over one or two parameters, on all cores."""
+"""Lyapunov exponents over one or two parameters, on all cores."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from hybrid.system.graph import as_system
 from lyapunov.spectrum import Estimate, first_vectors, interval_length
 
 UNTOUCHED = Status(
-    StatusCode.NOT_RUN, "Interrupted before this row was done.", "Chart the rows that are missing once more."
+    StatusCode.NOT_RUN, "The chart was interrupted before this row was complete.", "Compute this row again."
 )
 
 
@@ -40,15 +40,15 @@ class Chart:
     system
         The model.
     over
-        Parameter names to their values: the axes of the grid, one or two.
+        Maps one or two parameter names to their values, the axes of the grid.
     exponents, standard_error
         ``(*grid, k)``, as in :class:`lyapunov.LyapunovSpectrum`.
     sum_rule, jumps_per_interval
-        ``grid``, as there.
+        ``grid``, as in :class:`lyapunov.LyapunovSpectrum`.
     x, mode
-        ``(*grid, n)`` and ``grid``: state, and name of the mode, in which each row's spectrum ended.
+        ``(*grid, n)`` and ``grid``: state and name of the mode at the end of each row's spectrum.
     section
-        ``(*grid, points, n)``: states once a forcing period after that, for a bifurcation diagram.
+        ``(*grid, points, n)``: states once per forcing period after ``x``, for a bifurcation diagram.
     status
         ``grid`` of :class:`hybrid.Status`.
     """
@@ -66,7 +66,7 @@ class Chart:
 
     @property
     def ok(self) -> np.ndarray:
-        """Whether each row is complete and valid, a ``grid`` of booleans."""
+        """Whether each row is complete and valid: a ``grid`` of booleans."""
         return np.vectorize(lambda status: status.ok, otypes=[bool])(self.status)
 
     def __repr__(self) -> str:
@@ -95,18 +95,18 @@ def chart(
 ) -> Chart:
     """Lyapunov exponents at every point of a grid of parameter values, computed in threads.
 
-    The result does not depend on the number of threads, to the last bit. Ctrl-C ends the chart, not the
-    program: the rows done are returned, the others have the status ``NOT_RUN``.
+    The result is the same to the last bit for any number of threads. Ctrl-C ends the chart, not the program:
+    completed rows are returned, and the others have the status ``NOT_RUN``.
 
     Parameters
     ----------
     system
         The model.
     over
-        ``{"omega": values}`` for a line, ``{"omega": values, "e": values}`` for a grid; the last one varies
-        fastest.
+        ``{"omega": values}`` for a line, ``{"omega": values, "e": values}`` for a grid; the last parameter
+        varies fastest.
     x0, mode, t0
-        Where each row starts, as for :func:`hybrid.simulate`.
+        Start of each row, as for :func:`hybrid.simulate`.
     parameters
         Values of the other parameters.
     k
@@ -114,14 +114,14 @@ def chart(
     intervals, interval, transient, solver
         As for :func:`lyapunov.lyapunov_spectrum`.
     section
-        Points of the stroboscopic section to keep of each row, for a bifurcation diagram.
+        Number of points of the stroboscopic section to keep per row, for a bifurcation diagram.
     continue_from
-        ``"previous"`` carries the attractor along the last axis: a row starts where the transient of the row
-        before it led, the first from ``x0``. A row that cannot start there, and one after a row whose
-        transient broke off, starts from ``x0``. The attractor is carried without tangent vectors, ahead of
-        the rows, so that these still run side by side; it costs each row a second transient.
+        ``"previous"`` follows the attractor along the last axis: the first row starts from ``x0``, each other
+        row from the end of the previous row's transient. A row starts from ``x0`` if it cannot start there or
+        if the previous transient failed. The attractor is followed without tangent vectors ahead of the rows,
+        so that rows still run in parallel; this costs a second transient per row.
     threads
-        How many; by default as many as the process has cores.
+        Number of threads; by default the number of cores available to the process.
     progress
         Whether to show a progress bar.
 
@@ -132,8 +132,8 @@ def chart(
     Raises
     ------
     ModelError
-        If the model cannot be compiled, or an argument does not fit it (ArgumentError). What is wrong with
-        the values of a single row is in its status instead.
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError). A problem with the
+        values of a single row is reported in the status of that row instead.
 
     Examples
     --------
@@ -158,8 +158,8 @@ def chart(
     progress = arguments.flag("progress", progress)
     if section and system.period is None:
         raise ArgumentError(
-            "section= takes points once a forcing period, and the system declares none. Give HybridSystem a "
-            "period=, or leave section out."
+            "section= takes one point per forcing period, but the system declares no period. Give "
+            "HybridSystem period=, or omit section=."
         )
     if mode is not None:
         system.mode_index(mode)
@@ -208,7 +208,7 @@ def _axes(
 
 
 def _cores() -> int:
-    """Cores this process may use."""
+    """Number of cores available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -216,7 +216,7 @@ def _cores() -> int:
 
 @attrs.frozen(eq=False)
 class _Rows:
-    """What all rows have in common, and how one is computed."""
+    """Data common to all rows, and the computation of a row."""
 
     system: HybridSystem
     x0: np.ndarray
@@ -232,7 +232,7 @@ class _Rows:
     stop: Told = attrs.field(factory=Told)
 
     def load(self) -> None:
-        """Load all kernels that rows need, before threads do so at once."""
+        """Load all kernels that rows need, so that threads do not load them at the same time."""
         load_kernels("lyapunov.kernels")
         load_kernels("hybrid.kernels.events.sections")
         plan_of(compile_system(self.system), self.solver, self.vectors.shape[1])
@@ -240,7 +240,7 @@ class _Rows:
     def start(
         self, values: Mapping[str, float], state: np.ndarray, mode: str | None, vectors: np.ndarray | None
     ) -> tuple[Trajectory, float]:
-        """A trajectory at its start, and the length of its intervals."""
+        """A trajectory at its start, and the length of an interval."""
         trajectory = start(
             self.system,
             state,
@@ -256,7 +256,7 @@ class _Rows:
     def carried(
         self, values: Mapping[str, float], state: np.ndarray, mode: str | None
     ) -> tuple[np.ndarray, str | None]:
-        """State and mode after the transient, which is whole forcing periods so that the phase is kept."""
+        """State and mode after the transient, rounded up to whole forcing periods to keep the phase."""
         try:
             trajectory, length = self.start(values, state, mode, None)
         except HybridError:
@@ -268,12 +268,12 @@ class _Rows:
         code = trajectory.advance_to(int(clock.cycle) + cycles, float(phase), trajectory.no_record())
         if code != codes.DONE:
             return self.x0, self.mode
-        # With a single mode the check that it allows the state is worth more than the name.
+        # With a single mode pass on the caller's mode: None makes the start check that it allows the state.
         return trajectory.x, self.mode if len(self.system.modes) == 1 else trajectory.mode
 
 
 class _Sheet:
-    """The results of all rows, filled in as they are done, in any order."""
+    """Results of all rows, stored as rows finish, in any order."""
 
     def __init__(self, axes: dict[str, np.ndarray], shape: tuple[int, ...], points: int) -> None:
         self.axes = axes
@@ -291,7 +291,7 @@ class _Sheet:
         return {name: float(axis[i]) for (name, axis), i in zip(self.axes.items(), place, strict=True)}
 
     def fill(self, row: int, trajectory: Trajectory, spectrum: Any, points: int) -> None:
-        """Enter a spectrum, and as many points of the section as its trajectory goes on for."""
+        """Store a spectrum and the section points that its trajectory reaches, at most ``points``."""
         states = np.empty((0, len(spectrum.x)))
         if points and spectrum.status.ok:
             states, _, code = strobe(trajectory, points)
@@ -329,11 +329,11 @@ class _Sheet:
 
 
 class _StoppedError(Exception):
-    """A row is given up because the chart was."""
+    """The row was not computed because the chart was interrupted."""
 
 
 class _Sweep:
-    """Rows in a pool of threads: kernels let go of the interpreter, so threads run side by side."""
+    """Rows in a pool of threads, which run in parallel because kernels release the interpreter lock."""
 
     def __init__(self, work: _Rows, sheet: _Sheet, chained: bool) -> None:
         self.work = work
@@ -343,7 +343,7 @@ class _Sweep:
         self.ended: SimpleQueue[BaseException | None] = SimpleQueue()
 
     def run(self, threads: int, done: Callable[[], object]) -> None:
-        """Compute all rows, or those until an interrupt."""
+        """Compute all rows, or the rows up to an interrupt."""
         rows, origin = len(self.sheet.status), (self.work.x0, self.work.mode)
         chain = self.sheet.grid[-1]
         with ThreadPoolExecutor(threads) as self.pool:
@@ -361,7 +361,7 @@ class _Sweep:
                 self.stop.set()
 
     def update(self, n: float = 1) -> None:
-        """What a row reports its intervals to: here it may be told to stop."""
+        """Called by a row to report its intervals; raises to stop the row after an interrupt."""
         if self.stop.is_set():
             raise _StoppedError
 
@@ -378,7 +378,7 @@ class _Sweep:
             self.ended.put(failure)
 
     def _link(self, row: int, state: np.ndarray, mode: str | None) -> None:
-        """Carry the attractor through one row; the next link goes ahead of the row's own spectrum."""
+        """Carry the attractor through one row; submit the next link before this row's spectrum."""
         work = self.work
         try:
             state, mode = work.carried(self.sheet.values(row), state, mode)

@@ -1,4 +1,4 @@
-"""No more model than the scene needs: models of the same thing, by their exponents and by what they cost."""
+"""Compare models of one system by their exponents and their cost."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class ModelComparison:
     Attributes
     ----------
     spectra
-        Name of a model to its spectra, one at each of ``points``.
+        Maps the name of a model to its spectra, one per point of ``points``.
     reference
-        Name of the model that the others are held against.
+        Name of the model that the others are compared with.
     points
         Parameter values, by name.
     """
@@ -38,29 +38,29 @@ class ModelComparison:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the models, the cheapest first."""
+        """Names of the models, cheapest first."""
         return tuple(sorted(self.spectra, key=self.cost))
 
     @property
     def status(self) -> Status:
-        """Of the first run that did not succeed, or SUCCESS."""
+        """Status of the first run that did not succeed, or SUCCESS."""
         runs = (spectrum.status for spectra in self.spectra.values() for spectrum in spectra)
         return next((status for status in runs if not status.ok), SUCCESS)
 
     def cost(self, name: str) -> float:
-        """Mean number of the solver's steps an interval, rejected ones too, over all points."""
+        """Mean number of solver steps per interval over all points, including rejected steps."""
         return float(np.mean([spectrum.steps_per_interval for spectrum in self._of(name)]))
 
     def distance(self, name: str) -> np.ndarray:
-        """Largest difference of an exponent from the reference's at each point, ``(points,)``.
+        """Largest difference between the sorted exponents of the model and the reference, ``(points,)``.
 
-        The exponents are compared largest first; nan where a run of either model did not succeed.
+        The difference is nan where a run of either model did not succeed.
         """
         pairs = zip(self._of(name), self._of(self.reference), strict=True)
         return np.array([_distance(spectrum, reference) for spectrum, reference in pairs])
 
     def within(self, tolerance: float) -> tuple[str, ...]:
-        """Names of the models within ``tolerance`` of the reference at every point, the cheapest first."""
+        """Names of the models within ``tolerance`` of the reference at every point, cheapest first."""
         wanted = "be at least 0, in inverse units of time"
         tolerance = arguments.not_negative("tolerance", tolerance, wanted, infinite=True)
         return tuple(
@@ -75,7 +75,7 @@ class ModelComparison:
         Parameters
         ----------
         tolerance
-            In inverse units of time. The reference itself is within any.
+            In inverse units of time. The reference is within any tolerance.
 
         Raises
         ------
@@ -122,23 +122,23 @@ def compare_models(
     solver: Solver | None = None,
     progress: bool = False,
 ) -> ModelComparison:
-    """Exponents and cost of several models of the same thing, over a range of parameters.
+    """Exponents and cost of several models of one system, over a range of parameters.
 
-    Which of them is the cheapest that is as good as the best one, :meth:`ModelComparison.cheapest` answers.
-    All start at the same state at every point, so that where attractors coexist two models may end on
-    different ones: a distance, too.
+    :meth:`ModelComparison.cheapest` gives the cheapest model that agrees with the reference. All models
+    start at the same state at every point. Where attractors coexist, two models may reach different
+    attractors; the distance includes this difference.
 
     Parameters
     ----------
     systems
-        Name to model. They have the same states, and the parameters that ``points`` name.
+        Maps names to models. All models have the same states, and the parameters named in ``points``.
     x0, mode, k, intervals, interval, transient, solver
         As for :func:`lyapunov_spectrum`.
     reference
-        Name of the model to hold the others against.
+        Name of the model to compare the others with.
     points
-        Parameter values to compare at, each a mapping as ``parameters`` of :func:`lyapunov_spectrum`; by
-        default the models' own.
+        Parameter values to compare at, each a mapping as for ``parameters`` of :func:`lyapunov_spectrum`; by
+        default the models' declared values.
     progress
         Whether to show a progress bar.
 
@@ -151,7 +151,7 @@ def compare_models(
     ModelError
         If a model cannot be compiled or lacks the mode ``mode``.
     ArgumentError
-        If the reference is no model of ``systems``, the states differ, or an argument does not fit.
+        If ``systems`` lacks the reference, the states differ, or an argument does not fit.
 
     Examples
     --------
@@ -221,7 +221,7 @@ def _distance(spectrum: LyapunovSpectrum, reference: LyapunovSpectrum) -> float:
     if not (spectrum.status.ok and reference.status.ok):
         return float("nan")
     mine, theirs = np.sort(spectrum.exponents), np.sort(reference.exponents)
-    # Two directions that are both annihilated do not differ.
+    # Two exponents of minus infinity do not differ.
     return float(np.max(np.abs(np.subtract(mine, theirs, where=mine != theirs, out=np.zeros(len(mine))))))
 
 

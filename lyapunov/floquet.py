@@ -1,4 +1,4 @@
-"""Exponents of a periodic orbit from its multipliers: the exact answer to hold long averages against."""
+"""Exponents of a periodic orbit from its multipliers: an exact reference for long averages."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from hybrid import PeriodicOrbit, arguments
 
 
 def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
-    r"""Real parts of the Floquet exponents of a periodic orbit, its Lyapunov exponents.
+    r"""Lyapunov exponents of a periodic orbit: the real parts of its Floquet exponents.
 
     .. math:: \lambda_i = \ln|\rho_i| / T
 
     Parameters
     ----------
     orbit
-        From :func:`hybrid.periodic_orbit`: the logarithms of its multipliers :math:`\rho_i`, which are known
-        however small these are, and its period :math:`T`.
+        From :func:`hybrid.periodic_orbit`. It holds the period :math:`T` and the logarithms of the
+        multipliers :math:`\rho_i`, so that even very small multipliers have finite exponents.
 
     Returns
     -------
     (n,) array
-        In the order of the multipliers, in inverse units of time; minus infinity for a multiplier that is
-        zero, a direction that a saltation matrix annihilates.
+        In the order of the multipliers, in inverse units of time; minus infinity for a zero multiplier, a
+        direction that a saltation matrix annihilates.
 
     References
     ----------

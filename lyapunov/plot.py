@@ -1,4 +1,4 @@
-"""Charts of exponents and orbits: each function draws on the axes it is given, or makes a whole figure."""
+"""Charts of exponents and orbits: each function draws on the given axes or makes a new figure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Told apart by every kind of eye, and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
+# Distinct for the colour-blind and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
 INK = "#333333"
 STYLE: Any = {
@@ -49,7 +49,7 @@ FIGURE = (6.4, 3.8)
 
 
 def style() -> AbstractContextManager[None]:
-    """Settings of Matplotlib under which these charts look as meant: ``with style(): ...``."""
+    """Matplotlib settings for these charts: ``with style(): ...``."""
     import matplotlib
 
     return matplotlib.rc_context(STYLE)
@@ -69,13 +69,13 @@ def plot_convergence(
     Parameters
     ----------
     estimates
-        Label to history ``(M,)`` over 1, 2, ..., M intervals.
+        Maps each label to its history ``(M,)`` over 1, 2, ..., M intervals.
     points
-        Label to numbers of intervals and values there: estimates from elsewhere, in the colour of the label.
+        Maps a label to a pair, numbers of intervals and values: other estimates, drawn in the label's colour.
     truth
-        Value to converge to, drawn as a line.
+        Exact value, drawn as a line.
     points_label, truth_label
-        What the legend calls them.
+        Names of the points and of the line in the legend.
     ax
         Axes to draw into; by default those of a new figure.
     """
@@ -91,7 +91,7 @@ def plot_convergence(
         arguments.instance(name, text, str)
     truth = None if truth is None else arguments.number("truth", truth)
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
-    # What comes later is drawn thinner, so that of two lines that coincide both are seen.
+    # Later lines are thinner, so that both of two coinciding lines are visible.
     widths = (2.2, 0.9) if len(histories) > 1 else (1.3,)
     if truth is not None:
         ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
@@ -121,18 +121,18 @@ def plot_phase_portrait(
     labels: tuple[str, str] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Orbit in the plane of two components of the state, jumps as straight lines, with points of a section.
+    """Orbit in the plane of two state components, with jumps as straight lines and points of a section.
 
     Parameters
     ----------
     arc
-        With dense output, that is, simulated without ``samples``.
+        An arc with dense output, simulated without ``samples``.
     x, y
         Names of the components.
     section
         Points ``(N, n)`` to mark.
     labels
-        Texts at the axes; by default the names.
+        Labels of the axes; by default the names.
     ax
         Axes to draw into; by default those of a new figure.
     """
@@ -144,7 +144,7 @@ def plot_phase_portrait(
     orbit = _dense(arc)
     ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
     if marks is not None:
-        # A fixed point must be seen and a cloud must not clot.
+        # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
         size = 2.0 if np.ptp(marks, axis=0).max() > 1e-6 else 26.0
         ax.scatter(
             marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
@@ -155,7 +155,7 @@ def plot_phase_portrait(
 
 
 def _numbers(name: str, value: object, axes: int) -> np.ndarray:
-    """Numbers in a list or in rows."""
+    """An array of numbers with the given number of axes."""
     wanted = f"be an array of numbers of {axes} dimension{'s' if axes > 1 else ''}"
     found = arguments.numbers(name, value, wanted)
     if found.ndim != axes:
@@ -164,7 +164,7 @@ def _numbers(name: str, value: object, axes: int) -> np.ndarray:
 
 
 def _pair(name: str, value: object) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of intervals, and values there."""
+    """Numbers of intervals, and the values after them."""
     wanted = "be two lists of numbers of one length"
     both = arguments.items(name, value, wanted)
     if len(both) != 2:
@@ -176,7 +176,7 @@ def _pair(name: str, value: object) -> tuple[np.ndarray, np.ndarray]:
 
 
 def axis_labels(labels: object, *names: str) -> tuple[str, str]:
-    """Texts at two axes."""
+    """Labels of the two axes."""
     if labels is None:
         return names[0], names[1]
     texts = arguments.items("labels", labels, "be a pair of texts")
@@ -190,7 +190,7 @@ def _as_chart(value: object) -> Chart:
 
 
 def _dense(arc: HybridArc) -> np.ndarray:
-    """Points along an arc in order, close enough for a smooth line, with both sides of each jump."""
+    """Points along an arc in order, dense enough for a smooth line, with both sides of each jump."""
     times = np.linspace(arc.t[0], arc.t[-1], POINTS_OF_A_PORTRAIT)
     jumps = np.searchsorted(arc.jumps.t, times, side="right")
     order = np.lexsort((np.concatenate([arc.t, times]), np.concatenate([arc.j, jumps])))
@@ -198,7 +198,7 @@ def _dense(arc: HybridArc) -> np.ndarray:
 
 
 def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes:
-    """Estimates of the exponents against the number of intervals, with two standard errors at the end.
+    """Estimates of the exponents against the number of intervals, with a bar of two standard errors.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
     """
     arguments.instance("spectrum", spectrum, LyapunovSpectrum, "Make one with lyapunov.lyapunov_spectrum.")
     if not len(spectrum.growths):
-        raise ArgumentError("This spectrum has no history. Make it with history=True.")
+        raise ArgumentError("spectrum must have a history; this one has none. Compute it with history=True.")
     labels = [f"$\\lambda_{{{i + 1}}}$ = {value:.5g}" for i, value in enumerate(spectrum.exponents)]
     history = {label: spectrum.history[:, i] for i, label in enumerate(labels)}
     ax = plot_convergence(history, truth=0.0, truth_label="zero", ax=ax)
@@ -229,7 +229,7 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
             capsize=3,
             linewidth=1,
         )
-    # The first intervals are far off; what the estimates settle to is the news.
+    # The first estimates are far off, so the limits fit the later nine tenths.
     low, high = (values - errors)[shown], (values + errors)[shown]
     late = spectrum.history[len(spectrum.growths) // 10 :, shown]
     bottom, top = min(*low, late.min(), 0.0), max(*high, late.max(), 0.0)
@@ -239,7 +239,7 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
 
 
 def plot_exponents(chart: Chart, *, ax: Axes | None = None) -> Axes:
-    """Exponents of a chart over one parameter, with a band of two standard errors, and the line of zero.
+    """Exponents of a chart over one parameter, with bands of two standard errors and a line at zero.
 
     Parameters
     ----------
@@ -268,14 +268,14 @@ def plot_exponents(chart: Chart, *, ax: Axes | None = None) -> Axes:
 
 
 def plot_bifurcation(chart: Chart, component: str | None = None, *, ax: Axes | None = None) -> Axes:
-    """Points of the section over the parameter: a bifurcation diagram.
+    """Bifurcation diagram: points of the section over the parameter.
 
     Parameters
     ----------
     chart
         From :func:`lyapunov.chart`, over one parameter and with ``section=``.
     component
-        Name of the state's component to show, by default the first.
+        Name of the state component to show; by default the first.
     ax
         Axes to draw into; by default those of a new figure.
 
@@ -287,7 +287,7 @@ def plot_bifurcation(chart: Chart, component: str | None = None, *, ax: Axes | N
     name, values = _only_axis(_as_chart(chart))
     points = chart.section.shape[1]
     if points == 0:
-        raise ArgumentError("This chart has no points of a section. Make it with section=100, for instance.")
+        raise ArgumentError("chart must have section points; this one has none. Compute it with section=100.")
     names = chart.system.state_names
     i = 0 if component is None else as_component("component", chart.system.state_names, component)
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
@@ -299,14 +299,14 @@ def plot_bifurcation(chart: Chart, component: str | None = None, *, ax: Axes | N
 
 
 def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
-    """Map of an exponent over two parameters, red where it is positive, blue where negative, grey where not.
+    """Map of an exponent over two parameters: red if positive, blue if negative, grey if not computed.
 
     Parameters
     ----------
     chart
         From :func:`lyapunov.chart`, over two parameters.
     exponent
-        Which exponent, 0 for the largest.
+        Index of the exponent, 0 for the largest.
     ax
         Axes to draw into; by default those of a new figure.
 
@@ -318,11 +318,13 @@ def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes
     check_axes(ax)
     exponent = arguments.count("exponent", exponent, 0, _as_chart(chart).exponents.shape[-1] - 1)
     if len(chart.over) != 2:
-        raise ArgumentError("A map needs a chart over two parameters. Use plot_exponents for one.")
+        raise ArgumentError(
+            "chart must be over two parameters for a map; this one is over one. Use plot_exponents."
+        )
     (down, rows), (across, columns) = chart.over.items()
     values = chart.exponents[..., exponent]
     finite = np.abs(values[np.isfinite(values)])
-    # A few extremes would leave the rest pale.
+    # With limits at the extremes, a few large values would leave the rest of the map pale.
     limit = float(np.quantile(finite, 0.98)) if finite.size and finite.max() > 0 else 1.0
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
     ax.set_facecolor("0.75")
@@ -343,14 +345,15 @@ def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes
 
 
 def plot_chart(chart: Chart, component: str | None = None) -> Figure:
-    """A figure of a chart: exponents under their bifurcation diagram, or a map of the largest one.
+    """A figure of a chart: exponents below a bifurcation diagram, or a map of the largest exponent.
 
     Parameters
     ----------
     chart
-        From :func:`lyapunov.chart`. With ``section=`` the diagram is drawn.
+        From :func:`lyapunov.chart`. A chart over one parameter with ``section=`` also gets the bifurcation
+        diagram.
     component
-        Name of the state's component in the diagram, by default the first.
+        Name of the state component in the diagram; by default the first.
     """
     import matplotlib.pyplot as plt
 
@@ -373,13 +376,13 @@ def plot_chart(chart: Chart, component: str | None = None) -> Figure:
 def _only_axis(chart: Chart) -> tuple[str, np.ndarray]:
     if len(chart.over) != 1:
         raise ArgumentError(
-            f"This chart is over {' and '.join(chart.over)}: lines need one parameter. Use plot_map."
+            f"chart must be over one parameter; this one is over {' and '.join(chart.over)}. Use plot_map."
         )
     return next(iter(chart.over.items()))
 
 
 def _mark_failures(ax: Axes, chart: Chart) -> None:
-    """Ticks at the foot of the axes where a row has a status other than success."""
+    """Ticks at the bottom of the axes for the rows whose status is not ok."""
     bad = next(iter(chart.over.values()))[~chart.ok]
     if len(bad):
         ax.plot(

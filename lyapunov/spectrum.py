@@ -1,4 +1,4 @@
-"""Lyapunov spectra by orthonormalisation, with saltation at every jump."""
+"""Lyapunov spectra by orthonormalisation, with a saltation matrix at every jump."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from lyapunov.statistics import (
     taper_inflation,
 )
 
-# An interval is known to this part of itself, at least.
+# Rounding of the time may be at most this share of an interval.
 FINEST_INTERVAL = 2.0**-10
-# Intervals a call of the kernel: often enough for a progress bar and an interrupt.
+# Intervals per call of the kernel: few enough for a progress bar and an interrupt.
 INTERVALS_AT_ONCE = 250
 
 
@@ -41,23 +41,23 @@ class LyapunovSpectrum:
     Attributes
     ----------
     exponents
-        ``(k,)``. Tapered means of the growth rates (see ``lyapunov.statistics.TaperedMean``): on periodic and
-        quasi-periodic motion their error falls like ``M^-3``, where that of the plain mean falls like ``1 /
-        M``. Minus infinity for a direction that a saltation matrix annihilates.
+        ``(k,)``. Tapered means of the growth rates (see ``lyapunov.statistics.TaperedMean``). On periodic and
+        quasi-periodic motion their error falls like ``M^-3``; the error of the plain mean falls like
+        ``1 / M``. Minus infinity for a direction that a saltation matrix annihilates.
     standard_error
-        ``(k,)``. Two of them hold the true exponent of this orbit's attractor 95 times in a hundred; too wide
-        on regular motion.
+        ``(k,)``. Exponent plus and minus two standard errors contains the true exponent of this attractor
+        in 95 % of runs. Too wide on regular motion.
     sum_rule
-        What the exponents must sum to if ``k = n``: the time average of div f plus the mean log-determinant
+        Required sum of the exponents if ``k = n``: the time average of div f plus the mean log-determinant
         of the saltation matrices per unit time, along the same orbit and with the same weights.
     growths
         ``(intervals, k)``: growth rate of each direction over each interval; empty with ``history=False``.
     interval, intervals
-        Length of an interval in units of time, and how many were completed.
+        Length of an interval in units of time, and number of completed intervals.
     jumps_per_interval, steps_per_interval
-        Mean numbers of jumps and of the solver's steps, rejected ones too, an interval.
+        Mean numbers of jumps and of solver steps per interval, including rejected steps.
     mode, x
-        Where the orbit ended: name of the mode, state ``(n,)``.
+        End of the orbit: name of the mode, and state ``(n,)``.
     status
         How the run ended.
     """
@@ -86,7 +86,7 @@ class LyapunovSpectrum:
 
     @property
     def sum_defect(self) -> float:
-        """Sum of the exponents minus the sum rule: blind to most errors of the tangents."""
+        """Sum of the exponents minus the sum rule; it does not detect most errors of the tangents."""
         return float(self.exponents.sum() - self.sum_rule)
 
     def __repr__(self) -> str:
@@ -112,9 +112,9 @@ def lyapunov_spectrum(
 ) -> LyapunovSpectrum:
     """Lyapunov exponents by repeated orthonormalisation of tangent vectors.
 
-    The variational equation carries the vectors in a mode, the saltation matrix at a jump (Mueller 1995);
-    their error is controlled with the state's. They are orthonormalised at the end of each interval, and
-    around jumps whose saltation matrices come close to annihilating a direction.
+    The variational equation carries the vectors in a mode, and the saltation matrix carries them across a
+    jump (Mueller 1995). The error control includes the vectors. They are orthonormalised at the end of each
+    interval, and around jumps whose saltation matrices nearly annihilate a direction.
 
     Parameters
     ----------
@@ -123,14 +123,14 @@ def lyapunov_spectrum(
     k
         Number of exponents, 1 to n; all by default.
     intervals, interval
-        How many intervals to average over, and their length; by default the forcing period, and for an
-        autonomous system the reciprocal of the norm of ``D_x f`` at the start.
+        Number of intervals to average over, and their length; by default the forcing period, or the
+        reciprocal of the norm of ``D_x f`` at the start for an autonomous system.
     transient
-        Intervals run before, state and tangent vectors both, and not counted.
+        Number of intervals to run first, with tangent vectors, and discard.
     t0
         Time at the start.
     history
-        Whether to keep the growths of each interval; without, memory does not grow with ``intervals``.
+        Whether to keep the growth rates of each interval. If False, memory does not grow with ``intervals``.
     progress
         Whether to show a progress bar.
 
@@ -174,9 +174,9 @@ def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
 
 
 def interval_length(trajectory: Trajectory, interval: float | None, intervals: int) -> float:
-    """The interval asked for, or the forcing period, or the reciprocal norm of the Jacobian at the start.
+    """The given interval, or the forcing period, or the reciprocal norm of the Jacobian at the start.
 
-    It must be long enough to be told in the time of ``intervals`` of them.
+    The interval must be long compared with the rounding of the time after ``intervals`` intervals.
     """
     period = float(trajectory.model.period)
     if interval is not None:
@@ -191,20 +191,20 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
         where = f"a period of {period}" if period else f"t0 = {trajectory.t} and {intervals} intervals"
         raise ArgumentError(
             f"interval must be long enough to advance the clock; got {length}, and with {where} times are "
-            f"{math.ulp(latest):.2g} apart. Lengthen it, or begin nearer to time zero."
+            f"{math.ulp(latest):.2g} apart. Lengthen it, or start nearer to time zero."
         )
     return length
 
 
 @cache
 def generic_directions(n: int, k: int) -> np.ndarray:
-    """Orthonormal ``(n, k)``, the same every time, with no component along any axis that is zero.
+    """Orthonormal directions ``(n, k)``, always the same, with a nonzero component along every axis.
 
-    Axes are often invariant, that of a clock for one: a first vector along it would never see the largest
-    exponent.
+    Axes are often invariant, for example the axis of a clock. A first vector along such an axis would never
+    grow with the largest exponent.
     """
     directions, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))
-    # All who ask get the same array.
+    # Read-only, because the cache returns the same array to every caller.
     directions.flags.writeable = False
     return np.asarray(directions[:, :k])
 
@@ -217,7 +217,7 @@ def end_at(trajectory: Trajectory) -> Any:
 
 
 class Estimate:
-    """Takes a trajectory further and accumulates the growth rates that the kernel delivers in bursts."""
+    """Advances a trajectory and accumulates the growth rates, which the kernel returns in bursts."""
 
     def __init__(self, trajectory: Trajectory, interval: float) -> None:
         self.trajectory = trajectory
@@ -227,7 +227,7 @@ class Estimate:
         self.grazed_growth = 0.0
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
-        """The spectrum over so many intervals after a transient of so many."""
+        """The spectrum over ``intervals`` intervals, after ``transient`` intervals."""
         trajectory, k = self.trajectory, self.trajectory.tangents
         code = codes.DONE
         if transient:
@@ -264,7 +264,7 @@ class Estimate:
         kept = [np.empty((0, trajectory.tangents))]
         bursts, code = Bursts([trajectory]), codes.DONE
         while mean.count < intervals and code == codes.DONE:
-            # Means are taken of whole blocks, so that their rounding does not depend on where bursts end.
+            # Add whole blocks to the mean, so that its rounding does not depend on where bursts end.
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), trajectory.tangents + 1))
             filled, resumed = 0, False
             while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
@@ -289,10 +289,10 @@ class Estimate:
         return np.concatenate(kept), code
 
     def _replace_annihilated(self) -> None:
-        """Give a new direction to each tangent vector that a jump has sent to zero.
+        """Give a new direction to each tangent vector that a jump has annihilated.
 
-        One that is annihilated again and again has the exponent minus infinity; what happened during the
-        transient alone says nothing about that.
+        A direction that is annihilated again and again has the exponent minus infinity. Annihilation during
+        the transient alone does not mean that.
         """
         run, n = self.trajectory.run, self.trajectory.model.dimension
         vectors = run.y[n:].reshape(-1, n)

@@ -1,10 +1,10 @@
-"""How far a mean of growth rates can be trusted, and a mean that converges fast on regular motion.
+"""Standard error of a mean of growth rates, and a mean that converges fast on regular motion.
 
-Growth rates of successive intervals are correlated, sometimes over hundreds of intervals, and sometimes so
-that they cancel: on a torus, or for the logistic map, they are differences of a function along the orbit and
-their mean converges like ``1/M``, not ``1/sqrt(M)``. The textbook ``std / sqrt(M)`` is wrong in both cases.
-The accumulator here keeps a bounded number of batches however long the run, and the standard error is read
-off those.
+Growth rates of successive intervals are correlated, sometimes over hundreds of intervals. Sometimes they
+cancel: on a torus, or for the logistic map, they are differences of a function along the orbit, and their
+mean converges like ``1/M``, not ``1/sqrt(M)``. The textbook ``std / sqrt(M)`` is wrong in both cases. The
+accumulator keeps a bounded number of batches for any length of the run, and the standard error is computed
+from the batches.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ CLOSED = 0
 BATCH_SIZE = 1
 IN_OPEN_BATCH = 2
 
-# Few frequencies stay close to the zero where the spectrum is wanted; many make the estimate steady. With 8,
-# and the fall of the spectrum judged on some 32 batches, two standard errors cover the truth in 94 to 96 % of
-# runs of autoregressive noise as soon as the run has five times the length of its correlation.
+# Few frequencies stay close to zero, where the spectrum is needed; many reduce the variance of the estimate.
+# With 8 frequencies, and a correlation fitted to some 32 batches, two standard errors cover the truth in 94
+# to 96 % of runs of autoregressive noise if the run is at least five times as long as its correlation.
 FREQUENCIES = 8
 COARSE_BATCHES = 32
 
-# A correlation that close to 1 between batches of a 32nd of the run cannot be told from a drift.
+# A larger correlation between batches of 1/32 of the run cannot be distinguished from a drift.
 MAX_CORRELATION = 0.9
 
-# Student's t quantile at the probability of two sigmas, 95.45 %, over two, for 1 to 8 degrees of freedom.
+# Half of Student's t quantile at the probability of two sigmas, 95.45 %, for 1 to 8 degrees of freedom.
 TWO_SIGMA_OF_STUDENT = np.array(
     [6.9838651, 2.26326834, 1.65341109, 1.43465471, 1.32432472, 1.25826203, 1.21440257, 1.18320789]
 )
@@ -44,10 +44,11 @@ def new_batches(k: int) -> tuple[Array, NDArray[np.int64]]:
 
 
 def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
-    """Add ``values (k,)`` to ``batch_sums (B, k)``, ``B`` even, merging neighbours when all are full.
+    """Add ``values (k,)`` to ``batch_sums (B, k)``, ``B`` even; merge neighbours when all batches are full.
 
-    ``state (3,)`` counts the closed batches, the values a batch takes, and those in the open batch, the row
-    after the closed ones. Kernels compile this function: it knows arrays and integers only.
+    ``state (3,)`` holds the number of closed batches, the number of values per batch, and the number of
+    values in the open batch, which is the row after the closed ones. Kernels compile this function, so it
+    uses arrays and integers only.
     """
     if state[CLOSED] == batch_sums.shape[0]:
         half = batch_sums.shape[0] // 2
@@ -67,23 +68,23 @@ def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
 
 
 def closed_batch_means(batch_sums: Array, state: NDArray[np.int64]) -> Array:
-    """Means ``(b, k)`` of the closed batches of an accumulator; the open one is left out."""
+    """Means ``(b, k)`` of the closed batches of an accumulator, without the open batch."""
     return batch_sums[: state[CLOSED]] / state[BATCH_SIZE]
 
 
 def standard_error(series: Array) -> Array:
-    """Standard error of the mean of a correlated series, two of which cover the truth 95 % of the time.
+    """Standard error of the mean of a correlated series; two of them cover the truth in 95 % of runs.
 
     Parameters
     ----------
     series : (M, k) array
-        One row an interval: the growth rates over it. Nothing is assumed of their correlation, but
-        that the run is several times longer than it lasts.
+        Growth rates, one row per interval. The series must be several times longer than its correlation;
+        nothing else is assumed about the correlation.
 
     Returns
     -------
     (k,) array
-        See `standard_error_from_batches`, which is given at most `MAX_BATCHES` batches of equal size.
+        See `standard_error_from_batches`, which receives at most `MAX_BATCHES` batches of equal size.
     """
     series = np.asarray(series, dtype=float)
     size = max(1, math.ceil(len(series) / MAX_BATCHES))
@@ -93,28 +94,28 @@ def standard_error(series: Array) -> Array:
 def standard_error_from_batches(batch_means: Array) -> Array:
     r"""Standard error of the mean of equal batches, from their lowest cosine frequencies.
 
-    The variance of a mean is the spectrum at frequency zero over the length. It is estimated by
-    the mean square of the projections on the first :math:`\nu = 8` cosines of a whole run [1]_, [2]_,
+    The variance of a mean is the spectrum at frequency zero divided by the length. The spectrum is estimated
+    by the mean square of the projections on the first :math:`\nu = 8` cosines of the run [1]_, [2]_,
 
     .. math:: s^2 = \frac{1}{b \nu} \sum_{j=1}^{\nu} \Lambda_j^2, \qquad
         \Lambda_j = \sqrt{\tfrac{2}{b}} \sum_{i=1}^{b} y_i \cos \frac{\pi j (i - 1/2)}{b},
 
-    which, unlike the variance of batch means, stays close where the sum of the series is bounded. In a short
-    run of a slow series even these frequencies see only the flank of the peak at zero: :math:`s^2` is divided
-    by the part they would see of a first-order autoregressive process, fitted to some 32 coarser batches.
-    Anticorrelation is not credited. The result is widened by Student's t, so that plus and minus two of it
-    hold the truth 95.45 % of the time.
+    which, unlike the variance of batch means, stays accurate where the sum of the series is bounded. In a
+    short run of a slow series these frequencies cover only the flank of the peak at zero. Therefore
+    :math:`s^2` is divided by the share that they cover for a first-order autoregressive process, fitted to
+    some 32 coarser batches. A negative correlation is treated as zero. The result is widened by Student's t,
+    so that the mean plus and minus two standard errors contains the truth in 95.45 % of runs.
 
     Parameters
     ----------
     batch_means : (b, k) array
-        Means of consecutive stretches of the series.
+        Means of consecutive batches of the series.
 
     Returns
     -------
     (k,) array
-        ``nan`` for fewer than 4 batches; ``0`` for a column with minus infinity, whose mean is exactly that;
-        ``nan`` for a column with ``nan`` or plus infinity.
+        ``nan`` for fewer than 4 batches; ``0`` for a column with minus infinity, whose mean is exactly minus
+        infinity; ``nan`` for a column with ``nan`` or plus infinity.
 
     References
     ----------
@@ -148,19 +149,19 @@ def standard_error_from_batches(batch_means: Array) -> Array:
 
 
 def _merge(series: Array, size: int) -> Array:
-    """Means of batches of ``size`` rows; a remainder is dropped at the start, where transients are."""
+    """Means of batches of ``size`` rows; a remainder is dropped at the start, near the transient."""
     count = len(series) // size
     return series[len(series) - count * size :].reshape(count, size, *series.shape[1:]).mean(axis=1)
 
 
 def _cosines(count: int, nu: int) -> Array:
-    """First ``nu`` rows after the constant of the orthonormal discrete cosine transform of type II."""
+    """Rows 1 to ``nu`` of the orthonormal discrete cosine transform of type II; row 0 is the constant."""
     i, j = np.arange(count) + 0.5, np.arange(1, nu + 1)
     return np.sqrt(2.0 / count) * np.cos(np.pi / count * np.outer(j, i))
 
 
 def _lag_one_correlation(deviations: Array) -> Array:
-    """Correlation of neighbours, cut to 0 .. 0.9, less its bias ``-(1 + 3 r) / n`` (Marriott, Pope 1954)."""
+    """Correlation of neighbours, minus its bias ``-(1 + 3 r) / n`` (Marriott, Pope 1954), cut to 0 .. 0.9."""
     variance = (deviations**2).sum(axis=0)
     covariance = (deviations[1:] * deviations[:-1]).sum(axis=0)
     r = np.divide(covariance, variance, out=np.zeros_like(variance), where=variance > 0.0)
@@ -168,21 +169,22 @@ def _lag_one_correlation(deviations: Array) -> Array:
 
 
 def _autoregressive_spectrum(r: Array, count: int, nu: int) -> Array:
-    """Mean over the first ``nu`` cosine frequencies of an AR(1) spectrum that is 1 at frequency zero."""
+    """Mean of an AR(1) spectrum over the first ``nu`` cosine frequencies, relative to frequency zero."""
     angle = np.pi / count * np.arange(1, nu + 1).reshape(-1, *(1,) * r.ndim)
     return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=0)
 
 
 class TaperedMean:
-    r"""Mean of a series as it grows, weighted so that regular motion averages out fast.
+    r"""Mean of a growing series, with weights for which regular motion averages out fast.
 
     .. math:: \bar y_M = \sum_{i=1}^{M} w_i y_i \Big/ \sum_{i=1}^{M} w_i, \qquad
         w_i = (i - \tfrac12)^2 (M - i + \tfrac12)^2
 
-    A weighted Birkhoff average [1]_: the weight and its slope vanish at both ends, so on periodic and
-    quasi-periodic series the error falls like ``M**-3``, where the plain mean has ``1 / M``. The bump of [1]_
-    does still better, but needs to know ``M`` beforehand; this weight is a polynomial in ``M``, so three sums
-    give the estimate at every ``M``. On white noise its variance is 10/7 that of the plain mean.
+    This is a weighted Birkhoff average [1]_. The weight and its slope vanish at both ends, so on periodic and
+    quasi-periodic series the error falls like ``M**-3``; the error of the plain mean falls like ``1 / M``.
+    The smooth bump of [1]_ converges faster, but requires ``M`` in advance. This weight is a polynomial in
+    ``M``, so three sums give the estimate at every ``M``. On white noise its variance is 10/7 that of the
+    plain mean.
 
     Parameters
     ----------
@@ -192,8 +194,7 @@ class TaperedMean:
     References
     ----------
     .. [1] S. Das, Y. Saiki, E. Sander, J. A. Yorke, "Quantitative quasiperiodicity", Nonlinearity 30 (2017)
-    4111,
-       https://doi.org/10.1088/1361-6544/aa84c2.
+       4111, https://doi.org/10.1088/1361-6544/aa84c2.
     """
 
     def __init__(self, columns: int) -> None:
@@ -210,7 +211,7 @@ class TaperedMean:
         self.count += len(rows)
 
     def value(self) -> Array:
-        """The mean ``(columns,)`` so far; ``nan`` of nothing, minus infinity once such an entry came."""
+        """The mean ``(columns,)`` so far; ``nan`` without rows, minus infinity after an entry of -inf."""
         if self.count == 0:
             return np.full(self._moments.shape[1], np.nan)
         mean = _tapered(self._moments[:, None], np.array([float(self.count)]))[0]
@@ -238,5 +239,5 @@ def _tapered(moments: Array, count: Array) -> Array:
 
 
 def taper_inflation() -> float:
-    """Standard error of the tapered mean over that of the plain one, on noise: ``sqrt(10 / 7)``."""
+    """Ratio of the standard errors of the tapered and the plain mean on noise: ``sqrt(10 / 7)``."""
     return math.sqrt(10.0 / 7.0)

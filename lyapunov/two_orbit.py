@@ -1,4 +1,4 @@
-"""Exponents from the distance of two orbits: three formulas that saturate, and one that converges."""
+"""Exponents from the distance of two orbits: three formulas that saturate and one that converges."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from lyapunov.statistics import running_tapered_mean
 class TwoOrbitExponents:
     r"""Estimates of the largest exponent from the distance to a companion orbit, as histories over ``M``.
 
-    With :math:`d_0` the separation, :math:`d_i` the distance after the i-th interval, of length :math:`T`,
-    formulas (7) to (9) of [1]_ are
+    With :math:`d_0` the separation, :math:`T` the length of an interval and :math:`d_i` the distance after
+    the i-th interval, formulas (7) to (9) of [1]_ are
 
     .. math::
 
@@ -36,34 +36,33 @@ class TwoOrbitExponents:
         \lambda_8 = \frac{1}{M T} \sum_{i=1}^{M} \ln\frac{d_i}{d_{i-1}}, \qquad
         \lambda_9 = \frac{1}{M T} \sum_{i=1}^{M} \ln\frac{d_i}{d_0}.
 
-    None of them converges to an exponent. The sum in (8) telescopes: (8) is (7). The distance of a chaotic
-    orbit stops growing at the size of the attractor and that of a stable one stops shrinking at rounding or
-    at the solver's tolerance, so both decay like ``1 / M`` once it has. Formula (9) lacks a division by
-    ``i`` in its terms; it tends to the level at which the distance stays, over ``T``.
+    None of these formulas converges to an exponent. The sum in (8) telescopes, so (8) equals (7). The
+    distance stops growing at the size of the attractor for a chaotic orbit. For a stable orbit it stops
+    shrinking at rounding or at the solver's tolerance. From then on both estimates decay like ``1 / M``.
+    Formula (9) lacks a division by ``i`` in its terms. It tends to the mean of :math:`\ln(d_i / d_0)` at
+    saturation, divided by :math:`T`.
 
-    A companion that is brought back to the separation after each interval [2]_ has none of these faults,
-    needs no derivatives, and converges.
+    A companion that is rescaled to the separation after each interval [2]_ avoids these faults: its estimate
+    converges and needs no derivatives.
 
     Attributes
     ----------
     distances
         ``(M,)``: distance of the free companion at the end of each interval. The phase of the forcing, a
-        coordinate of its own in [1]_, is the same for both and adds nothing.
+        coordinate in [1]_, is the same for both orbits and adds nothing.
     renormalised_growths
         ``(M,)``: growth rate of the distance of the renormalised companion over each interval.
     separation, interval
         Distance at the start, and length of an interval in units of time.
     status
-        How the runs ended; the histories hold the intervals completed.
+        How the runs ended; the histories hold the completed intervals.
 
     References
     ----------
     .. [1] V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly
-    nonlinear
-       nonsmooth discontinuous vibroimpact system", 2017.
+       nonlinear nonsmooth discontinuous vibroimpact system", 2017.
     .. [2] G. Benettin, L. Galgani, J.-M. Strelcyn, "Kolmogorov entropy and numerical experiments", Phys.
-    Rev. A 14
-       (1976) 2338, doi:10.1103/PhysRevA.14.2338.
+       Rev. A 14 (1976) 2338, doi:10.1103/PhysRevA.14.2338.
     """
 
     distances: np.ndarray
@@ -74,7 +73,7 @@ class TwoOrbitExponents:
 
     @property
     def intervals(self) -> int:
-        """How many intervals were completed."""
+        """Number of completed intervals."""
         return len(self.distances)
 
     @property
@@ -84,10 +83,10 @@ class TwoOrbitExponents:
 
     @property
     def telescoped(self) -> np.ndarray:
-        """Formula (8), ``(M,)``, summed as it stands; minus infinity from the first coincidence on."""
+        """Formula (8), ``(M,)``, summed term by term; minus infinity from the first coincidence on."""
         before = np.concatenate([[self.separation], self.distances[:-1]])
         ratios = np.divide(self.distances, before, out=np.zeros_like(before), where=before > 0)
-        # The distance may come back from zero by rounding; the sum does not come back from minus infinity.
+        # The distance may leave zero again by rounding, but the sum stays minus infinity.
         return np.cumsum(_log(ratios)) / self._elapsed
 
     @property
@@ -97,12 +96,12 @@ class TwoOrbitExponents:
 
     @property
     def renormalised(self) -> np.ndarray:
-        """Plain running means ``(M,)`` of the growths of the renormalised companion."""
+        """Plain running means ``(M,)`` of the growth rates of the renormalised companion."""
         return np.cumsum(self.renormalised_growths) / np.arange(1, self.intervals + 1)
 
     @property
     def renormalised_exponent(self) -> float:
-        """Tapered mean of those growths (see ``lyapunov.statistics.TaperedMean``): the estimate to use."""
+        """The estimate to use: the tapered mean of ``renormalised_growths``, nan without intervals."""
         if self.intervals == 0:
             return math.nan
         return float(running_tapered_mean(self.renormalised_growths[:, None])[-1, 0])
@@ -138,16 +137,17 @@ def two_orbit_exponents(
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`.
     separation
-        Distance of the companion at the start, in the units of the state: small against the lengths over
-        which the model bends, and well above the solver's tolerances and the rounding of the state.
-        Distances near the tolerance measure how the two runs happened to step, not how the orbits separate.
+        Distance of the companion at the start, in the units of the state. It should be small against the
+        lengths over which the model is nonlinear, and well above the solver's tolerances and the rounding of
+        the state. Distances near the tolerance show the steps of the two runs, not the separation of orbits.
     direction
-        ``(n,)``: where the companion lies, of any length; by default all components are equal.
+        ``(n,)``: direction from the reference to the companion, of any length; by default all components are
+        equal.
     intervals, interval
-        How many intervals to follow the orbits, and their length; by default the forcing period, and for an
-        autonomous system the reciprocal of the norm of ``D_x f`` at the start.
+        Number of intervals to follow the orbits, and their length; by default the forcing period, or the
+        reciprocal of the norm of ``D_x f`` at the start for an autonomous system.
     transient
-        Intervals that the reference orbit runs before the companion is placed.
+        Number of intervals to run the reference orbit before the companion is placed.
     t0
         Time at the start.
     progress
@@ -164,8 +164,8 @@ def two_orbit_exponents(
 
     Notes
     -----
-    The companion starts in the mode that its guards allow if there is just one, else in that of the
-    reference orbit.
+    The companion starts in the only mode that the guards allow; if they do not allow exactly one, it starts
+    in the mode of the reference orbit.
 
     Examples
     --------
@@ -217,7 +217,7 @@ def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarra
 
 
 def _skip(trajectory: Trajectory, intervals: int, interval: float) -> int:
-    """Run a number of intervals, exactly if they are forcing periods; returns the driver's code."""
+    """Run a number of intervals, exactly if they are forcing periods; return the driver's code."""
     record = trajectory.no_record()
     if interval == trajectory.model.period:
         cycle, phase = trajectory.run.cycle, trajectory.run.phase
@@ -231,13 +231,14 @@ def _companion(
     parameters: Mapping[str, float] | None,
     solver: Solver | None,
 ) -> Trajectory:
-    """A trajectory beside the current point of the reference, at exactly its time."""
+    """A trajectory that starts beside the current point of the reference, at exactly the same time."""
     place = (reference.system, reference.x + offset, reference.t)
     try:
         companion = start(*place, parameters=parameters, solver=solver)
     except ArgumentError:
         companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
-        # What lies between the two orbits, the companion has crossed.
+        # The companion takes the sides of the guards from the reference, as if it had crossed any guard
+        # between the two orbits.
         companion.run.side[:] = reference.run.side
         companion.run.previous_mode = companion.run.mode
     companion.run.cycle = reference.run.cycle
@@ -253,7 +254,7 @@ def _follow(
     intervals: int,
     bar: Progress,
 ) -> tuple[np.ndarray, Status]:
-    """Distances ``(M, 2)`` of the free and the renormalised companion, in bursts, and how the runs ended."""
+    """Distances ``(M, 2)`` of the free and the renormalised companion, and how the runs ended."""
     kernel = entry(load_kernels("lyapunov.kernels").distances)
     advance = address(load_kernels().advance)
     runs: list[Any] = [reference, *companions]

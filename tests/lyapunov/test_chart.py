@@ -189,7 +189,7 @@ def test_an_interrupt_keeps_the_rows_done(monkeypatch):
     assert np.isfinite(chart.exponents[done]).all()
     assert np.isnan(chart.exponents[~done]).all()
     assert {status.code for status in chart.status[~done]} == {StatusCode.NOT_RUN}
-    assert "Interrupted before this row was done" in str(chart.status[~done][0])
+    assert "The chart was interrupted before this row was complete" in str(chart.status[~done][0])
 
 
 def test_an_error_in_a_thread_is_raised(monkeypatch):
@@ -264,5 +264,5 @@ def test_bad_arguments(arguments, message):
 
 
 def test_a_section_needs_a_period():
-    with pytest.raises(hybrid.ArgumentError, match="once a forcing period, and the system declares none"):
+    with pytest.raises(hybrid.ArgumentError, match="per forcing period, but the system declares no period"):
         lyapunov.chart(models.bouncing_ball(), {"e": [0.8]}, (1.0, 0.0), section=5)

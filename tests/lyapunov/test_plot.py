@@ -68,13 +68,13 @@ def test_a_figure_of_each_kind(line, grid):
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
     assert len(plot_chart(bare).axes) == 1
-    with pytest.raises(ArgumentError, match="no points of a section"):
+    with pytest.raises(ArgumentError, match="chart must have section points"):
         plot_bifurcation(bare, ax=plt.figure().subplots())
 
 
 def test_lines_and_maps_want_their_kind_of_chart(line, grid):
     ax = plt.figure().subplots()
-    with pytest.raises(ArgumentError, match="over r and d: lines need one parameter"):
+    with pytest.raises(ArgumentError, match="over one parameter; this one is over r and d"):
         plot_exponents(grid, ax=ax)
-    with pytest.raises(ArgumentError, match="A map needs a chart over two parameters"):
+    with pytest.raises(ArgumentError, match="chart must be over two parameters"):
         plot_map(line, ax=ax)
