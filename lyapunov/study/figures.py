@@ -24,20 +24,20 @@ BODIES = (
     ("main body", "x1", "v1", ("$x_1$, m", "$\\dot x_1$, m/s")),
     ("attached body", "x2", "v2", ("$x_2$, m", "$\\dot x_2$, m/s")),
 )
-# Up to here every estimate is a tangle.
+# First number of periods shown; earlier estimates fluctuate too much.
 FIRST_SHOWN = 10
-# The first estimates of every method are far off; the scale is that of what they come to.
+# Least height of the axes, in 1/s; the limits fit the late estimates, since the first ones are far off.
 LEAST_HEIGHT = 0.03
 ESTIMATES = (
     ("Two orbits, formulas (7) and (8)", ("(7)", "(8)")),
     ("Two orbits, formula (9)", ("(9)",)),
     ("Benettin, two starts", ("(10) I", "(10) II")),
-    ("What converges", ("two-orbit", "tapered")),
+    ("Estimates that converge", ("two-orbit", "tapered")),
 )
 
 
 def write_figures(folder: Path, regimes: Sequence[Regime]) -> list[Path]:
-    """A phase portrait and the convergence for each regime, and all regimes compared; returns the paths."""
+    """Write a phase portrait and the convergence of each regime, and a comparison; return the paths."""
     paths = []
     with style():
         for regime in regimes:
@@ -48,7 +48,7 @@ def write_figures(folder: Path, regimes: Sequence[Regime]) -> list[Path]:
 
 
 def write_tolerance_figure(folder: Path, trap: Trap) -> Path:
-    """The trap, as ``tolerances.png``."""
+    """Write the errors of tangent vectors outside the error control as ``tolerances.png``."""
     with style():
         return _save(tolerances(trap), folder / "tolerances.png")
 
@@ -58,19 +58,19 @@ def _title(regime: Regime) -> str:
 
 
 def portrait(regime: Regime) -> Figure:
-    """Phase portraits of both bodies with the points once a period."""
+    """Phase portraits of both bodies, with one section point per period."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.8))
     for ax, (body, x, v, labels) in zip(axes, BODIES, strict=True):
         plot_phase_portrait(regime.arc, x, v, section=regime.section.x, labels=labels, ax=ax)
         ax.set_title(body)
-    figure.suptitle(f"{_title(regime)}: orbit, and section once a period", x=0.01, ha="left", fontsize=10.5)
+    figure.suptitle(f"{_title(regime)}: orbit and stroboscopic section", x=0.01, ha="left", fontsize=10.5)
     return figure
 
 
 def convergence(regime: Regime) -> Figure:
-    """Every estimate over M, the paper's figures as open circles."""
+    """Every estimate over M, with the paper's figures as open circles."""
     import matplotlib.pyplot as plt
 
     ours, theirs = histories(regime), paper_columns(regime.omega)
@@ -96,11 +96,11 @@ def convergence(regime: Regime) -> Figure:
 
 
 def _truth(regime: Regime) -> tuple[float, str]:
-    """The best value known, and what it is."""
+    """The best known value and its label."""
     if regime.kind == "periodic" and regime.orbit.status.ok:
         return float(floquet_exponents(regime.orbit)[0]), "Floquet exponent"
     if regime.kind == "quasi-periodic":
-        return 0.0, "zero, of a torus"
+        return 0.0, "zero for a torus"
     return float(regime.spectra[0].exponents[0]), "last tapered estimate"
 
 
@@ -112,7 +112,7 @@ def _printed(column: tuple[float | None, ...]) -> tuple[list[int], list[float]]:
 def _fit_height(
     ax: Axes, estimates: Sequence[np.ndarray], printed: Sequence[Sequence[float]], truth: float
 ) -> None:
-    """Limits that hold the paper's points, the truth, and all but the first hundredth of the histories."""
+    """Set limits that show the paper's points, the truth, and the last 99 % of the histories."""
     shown = [history[len(history) // 100 :] for history in estimates]
     values = np.concatenate([*shown, *map(np.asarray, printed), [truth]])
     values = values[np.isfinite(values)]
@@ -122,7 +122,7 @@ def _fit_height(
 
 
 def comparison(regimes: Sequence[Regime]) -> Figure:
-    """The regimes side by side, the second body's plane."""
+    """The regimes side by side, in the plane of the second body."""
     _, x, v, labels = BODIES[1]
     panels = [
         Panel(_title(regime), regime.arc, regime.section.x, regime.spectra[0].history[:, 0], 0.08)
@@ -132,7 +132,7 @@ def comparison(regimes: Sequence[Regime]) -> Figure:
 
 
 def tolerances(trap: Trap) -> Figure:
-    """Errors over tolerances, of the first exponent and of the sum, tangents controlled and not."""
+    """Errors of the first exponent and of the sum over the tolerance, with and without error control."""
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=(6.4, 4.2))
@@ -148,7 +148,7 @@ def tolerances(trap: Trap) -> Figure:
     )
     ax.set_xlabel("tolerance, rtol = atol")
     ax.set_ylabel("error, 1/s")
-    ax.set_title("Tangent vectors inside the error control, and outside of it")
+    ax.set_title("Tangent vectors inside and outside the error control")
     ax.grid(True)
     ax.invert_xaxis()
     ax.legend()

@@ -1,4 +1,4 @@
-"""The figures printed in the paper that the study repeats, as data.
+"""Data: the figures printed in the paper that the study recomputes.
 
 V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
 nonsmooth discontinuous vibroimpact system", 2017: exponents in 1/s after M periods.
@@ -13,7 +13,7 @@ ROWS = (100, 500, 1000, 5000, 10000)
 
 @attrs.frozen
 class PaperRegime:
-    """What the paper has for one frequency; columns follow ``ROWS``, with None where nothing is printed."""
+    """Figures of the paper for one frequency: one column entry per row of ``ROWS``, None if not printed."""
 
     regime: str
     single_piece: tuple[float | None, ...]
@@ -56,6 +56,6 @@ PAPER = {
     ),
 }
 
-# Where the paper's Benettin column ends although the exponent is known to be something else: 7.40 has the
-# paper's own Floquet exponent, -0.056, and 7.46 a torus, whose first exponent is zero.
+# Last values of the paper's Benettin column that contradict the known exponents: at 7.40 the paper's own
+# Floquet exponent is -0.056, and at 7.46 the motion is on a torus, whose first exponent is zero.
 DOUBTFUL = {7.40: -0.067, 7.46: -0.0091}

@@ -17,12 +17,12 @@ from lyapunov.study.paper import DOUBTFUL, PAPER, ROWS
 from lyapunov.study.runs import STARTS, Regime
 from lyapunov.study.tangents import TRAP_OMEGA, Explanation, Trap
 
-# An explanation is worth the name if it leaves at most this part of the disagreement.
+# A candidate counts as an explanation if it leaves at most this share of the disagreement.
 EXPLAINS = 0.5
 
 
 def histories(regime: Regime) -> dict[str, np.ndarray]:
-    """Every estimate of the first exponent as a history ``(M,)``, under the heading it has in the tables."""
+    """Every estimate of the first exponent as a history ``(M,)``, by its heading in the tables."""
     first, second = regime.spectra[0], regime.spectra[1]
     two = regime.two_orbit
     return {
@@ -37,7 +37,7 @@ def histories(regime: Regime) -> dict[str, np.ndarray]:
 
 
 def paper_columns(omega: float) -> dict[str, tuple[float | None, ...]]:
-    """The paper's columns under the same headings; empty at a frequency it does not have."""
+    """The paper's columns by the same headings; empty at a frequency that the paper does not have."""
     paper = PAPER.get(omega)
     if paper is None:
         return {}
@@ -51,7 +51,7 @@ def paper_columns(omega: float) -> dict[str, tuple[float | None, ...]]:
 
 
 def regime_text(regime: Regime) -> str:
-    """Table of one frequency, the paper's figures beside ours, and what the regime is."""
+    """Table of one frequency with the paper's figures beside ours, and a description of the regime."""
     ours, theirs = histories(regime), paper_columns(regime.omega)
     headings, rows = ["M"], [[str(M)] for M in rows_up_to(regime)]
     for name, history in ours.items():
@@ -77,7 +77,7 @@ def regime_text(regime: Regime) -> str:
 
 
 def rows_up_to(regime: Regime) -> list[int]:
-    """Rows of the paper that the study reaches, or else its own end."""
+    """Rows of the paper that the study reaches, or else the last interval of the study."""
     intervals = regime.spectra[0].intervals
     return [M for M in ROWS if intervals >= M] or [max(intervals, 1)]
 
@@ -122,14 +122,14 @@ def _trouble(regime: Regime) -> list[str]:
 
 
 def tolerance_text(trap: Trap) -> str:
-    """Table of the trap."""
+    """Table of the exponents with tangent vectors inside and outside the error control."""
     total = trap.truth.sum()
     cells = [
         [f"{tolerance:.0e}", *(f"{v:.6f}" for v in (a[0], a[-1], b[0], b[-1])), f"{b.sum() - total:.0e}"]
         for tolerance, a, b in zip(trap.tolerances, trap.inside, trap.outside, strict=True)
     ]
     exact = ["exact", *(f"{v:.6f}" for v in trap.truth[[0, -1, 0, -1]]), ""]
-    title = f"The trap: tangent vectors outside the error control, omega = {TRAP_OMEGA:.2f}"
+    title = f"Tangent vectors outside the error control, omega = {TRAP_OMEGA:.2f}"
     headings = ["rtol = atol", "inside: first", "last", "outside: first", "last", "their sum off by"]
     return "\n".join(
         [
@@ -137,24 +137,24 @@ def tolerance_text(trap: Trap) -> str:
             "-" * len(title),
             table(headings, [*cells, exact], numbers=True),
             "",
-            "Outside, the exponents are wrong where their sum is right: the sum rule does not see it.",
+            "Outside, the exponents are wrong but their sum is right, so the sum rule does not detect it.",
         ]
     )
 
 
 def explanation_text(found: Sequence[Explanation]) -> str:
-    """Table of the candidates and the verdict, which may be that the question stays open."""
+    """Table of the candidates, and the verdict, which may leave the question open."""
     omegas = list(found[0].exponents)
     paper = [number(DOUBTFUL.get(omega)) for omega in omegas]
     cells = [["the paper's Benettin column", *paper, ""]]
     cells += [[e.text, *(number(e.exponents[omega]) for omega in omegas), number(e.misfit)] for e in found]
-    title = "Where the paper's Benettin column ends, and why"
+    title = "Last values of the paper's Benettin column, and candidate explanations"
     headings = ["", *(f"{omega:.2f}" for omega in omegas), "off by"]
     return "\n".join([title, "-" * len(title), table(headings, cells, numbers=True), "", verdict(found)])
 
 
 def verdict(found: Sequence[Explanation]) -> str:
-    """What the comparison says, in words."""
+    """The result of the comparison, in words."""
     as_it_is, *others = found
     if math.isnan(as_it_is.misfit):
         frequencies = " and ".join(f"{omega:.2f}" for omega in DOUBTFUL)
@@ -165,20 +165,20 @@ def verdict(found: Sequence[Explanation]) -> str:
         return f"Open: the closest candidate, {best.text}, still leaves {left}."
     return (
         f"Closest: {best.text}, which leaves {left}.\n"
-        f"It is one of {len(others)} candidates; method and tolerance stand in for the paper's ode23s,\n"
-        "which ran straight through the impacts at a tolerance that is not printed: a finding, not a proof."
+        f"It is one of {len(others)} candidates. Its method and tolerance replace the paper's ode23s, which\n"
+        "integrated across the impacts at an unknown tolerance. This is an indication, not a proof."
     )
 
 
 def number(value: float | None) -> str:
-    """Four significant digits at most, empty for nothing."""
+    """At most four significant digits; an empty text for None or nan."""
     if value is None or math.isnan(value):
         return ""
     return f"{value:.2e}" if 0 < abs(value) < 1e-3 else f"{value:.4f}" if abs(value) < 1 else f"{value:.2f}"
 
 
 def write_histories(folder: Path, regime: Regime) -> None:
-    """``exponents_<omega>.csv``: each estimate after each period."""
+    """Write ``exponents_<omega>.csv``: one row per period, one column per estimate."""
     columns = histories(regime)
     length = min(map(len, columns.values()))
     rows = ([M + 1, *(history[M] for history in columns.values())] for M in range(length))
@@ -186,14 +186,14 @@ def write_histories(folder: Path, regime: Regime) -> None:
 
 
 def write_tolerances(folder: Path, trap: Trap) -> None:
-    """``tolerances.csv``: the trap."""
+    """Write ``tolerances.csv``: exponents inside and outside the error control."""
     headings = [f"{side} {i}" for side in ("inside", "outside") for i in range(1, 5)]
     rows = np.column_stack([trap.tolerances, trap.inside, trap.outside])
     _write(folder / "tolerances.csv", ["tolerance", *headings], rows.tolist())
 
 
 def write_explanations(folder: Path, found: Sequence[Explanation]) -> None:
-    """``explanations.csv``: the candidates."""
+    """Write ``explanations.csv``: one row per candidate."""
     omegas = list(found[0].exponents)
     rows = ([e.text, *(e.exponents[omega] for omega in omegas), e.misfit] for e in found)
     _write(folder / "explanations.csv", ["candidate", *omegas, "misfit"], rows)

@@ -1,4 +1,4 @@
-"""The computations of the study, one regime at a time; nothing is printed or drawn here."""
+"""The computations of the study, one regime at a time, without printing or drawing."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
 
 SECTION_POINTS = 2000
 PORTRAIT_PERIODS = 60
-# The companion starts at 1e-8: a solver whose steps are off by that much would be all that it sees.
+# The companion starts at 1e-8: with a solver error of that size the distance would show only the error.
 TWO_ORBIT_TIGHTER = 1e-3
 
 
 @attrs.frozen
 class Start:
-    """A state ``(x1, x2, v1, v2)`` to start from, and what to call it."""
+    """A start ``(x1, x2, v1, v2)`` with its label and description."""
 
     label: str
     text: str
@@ -43,7 +43,7 @@ STARTS = (
 
 @attrs.frozen
 class Settings:
-    """Forcing periods averaged over and skipped before, the method, and whether to show progress."""
+    """Forcing periods to average over and to skip first, the method, and whether to show progress."""
 
     intervals: int = 10_000
     transient: int = 1_000
@@ -52,28 +52,28 @@ class Settings:
 
     @property
     def two_orbit_solver(self) -> Solver:
-        """The method for two neighbouring orbits, whose small distance must stand out of the error."""
+        """The method for two neighbouring orbits, whose distance must be well above the solver error."""
         rtol, atol = self.solver.rtol * TWO_ORBIT_TIGHTER, self.solver.atol * TWO_ORBIT_TIGHTER
         return attrs.evolve(self.solver, rtol=max(rtol, 1e-13), atol=max(atol, 1e-16))
 
 
 @attrs.frozen(eq=False)
 class Regime:
-    """All that is computed at one frequency.
+    """Results at one frequency.
 
     Attributes
     ----------
     omega
         Frequency of the drive, rad/s.
     spectra
-        One for each of ``STARTS``: all exponents from the first, the largest alone from the others.
+        One per start of ``STARTS``: all exponents for the first start, the largest one for the others.
     two_orbit
         The two-orbit estimates from the first start.
     orbit
-        Periodic orbit of one forcing period, stable or not, that Newton's method finds from the first start.
+        Periodic orbit of one forcing period, stable or not, found by Newton's method from the first start.
     section, arc
-        Points once a period, half a period after the drive's peak, and some periods of orbit, where the
-        first start led.
+        Section points once per period, half a period after the drive's peak, and an arc of several periods,
+        both on the attractor of the first start.
     """
 
     omega: float
@@ -85,7 +85,7 @@ class Regime:
 
     @property
     def impacts_per_period(self) -> tuple[float, ...]:
-        """For each start. An impact is two jumps, into contact and out of it."""
+        """Impacts per period for each start. An impact is two jumps: into contact and out of contact."""
         return tuple(spectrum.jumps_per_interval / 2 for spectrum in self.spectra)
 
     @property
@@ -94,7 +94,7 @@ class Regime:
         first = self.spectra[0]
         if not len(self.section) or np.isnan(first.standard_error[0]):
             return "undecided"
-        # On regular motion the estimate is better than its standard error, which may then be next to nothing.
+        # On regular motion the standard error may be close to zero, so the threshold has a lower limit.
         value, error = first.exponents[0], max(2 * first.standard_error[0], 1e-4)
         if np.ptp(self.section.x, axis=0).max() < 1e-6 or value < -error:
             return "periodic"
@@ -102,7 +102,7 @@ class Regime:
 
 
 def study_regime(system: HybridSystem, omega: float, settings: Settings) -> Regime:
-    """Exponents by every method at one frequency, with the orbit to look at.
+    """Exponents by every method at one frequency, with an arc and a section to plot.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def study_regime(system: HybridSystem, omega: float, settings: Settings) -> Regi
     omega
         Frequency of the drive, rad/s.
     settings
-        How long and how accurately.
+        Lengths of the runs, and solver.
     """
     parameters, solver = {"omega": omega}, settings.solver
     spectra = tuple(
@@ -136,7 +136,7 @@ def study_regime(system: HybridSystem, omega: float, settings: Settings) -> Regi
         solver=settings.two_orbit_solver,
         progress=settings.progress,
     )
-    # Impacts crowd around phase zero, where they would tear the section.
+    # Impacts accumulate around phase zero, where they would make the section discontinuous.
     period = 2 * np.pi / omega
     half = simulate(
         system, spectra[0].x, (0.0, period / 2), mode=spectra[0].mode, parameters=parameters, solver=solver

@@ -1,4 +1,4 @@
-"""Exponents when tangent vectors are carried carelessly, and what the paper's figures may owe to it."""
+"""Exponents from tangent vectors outside the error control, and explanations of the paper's figures."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ TOLERANCES = tuple(10.0**-digits for digits in range(4, 11))
 LOOSE = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 TRAP_OMEGA = 7.40
 
-# So small that no absolute tolerance sees it, and powers of ten away from the smallest numbers there are.
+# Far below every absolute tolerance, and far above the smallest numbers of double precision.
 UNSEEN = 1e-30
-# Few enough that the directions stay apart between two orthonormalisations.
+# Periods between two orthonormalisations, few enough that the directions stay apart.
 PERIODS_AT_ONCE = 10
-# Most periods of an exponent that need not have more than four digits, and of one whose mean converges fast.
+# Largest numbers of periods: for an exponent to four digits, and for regular motion, which converges fast.
 ENOUGH = 2000
 ENOUGH_OF_REGULAR_MOTION = 500
 
@@ -31,13 +31,13 @@ ENOUGH_OF_REGULAR_MOTION = 500
 def with_tangent(system: HybridSystem) -> HybridSystem:
     r"""Vibro-impact system with one tangent vector as a state: ``u1, u2, w1, w2`` before ``x1, x2, v1, v2``.
 
-    The vector obeys :math:`\dot u = A u` with the Jacobian as the paper writes it, :math:`A`, where the
-    parameter ``slip = 1`` leaves out the :math:`\chi` that :math:`a_{34} = 2 \xi_2 \omega_2 \chi` is
-    printed without. Saltation matrices are the identity, so nothing happens to it at a jump.
+    The vector obeys :math:`\dot u = A u` with the Jacobian :math:`A` of the paper. The paper prints
+    :math:`a_{34} = 2 \xi_2 \omega_2 \chi` without the factor :math:`\chi`; the parameter ``slip = 1`` omits
+    it. Saltation matrices are the identity, so a jump does not change the vector.
 
-    From ``u = 0`` this is a way to the exponents of the wrong Jacobian: displacements of ``u`` alone follow
-    it, stay among themselves, and their growth is what ``lyapunov_spectrum`` with ``k = 4`` measures, their
-    error controlled.
+    With ``u = 0`` this gives the exponents of the wrong Jacobian under error control: displacements of ``u``
+    alone follow that Jacobian and do not affect the state. ``lyapunov_spectrum`` with ``k = 4`` measures
+    their growth.
     """
     fields = {mode.name: mode.field for mode in system.modes}
     return HybridSystem(
@@ -69,7 +69,7 @@ def _with_variation(field: Callable[..., Any], stiffness: Callable[..., Any]) ->
 
 
 def _contact_stiffness(x: Any, p: Any) -> Any:
-    """Derivative of the Hertz force, kept off the zero where it has no derivative of its own."""
+    """Derivative of the Hertz force, with its argument kept above zero, where the square root is singular."""
     return 1.5 * p.K * np.sqrt(np.maximum(x.x1 - x.x2, 1e-20))
 
 
@@ -94,10 +94,10 @@ class Trap:
 
 
 def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
-    """The trap: what each tolerance gives with and without error control of the tangents, and the truth.
+    """Exponents at each tolerance with and without error control of the tangents, and the exact values.
 
-    Without, steps that follow the state alone need not be short enough for the tangents. It is a trap of
-    Runge-Kutta methods, so one of these it is.
+    Without error control, steps chosen for the state alone need not be short enough for the tangents. This
+    is a fault of Runge-Kutta methods, so the study uses DOP853 in place of Taylor.
     """
     x0, parameters = STARTS[0].x0, {"omega": TRAP_OMEGA}
     method = DOP853 if isinstance(settings.solver, Taylor) else type(settings.solver)
@@ -113,10 +113,12 @@ def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
     return Trap(truth, np.array(TOLERANCES), np.array(inside), np.array(outside))
 
 
-def _uncontrolled_exponents(extended: HybridSystem, omega: float, solver: Solver, periods: int) -> np.ndarray:
-    """Exponents ``(4,)`` by QR of tangent vectors that the error control does not see, from start I.
+def _uncontrolled_exponents(
+    extended: HybridSystem, omega: float, solver: Solver, periods: int
+) -> np.ndarray:
+    """Exponents ``(4,)`` from start I, by QR of tangent vectors outside the error control.
 
-    One column at a time: the steps follow the state alone, so they are the same for all.
+    The columns are computed one at a time. The steps follow the state alone, so all columns have the same.
     """
     span = PERIODS_AT_ONCE * 2 * np.pi / omega
     bursts = max(periods // PERIODS_AT_ONCE, 1)
@@ -138,13 +140,13 @@ def _uncontrolled_exponents(extended: HybridSystem, omega: float, solver: Solver
         x, mode = arc.x[-1, 4:], str(arc.mode[-1])
         vectors, r = np.linalg.qr(np.column_stack(columns))
         growths[burst] = np.log(np.abs(np.diag(r))) / span
-    # The first fifth is the turning of the vectors into their directions.
+    # The first fifth is discarded: the vectors still turn towards their directions.
     return growths[bursts // 5 :].mean(axis=0)
 
 
 @attrs.frozen(eq=False)
 class Candidate:
-    """A way the paper's Benettin column might have come about: the ``index``-th exponent of a run."""
+    """A possible origin of the paper's Benettin column: the exponent number ``index`` of a run."""
 
     text: str
     system: HybridSystem
@@ -154,7 +156,7 @@ class Candidate:
     index: int = 0
 
     def exponent(self, omega: float, settings: Settings) -> float:
-        """What the column would then tend to at one frequency."""
+        """The limit of the column at one frequency if this candidate is right."""
         spectrum = lyapunov_spectrum(
             self.system,
             self.x0,
@@ -177,14 +179,14 @@ class Explanation:
 
     @property
     def misfit(self) -> float:
-        """Largest distance from the paper's two figures in doubt; nan unless both were computed."""
+        """Largest distance from the paper's two doubtful figures; nan unless both were computed."""
         if not DOUBTFUL.keys() <= self.exponents.keys():
             return float("nan")
         return max(abs(self.exponents[omega] - value) for omega, value in DOUBTFUL.items())
 
 
 def candidates(system: HybridSystem, solver: Solver) -> list[Candidate]:
-    """The exponent as it is, then with each of the faults that might explain the paper's."""
+    """The true exponent first, then each fault that might explain the paper's figures."""
     first, other = STARTS[0].x0, STARTS[2].x0
     loose = [
         Candidate(
@@ -206,7 +208,7 @@ def candidates(system: HybridSystem, solver: Solver) -> list[Candidate]:
 
 
 def explanations(system: HybridSystem, omegas: Sequence[float], settings: Settings) -> list[Explanation]:
-    """What each candidate gives at the frequencies."""
+    """The exponents of each candidate at the frequencies."""
     return [
         Explanation(candidate.text, {omega: candidate.exponent(omega, settings) for omega in omegas})
         for candidate in candidates(system, settings.solver)

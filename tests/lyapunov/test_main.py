@@ -1,4 +1,4 @@
-"""The study from its command line, short."""
+"""A short run of the study from its command line."""
 
 import csv
 
