@@ -1,4 +1,4 @@
-"""How long a chart takes, and how well threads share it: ``python -m benchmarks.chart_time --rows 1000``."""
+"""Time of a chart and efficiency of its threads: ``python -m benchmarks.chart_time --rows 1000``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOLVER = Taylor(rtol=1e-6, atol=1e-8)
 
 
 def measured(rows: int, threads: int, **options: object) -> tuple[float, float]:
-    """Seconds on the clock and of processors."""
+    """Wall-clock time and processor time in seconds."""
     over = {"omega": np.linspace(7.0, 8.0, rows)}
     work = partial(chart, models.vibroimpact(), over, START, solver=SOLVER, threads=threads)
     clock, processor = time.perf_counter(), time.process_time()
@@ -44,7 +44,7 @@ def main() -> None:
         for threads in arguments.threads:
             clock, processor = measured(count, threads, **options)
             alone = alone or clock
-            # A row of one interval is all Python: what threads cannot share.
+            # A row of one interval is almost all Python, which threads cannot run in parallel.
             _, python = measured(count, 1, intervals=1, transient=1, **options)
             rows.append(
                 [
@@ -56,7 +56,7 @@ def main() -> None:
                     f"{100 * alone * arguments.threads[0] / clock / threads:.0f} %",
                 ]
             )
-    table(["start", "threads", "time", "processor a row", "Python's share", "efficiency"], rows)
+    table(["start", "threads", "time", "processor time per row", "Python's share", "efficiency"], rows)
 
 
 if __name__ == "__main__":

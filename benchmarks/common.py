@@ -1,4 +1,4 @@
-"""What the measurements share: where and when they were made, tables, peak memory, fresh processes."""
+"""Helpers of the benchmarks: machine and date, tables, times, fresh processes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def least_time(work: Callable[[], object], repeats: int = 7) -> float:
-    """Least of several processor times in seconds, so that what else runs on the machine counts little."""
+    """Least of several processor times in seconds, to reduce the effect of other load on the machine."""
     times = []
     for _ in range(repeats):
         start = time.process_time()
@@ -55,7 +55,7 @@ def least_time(work: Callable[[], object], repeats: int = 7) -> float:
 
 
 class Process(NamedTuple):
-    """Seconds on the clock and on the processor, and what was written to standard output and error."""
+    """Wall-clock and processor time in seconds, and the text on standard output and standard error."""
 
     wall: float
     processor: float
@@ -80,5 +80,5 @@ def fresh_process(code: str, environment: Mapping[str, str] | None = None) -> Pr
 
 
 def fastest_process(code: str, environment: Mapping[str, str] | None = None, repeats: int = 5) -> Process:
-    """The one of several runs that took the least time on the clock."""
+    """The run with the least wall-clock time."""
     return min(fresh_process(code, environment) for _ in range(repeats))

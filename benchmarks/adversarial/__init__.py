@@ -1,1 +1,1 @@
-"""Random guards and random instants against exact answers: what is missed, invented or doubled."""
+"""Random guards and random instants compared with exact answers: events missed, invented or doubled."""

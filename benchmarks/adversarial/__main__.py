@@ -30,7 +30,7 @@ def chosen(arguments: argparse.Namespace, count: int) -> list[int]:
 
 
 def guards(arguments: argparse.Namespace) -> Tally:
-    """Run random guards; returns what came."""
+    """Run random guards; return the tally."""
     seed = arguments.seed
     # A structure has two guards on average.
     samples = max(1, arguments.guards // (2 * arguments.structures))
@@ -60,7 +60,7 @@ def guards(arguments: argparse.Namespace) -> Tally:
 
 
 def systems(arguments: argparse.Namespace) -> InstantTally:
-    """Run random instants; returns what came."""
+    """Run random instants; return the tally."""
     seed = arguments.seed
     cases = max(1, arguments.systems // arguments.instants)
 
@@ -88,7 +88,7 @@ def systems(arguments: argparse.Namespace) -> InstantTally:
 
 
 def warm_up() -> None:
-    """Load the kernels once, for the processes that follow."""
+    """Load the kernels once, for all processes started later."""
     system = HybridSystem(
         state=("q",),
         modes=[Mode("run", lambda t, x, p: (-np.sin(x.q),))],
@@ -109,9 +109,9 @@ def main() -> None:
     parser.add_argument("--failures", type=int, default=0, help="cases to print per kind, guard and method")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--picture", type=Path, help="where to draw what the guards show")
+    parser.add_argument("--picture", type=Path, help="file for the picture of the guards")
     arguments = parser.parse_args()
-    heading("Random guards and random instants: what is missed, invented or doubled?")
+    heading("Random guards and random instants: events missed, invented or doubled.")
     began = time.perf_counter()
     warm_up()
     if arguments.guards:
@@ -121,7 +121,7 @@ def main() -> None:
         table(*error_rows(tally))
         table(*family_rows(tally, arguments.methods[0]))
         seconds = {name: f"{value:.0f} s" for name, value in sorted(tally.seconds.items())}
-        print(f"Seconds of all processes: {seconds}; runs whose truth is in doubt: {tally.doubts}\n")
+        print(f"Seconds of all processes: {seconds}; runs with a doubtful exact answer: {tally.doubts}\n")
         if arguments.picture:
             picture(tally, arguments.picture)
             print(f"Picture: {arguments.picture}\n")

@@ -1,4 +1,4 @@
-"""Events found against the changes of sign there are: missed, invented, doubled, mistimed, off zero."""
+"""Compares found events with the true changes of sign: missed, invented, doubled, mistimed, off zero."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from benchmarks.adversarial.interval import Enclosure
 from benchmarks.adversarial.truth import Composed, Roots
 
 EPS = np.finfo(float).eps
-# An event belongs to a change of sign no further away than this, and than about half the way to the next.
+# An event belongs to a change of sign if closer than this, and than this part of the gap to the next change.
 FARTHEST, PART = 0.02, 0.45
-# The motion of a method is known to so many times its largest error seen, and to so many roundings.
+# Assumed error of a method's motion: multiples of the largest error seen, and of rounding.
 ERRORS, ROUNDINGS = 10.0, 64.0
-# A guard is zero at an event if it changes sign within so many roundings of state and time.
+# A guard is zero at an event if it changes sign within this many roundings of state and time.
 ZERO = 64
-# Points at which a bulge between two changes of sign is looked at.
+# Points at which the guard is evaluated between two changes of sign.
 POINTS = 33
 
 
@@ -32,7 +32,7 @@ class Found(NamedTuple):
     last: np.ndarray
     done: np.ndarray
     ran: np.ndarray
-    # Every event seen of the run, of other guards too: where the motion can be compared.
+    # All events of the run, also of other guards: points at which the motion can be compared.
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
     @classmethod
@@ -55,7 +55,7 @@ class Found(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Counts over the runs of a guard, and per run ``(N,)`` what went wrong."""
+    """Counts over the runs of a guard, and the errors of each run ``(N,)``."""
 
     runs: int
     crossings: int
@@ -69,7 +69,7 @@ class Outcome(NamedTuple):
     sharpness: np.ndarray
     # Crossings, missed, invented and doubled of each run.
     per_run: np.ndarray
-    # Errors of times in units of what rounding may do.
+    # Errors of event times in units of the rounding error.
     errors: np.ndarray
     examples: list[tuple[int, str, float]]
 
@@ -90,7 +90,7 @@ def compare(composed: Composed, roots: Roots, found: Found, direction: int, shar
         there = slice(root_bounds[k], root_bounds[k + 1])
         times, directions = roots.time[there], roots.direction[there]
         wanted = (directions == direction) | (direction == 0)
-        # What comes at the very end, or after a run has stopped, is not asked for.
+        # Changes of sign at the very end, or after a run has stopped, are not required.
         wanted &= times < found.reached[k] * (1 - 1e-9)
         true = times[wanted]
         events = time[bounds[k] : bounds[k + 1]]
@@ -132,7 +132,7 @@ def compare(composed: Composed, roots: Roots, found: Found, direction: int, shar
 
 
 def matched(true: np.ndarray, events: np.ndarray) -> tuple[list[list[float]], list[float]]:
-    """Events of each change of sign, and those of none."""
+    """Events of each change of sign, and events that belong to no change of sign."""
     hits: list[list[float]] = [[] for _ in true]
     rest = []
     gaps = np.diff(true, prepend=-math.inf, append=math.inf)
@@ -146,7 +146,7 @@ def matched(true: np.ndarray, events: np.ndarray) -> tuple[list[list[float]], li
 
 
 def distances(composed: Composed, found: Found) -> dict[str, np.ndarray]:
-    """How far the states of each run may be from the motion, ``(N,)`` each, from the errors seen."""
+    """Bound ``(N,)`` per state on the distance of each run from the motion, from the errors seen."""
     samples = len(found.last)
     everywhere = np.arange(samples)
     runs = [everywhere[found.ran], *(row[0] for row in found.seen)]
@@ -172,7 +172,7 @@ def amplitude(composed: Composed, name: str, samples: int, end: float) -> np.nda
 
 
 class Cases:
-    """Which differences the errors of the motion can explain."""
+    """Decides which differences the errors of the motion can explain."""
 
     def __init__(
         self, composed: Composed, roots: Roots, away: dict[str, np.ndarray], reached: np.ndarray
@@ -181,13 +181,13 @@ class Cases:
         self.bounds = np.searchsorted(roots.run, np.arange(len(reached) + 1))
 
     def shallow(self, k: int, place: int) -> bool:
-        """Whether the bulge on either side of a change of sign is hidden by the error of the motion."""
+        """Whether the guard is within the error of the motion on one side of a change of sign."""
         times = self.roots.time[self.bounds[k] : self.bounds[k + 1]]
         edges = np.concatenate([[0.0], times, [self.reached[k]]])
         return any(self._hidden(k, np.linspace(edges[i], edges[i + 1], POINTS)) for i in (place, place + 1))
 
     def touches(self, k: int, event: float) -> bool:
-        """Whether the guard is zero within the error of the motion, and no change of sign explains it."""
+        """Whether the guard is zero at the event within the error of the motion."""
         times = self.roots.time[self.bounds[k] : self.bounds[k + 1]]
         if len(times):
             nearest = int(np.argmin(np.abs(times - event)))
@@ -204,7 +204,7 @@ class Cases:
 def mistimed(
     composed: Composed, run: np.ndarray, time: np.ndarray, away: dict[str, np.ndarray]
 ) -> np.ndarray:
-    """Events at whose time the guard on the true motion is not zero, whatever the error of the motion."""
+    """Events at whose time the guard is not zero for any state within the error of the true motion."""
     if not len(run):
         return np.zeros(0, dtype=bool)
     near = composed.near(run, time, 4, {name: values[run] for name, values in away.items()})
@@ -212,7 +212,7 @@ def mistimed(
 
 
 def off_zero(composed: Composed, run: np.ndarray, time: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Events at whose own state the guard is not zero to rounding."""
+    """Events at whose reported state the guard is not zero to rounding."""
     if not len(run):
         return np.zeros(0, dtype=bool)
     samples = int(run.max()) + 1

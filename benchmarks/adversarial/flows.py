@@ -1,4 +1,4 @@
-"""Flows whose motion is known in closed form, as text that runs on numbers, on enclosures and in models."""
+"""Flows with a closed-form motion, as text that runs on numbers, on enclosures and in models."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-# How a parameter is drawn: between two numbers, evenly or evenly in the logarithm.
+# A parameter is drawn between two numbers, uniformly or uniformly in the logarithm.
 EVENLY, LOGARITHMICALLY = "evenly", "logarithmically"
 Range = tuple[str, float, float]
 
 
 class Flow(NamedTuple):
-    """A field, its motion from time zero, and what guards may be made of.
+    """A field, its motion from time zero, and the signals that guards are made of.
 
-    ``field`` and ``motion`` have one text per state; ``signals`` are combinations of the order of one.
+    ``field`` and ``motion`` have one text per state; ``signals`` are expressions with values of order one.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Random guards: compositions of functions whose sharpness, thresholds and places are parameters."""
+"""Random guards: compositions of functions with sharpness, thresholds and places as parameters."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ PLACE = evenly(-1.0, 1.0)
 LEVEL = evenly(0.1, 0.9)
 SIGNED = evenly(-0.9, 0.9)
 SHARP = logarithmically(1.0, 1e4)
-# What goes into an exponential must not overflow.
+# Sharpness for which an exponential does not overflow.
 GENTLE = logarithmically(1.0, 150.0)
-# Two signals U and V; each parameter of a family gets a name of its own in the guard.
+# U and V are two signals; each parameter of a family gets a unique name in the guard.
 FAMILIES: dict[str, tuple[str, dict[str, Range]]] = {
     "affine": ("U - {a}", {"a": PLACE}),
     "tanh": ("np.tanh({k}*(U - {a})) - {c}", {"k": SHARP, "a": PLACE, "c": SIGNED}),
@@ -52,7 +52,7 @@ FAMILIES: dict[str, tuple[str, dict[str, Range]]] = {
     "quotient": ("(U - {a})/(0.01 + {k}*V*V)", {"k": SHARP, "a": PLACE}),
     "quotient, spike": ("1/(1 + {k}*V*V) - {c}*(1 + 0.3*U)", {"k": SHARP, "c": evenly(0.1, 0.6)}),
 }
-# What a signal may go through before: values stay of the order of one.
+# Functions that may be applied to a signal first; values stay of order one.
 INNER: tuple[tuple[str, dict[str, Range]], ...] = (
     ("np.sin({m}*U)", {"m": evenly(0.5, 4.0)}),
     ("np.tanh({m}*U)", {"m": evenly(0.5, 5.0)}),
@@ -69,19 +69,19 @@ INNER: tuple[tuple[str, dict[str, Range]], ...] = (
     ("np.cbrt(U - {m})", {"m": PLACE}),
     ("(U + {m}*V*V)", {"m": evenly(-0.5, 0.5)}),
 )
-# Two guards in one.
+# Combinations of two guards into one.
 PAIRS = ("({A})*({B})", "np.maximum({A}, {B})", "np.minimum({A}, {B})", "np.where(V > 0.1, {A}, {B})")
 
 
 class RandomGuard(NamedTuple):
-    """A guard as text, the parameters in it, its family, and which of them say how sharp it is."""
+    """A guard as text, with its parameters, its family, and the names of the sharpness parameters."""
 
     text: str
     parameters: dict[str, Range]
     family: str
     sharpness: tuple[str, ...]
     direction: int
-    # Whether the transition changes the state: it counts, and the run goes on from the same place.
+    # Whether the transition has a reset, which increments a counter and keeps the other states.
     counts: bool
 
 
@@ -101,7 +101,7 @@ class _Namer:
 
 
 def random_guard(rng: np.random.Generator, flow: Flow, prefix: str, family: str) -> RandomGuard:
-    """A guard of a family on a flow: its signals are composed at random."""
+    """A guard of a family on a flow, with randomly composed signals."""
     namer = _Namer(prefix)
 
     def signal() -> str:

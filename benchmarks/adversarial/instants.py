@@ -1,7 +1,7 @@
-"""Random systems in which many things happen at one instant, and what the library makes of them.
+"""Random systems with many transitions at one instant, compared with exact rules.
 
 A structure fixes fields, guards, directions, targets and the form of resets; thresholds, reset values and
-starts are drawn. All numbers are small multiples of a half, so that every state and time is exact.
+starts are drawn. All numbers are dyadic, so that every state and time is exact.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition,
 
 STATES = ("y", "z", "w", "v", "n", "m")
 END = 6.3
-# Share of the draws without two events at one instant that is kept.
+# Share of draws without simultaneous events that is kept.
 APART_SHARE = 0.1
-# Jumps at one instant that are taken for without end; the library allows more.
+# Number of jumps at one instant that counts as endless; the library allows more.
 MOST_AT_ONCE = 300
-# What is within this of the exact numbers is right.
+# Tolerance for times and states.
 CLOSE = 1e-9
-# Draws per case: most are thinned out.
+# Most draws per case; many draws are discarded.
 MOST_DRAWS = 20
 SOLVERS: dict[str, Any] = {"Taylor": Taylor(), "DOP853": DOP853()}
-# Sums that guards are made of.
+# Forms of guards, before a threshold is subtracted.
 FORMS = (
     "x.y",
     "x.z",
@@ -45,12 +45,12 @@ FORMS = (
 SPEEDS = (1.0, 1.0, 1.0, 1.0, -1.0, 2.0, -2.0, 0.5, 0.0)
 VALUES = np.arange(-4, 5) / 2
 LEVELS = np.arange(-2, 5) / 2
-# Thresholds of conditions, which no state of the lattice meets.
+# Thresholds of conditions, which no state equals exactly.
 BETWEEN = np.arange(-3, 4) + 0.328125
 
 
 class Form(NamedTuple):
-    """A transition as text: what the library and the exact rules both read."""
+    """A transition as text, the input of both the library and the exact rules."""
 
     source: int
     target: int | None
@@ -61,7 +61,7 @@ class Form(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """A structure, as text and as the library's system, with how its parameters are drawn."""
+    """A structure as text and as a library system, with the values its parameters are drawn from."""
 
     fields: tuple[tuple[str, ...], ...]
     edges: tuple[Form, ...]
@@ -85,14 +85,14 @@ def instant(seed: int, index: int) -> Instant:
     surfaces = [
         f"{form} - {named('c', LEVELS)}" for form in rng.choice(FORMS, int(rng.integers(2, 5)), replace=False)
     ]
-    # A surface is watched both ways by one transition, or one way by each.
+    # A surface is used with direction 0 by all its transitions, or with a sign by all of them.
     both = {surface for surface in surfaces if rng.random() < 0.15}
     edges = []
     for source in range(modes):
         for _ in range(int(rng.integers(1, 4))):
             edges.append(_edge(rng, named, surfaces, both, source, modes))
     for mode in range(1, modes):
-        # Every mode can be reached.
+        # Make sure that every mode can be reached.
         if not any(edge.source == mode - 1 and edge.target == mode for edge in edges):
             edge = _edge(rng, named, surfaces, both, mode - 1, modes)
             edges.append(edge._replace(target=mode))
@@ -111,7 +111,7 @@ def _edge(
     modes: int,
 ) -> Form:
     surface = str(rng.choice(surfaces))
-    # Most forms grow with time.
+    # +1 is likelier, because most forms grow with time.
     direction = 0 if surface in both else int(rng.choice((-1, 1, 1)))
     if direction and rng.random() < 0.1:
         surface, direction = f"{rng.choice((-1.0, 2.0, -0.5))}*({surface})", direction
@@ -130,7 +130,7 @@ def _edge(
 
 
 def _part(rng: np.random.Generator, named: Callable[[str, np.ndarray], str], name: str) -> str:
-    """One state of a reset."""
+    """The expression for one state in a reset."""
     draw = rng.random()
     if draw < 0.6:
         return f"x.{name}"
@@ -177,7 +177,7 @@ def _system(
 
 
 def affine(text: str, values: dict[str, Fraction]) -> Affine:
-    """The exact function that a text is, found from its values at zero and at the unit vectors."""
+    """The exact affine function of a text, from its values at zero and at the unit vectors."""
     code, p = _function(text), SimpleNamespace(**values)
 
     def at(t: int, place: int | None) -> Fraction:
@@ -208,7 +208,7 @@ def exact_rules(made: Instant, values: dict[str, Fraction]) -> Rules:
 
 
 class Case(NamedTuple):
-    """One draw: parameters, start and mode, and what is true."""
+    """One draw: parameters, start, mode and the exact run."""
 
     parameters: dict[str, float]
     x0: list[float]
@@ -217,7 +217,7 @@ class Case(NamedTuple):
 
 
 def case(made: Instant, seed: int, index: int, number: int) -> Case | None:
-    """A draw on which the rules leave nothing open, or None; few without two events at once are kept."""
+    """A draw that the rules decide, or None; only few draws without simultaneous events are kept."""
     rng = np.random.default_rng([seed, index, 2, number])
     parameters = {name: float(rng.choice(values)) for name, values in made.parameters.items()}
     x0 = [float(value) for value in rng.choice(VALUES, len(STATES))]
@@ -236,12 +236,12 @@ def case(made: Instant, seed: int, index: int, number: int) -> Case | None:
     return Case(parameters, x0, mode, truth)
 
 
-# An order that matters is said; the run goes on in the listed one.
+# With AMBIGUOUS_ORDER the library reports that the order matters and continues in the listed order.
 ENDINGS = {"SUCCESS": "end", "AMBIGUOUS_ORDER": "end", "STUCK": "stuck", "TERMINAL": "terminal"}
 
 
 def difference(made: Instant, drawn: Case, solver: Any) -> tuple[str, str]:
-    """How the library's run differs from the truth, or two empty texts."""
+    """Kind and description of the difference between the library's run and the exact run, or empty texts."""
     arc = simulate(
         made.system, drawn.x0, (0.0, END), mode=f"m{drawn.mode}", parameters=drawn.parameters, solver=solver
     )
@@ -251,7 +251,7 @@ def difference(made: Instant, drawn: Case, solver: Any) -> tuple[str, str]:
     expected = [i for _, i in truth.fired]
     times = [float(t) for t, _ in truth.fired]
     if truth.ending == ending == "stuck":
-        # The last of many rounds may be cut anywhere.
+        # An endless sequence may be cut at any jump.
         shortest = min(len(fired), len(expected))
         if shortest >= 100 and fired[:shortest] == expected[:shortest]:
             return "", ""
@@ -292,12 +292,12 @@ def text_of(made: Instant, drawn: Case) -> str:
 
 
 class Compared(NamedTuple):
-    """What came of one method on one structure: cases, and those that differ with the kind and both sides."""
+    """Result of one method on one structure; a difference is a draw, a kind and a description."""
 
     index: int
     method: str
     cases: int
-    # Draws that the rules leave open, or without two events at one instant.
+    # Draws discarded because the rules leave them open or because they have no simultaneous events.
     left: int
     firings: int
     differences: list[tuple[int, str, str]]
@@ -305,7 +305,7 @@ class Compared(NamedTuple):
 
 
 def drawn_cases(made: Instant, seed: int, index: int, cases: int) -> Iterator[tuple[int, Case | None]]:
-    """Numbered draws until there are enough cases."""
+    """Yield numbered draws until there are enough cases."""
     done = number = 0
     while done < cases and number < MOST_DRAWS * cases:
         drawn = case(made, seed, index, number)
@@ -322,13 +322,13 @@ def compared(
     begin: Callable[[str, int], None] = lambda method, run: None,
     left_out: Mapping[str, set[int]] = MappingProxyType({}),
 ) -> Iterator[Compared]:
-    """One part per method; ``begin`` is told of each run, and some may be left out."""
+    """Yield one part per method; call ``begin`` before each run, and skip the runs in ``left_out``."""
     made = instant(seed, index)
     draws = list(drawn_cases(made, seed, index, cases))
     good = {number: drawn for number, drawn in draws if drawn is not None}
     firings = sum(len(drawn.truth.fired) for drawn in good.values() if drawn.truth.ending != "stuck")
     for method in methods:
-        # Compiled before a run is watched.
+        # Compile before runs are timed.
         simulate(made.system, [0.0] * len(STATES), (0.0, 0.0), mode="m0", solver=SOLVERS[method])
         began, differences = time.perf_counter(), []
         for number, drawn in good.items():

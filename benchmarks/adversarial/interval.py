@@ -1,7 +1,7 @@
-"""Interval arithmetic on arrays, with the derivative in time carried along.
+"""Interval arithmetic on arrays, including the derivative in time.
 
-Every bound is rounded outwards, so an enclosure holds all values of its expression. The text of a guard runs
-on enclosures as it runs on numbers: ``FUNCTIONS`` takes the place of NumPy.
+Every bound is rounded outwards, so an enclosure contains all values of its expression. The text of a guard
+runs on enclosures as on numbers, with ``FUNCTIONS`` in place of NumPy.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-# Room for sine and cosine beside an extremum: in doubt the extremum is taken to lie inside.
+# An extremum of sine or cosine within this distance of an interval counts as inside.
 SLACK = 1e-13
 
 
@@ -130,7 +130,7 @@ def enclosure(a: Any) -> Enclosure:
 
 
 def product(a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Any, Any]:
-    # Nothing times an unbounded number is nothing: the bound stands for finite numbers without a limit.
+    # Zero times infinity is zero here: an infinite bound stands for finite but unbounded numbers.
     with np.errstate(invalid="ignore", over="ignore"):
         ends = [np.where((x == 0) | (y == 0), 0.0, np.multiply(x, y)) for x in a for y in b]
     low = np.minimum(np.minimum(ends[0], ends[1]), np.minimum(ends[2], ends[3]))
@@ -139,7 +139,7 @@ def product(a: tuple[Any, Any], b: tuple[Any, Any]) -> tuple[Any, Any]:
 
 
 def chained(a: Enclosure, value: tuple[Any, Any], derivative: tuple[Any, Any]) -> Enclosure:
-    """An image whose derivative lies between two bounds; library functions are right to two roundings."""
+    """An image whose derivative lies between two bounds; allows for errors of NumPy's functions."""
     low = down(np.minimum(*derivative), 3)
     high = up(np.maximum(*derivative), 3)
     return Enclosure(down(value[0], 3), up(value[1], 3), *product((low, high), a.slope))
@@ -195,7 +195,7 @@ def cos(a: Any) -> Enclosure:
 
 
 def even(a: Enclosure) -> tuple[Any, Any]:
-    """Bounds of the absolute value: where an even function is least and most."""
+    """Bounds of the absolute value, at which even functions take their extremes."""
     inside = (a.low <= 0) & (a.high >= 0)
     nearer = np.where(inside, 0.0, np.minimum(np.abs(a.low), np.abs(a.high)))
     return nearer, np.maximum(np.abs(a.low), np.abs(a.high))
@@ -232,7 +232,7 @@ def log1p(a: Any) -> Enclosure:
 
 def sqrt(a: Any) -> Enclosure:
     a = enclosure(a)
-    # What is under a root is not negative: less than zero is rounding.
+    # The argument of a root is never negative; a negative bound comes from rounding.
     a = Enclosure(np.maximum(a.low, 0.0), np.maximum(a.high, 0.0), *a.slope)
     with np.errstate(divide="ignore"):
         root = a._monotone(np.sqrt, lambda b: 0.5 / np.sqrt(b))

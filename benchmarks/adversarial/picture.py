@@ -1,4 +1,4 @@
-"""Shares of events missed, invented and doubled over the sharpness of the guards, by method."""
+"""Picture: shares of events missed, invented and doubled over the sharpness of the guards, per method."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PANELS = ("missed", "invented", "doubled")
 
 
 def picture(tally: Tally, path: Path) -> None:
-    """Three panels: one point per bin of sharpness and method, on an axis that shows zero."""
+    """Draw three panels with one point per bin of sharpness and method, on an axis that includes zero."""
     middles = np.sqrt(EDGES[1:] * EDGES[:-1])
     with plt.rc_context({"font.size": 9, "axes.linewidth": 0.7}):
         figure, panels = plt.subplots(1, 3, figsize=(11.4, 3.4), sharey=True)

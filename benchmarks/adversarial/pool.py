@@ -1,4 +1,4 @@
-"""Structures on several processes; a run that does not end is ended, counted and left out."""
+"""Runs structures on several processes; a run that does not end is killed, counted and skipped."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-# Seconds after which a run is taken never to end; runs take milliseconds.
+# Seconds after which a run counts as hung; normal runs take milliseconds.
 LIMIT = 20.0
-# After so many such runs the rest of a structure's is left out.
+# After this many hung runs the method's remaining runs of the structure are skipped.
 MOST_HUNG = 3
 POLL = 0.05
-# Children have the kernels that their parent has loaded.
+# Forked children share the kernels that the parent has loaded.
 CONTEXT = multiprocessing.get_context("fork")
 Begin = Callable[[str, int], None]
-# From a structure and methods to one part per method.
+# Maps a structure and methods to one part per method.
 Work = Callable[[int, Iterable[str], Begin, Mapping[str, set[int]]], Iterator[Any]]
 
 
 class Hung(NamedTuple):
-    """A run that did not end; ``run`` is -1 for the rest of a method's runs, given up."""
+    """A run that did not end; ``run`` is -1 if the method's remaining runs are skipped."""
 
     index: int
     method: str
@@ -28,7 +28,7 @@ class Hung(NamedTuple):
 
 
 class _Job:
-    """One structure in a process of its own."""
+    """One structure in its own process."""
 
     def __init__(self, work: Work, index: int, methods: tuple[str, ...]) -> None:
         self.work, self.index, self.names = work, index, methods
@@ -38,7 +38,7 @@ class _Job:
 
     def launch(self) -> None:
         self.reader, writer = CONTEXT.Pipe(duplex=False)
-        # Place of the method, run, and when the run began; zero where none is under way.
+        # Index of the method, run, and start time of the run, which is zero if no run is active.
         self.beat = CONTEXT.Array("d", 3, lock=False)
         self.process = CONTEXT.Process(target=self._inside, args=(writer,), daemon=True)
         self.process.start()
@@ -89,7 +89,7 @@ class _Job:
 def parts(
     work: Work, indices: list[int], methods: tuple[str, ...], processes: int, title: str
 ) -> Iterator[Any]:
-    """What comes of some structures, as it comes: one part per method, and what hung."""
+    """Yield the results of structures as they arrive: one part per method, and one `Hung` per hung run."""
     waiting, active, done, began = list(indices), [], 0, time.perf_counter()
     while waiting or active:
         while waiting and len(active) < processes:
@@ -97,7 +97,7 @@ def parts(
         for job in list(active):
             yield from job.news()
             if job.done:
-                # What was sent in between.
+                # Parts sent since the last poll.
                 yield from job.news()
                 active.remove(job)
                 done += 1

@@ -1,7 +1,7 @@
-"""What fires at one instant, in exact arithmetic: slow, plain, and written apart from the library.
+"""The transitions that fire at one instant, in exact arithmetic, implemented independently of the library.
 
-Fields are constant between events, guards and resets are affine, all numbers are fractions. The rules are
-those of ``docs/instant.md``. A case that the rules leave open, or whose times are not dyadic, is `Open`.
+Fields are constant between events, guards and resets are affine, and all numbers are fractions. The rules
+are those of ``docs/instant.md``. `Open` is raised if the rules leave a case open or a time is not dyadic.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 Vector = tuple[Fraction, ...]
 ZERO = Fraction(0)
-# Jumps before the last instant after which a case is given up.
+# A case is discarded after this many jumps before the last instant.
 MOST_JUMPS = 200
 
 
 class Open(Exception):
-    """The rules do not say what happens here, or binary numbers cannot follow."""
+    """The rules do not decide the case, or its times are not exact as binary numbers."""
 
 
 class Affine(NamedTuple):
@@ -33,7 +33,7 @@ class Affine(NamedTuple):
         return sum((a * b for a, b in zip(self.coefficients, velocity, strict=True)), self.rate)
 
     def factor(self, other: Affine) -> Fraction | None:
-        """The number that this function is times another one, if there is one."""
+        """The ratio of this function to another one if the ratio is constant and not zero, else None."""
         mine = (*self.coefficients, self.rate, self.constant)
         its = (*other.coefficients, other.rate, other.constant)
         place = next((i for i, b in enumerate(its) if b), None)
@@ -44,7 +44,7 @@ class Affine(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """A transition; modes are numbers, ``target`` is None if the run ends, ``reset`` is None for none."""
+    """A transition; modes are numbers, ``target`` is None if the run ends."""
 
     source: int
     target: int | None
@@ -75,10 +75,10 @@ class Run(NamedTuple):
 
 
 class Watch:
-    """What is remembered of one guard: on which side the state is taken to be, and whether it is due.
+    """State of one guard: the recorded side of the state, and whether the transition is due.
 
-    ``way`` is the sign that turns the guard's near side into the negative one. With direction 0 the near side
-    is the side on which the state was; ``turned`` says that ``way`` knows of the crossing that has fired.
+    The guard times ``way`` is negative on the near side. With direction 0 the near side is the side on which
+    the state was; ``turned`` is set once ``way`` accounts for the crossing that has fired.
     """
 
     def __init__(self, edge: Edge, way: int) -> None:
@@ -97,7 +97,7 @@ def sign(a: Fraction) -> int:
 
 
 def simulate_exactly(system: Rules, x: Vector, mode: int, end: Fraction, limit: int) -> Run:
-    """Run from time zero; ``limit`` is the number of jumps at one instant that is taken for without end."""
+    """Run from time zero; more than ``limit`` jumps at one instant count as endless."""
     return _Runner(system, x, mode, limit).run(end)
 
 
@@ -115,7 +115,7 @@ class _Runner:
         return {i: edge for i, edge in enumerate(self.system.edges) if edge.source == mode}
 
     def _side(self, edge: Edge) -> int:
-        """Side on which the state is, or to which it moves."""
+        """The side of the state, or the side to which it moves if the guard is zero."""
         side = sign(edge.guard(self.t, self.x)) or sign(edge.guard.speed(self.velocity))
         if not side:
             raise Open("a guard with direction 0 at rest at zero")
@@ -125,7 +125,7 @@ class _Runner:
         return Watch(edge, edge.direction or -self._side(edge))
 
     def _started(self) -> dict[int, Watch]:
-        """Nothing has been crossed yet; who starts on a guard and moves beyond crosses it."""
+        """Watches at the start: a state that starts on a guard and moves beyond it crosses it."""
         watches = {}
         for i, edge in self._edges(self.mode).items():
             watch = self._fresh(edge)
@@ -159,7 +159,7 @@ class _Runner:
         return tuple(a + step * b for a, b in zip(self.x, velocity, strict=True))
 
     def _arrive(self, watch: Watch) -> None:
-        """The flow has brought the state here."""
+        """Update a watch after the flow has moved the state."""
         value, speed = watch.value(self.t, self.x), watch.speed(self.velocity)
         if value == 0 and speed > 0 and not watch.beyond:
             watch.due = watch.beyond = True
@@ -167,7 +167,7 @@ class _Runner:
             watch.beyond = False
 
     def _instant(self) -> str:
-        """Fire what is due, one after the other; returns how the run ended, or nothing."""
+        """Fire the due transitions one after another; return how the run ended, or an empty text."""
         count = 0
         for watch in self.watches.values():
             watch.fired = watch.turned = False
@@ -179,7 +179,7 @@ class _Runner:
                 break
             everything = self._everything()
             if everything in known:
-                # It goes round from here on.
+                # The sequence repeats from here on.
                 rounds = self.fired[known[everything] :]
                 self.fired += rounds * (self.limit // len(rounds) + 1)
                 return "stuck"
@@ -195,7 +195,7 @@ class _Runner:
                 return "terminal"
             self._jump(first, edge)
         for watch in self.watches.values():
-            # What is still refused has been passed.
+            # A guard whose condition still refuses has been passed.
             watch.due = False
             if not watch.edge.direction and watch.beyond:
                 watch.way, watch.beyond = -self._side(watch.edge), False
@@ -234,7 +234,7 @@ class _Runner:
                 self._asked(watch, before[i])
 
     def _own(self, watch: Watch, before: Fraction) -> None:
-        """After its own reset a transition is not due, unless it came from beyond exactly onto its guard."""
+        """After its own reset a transition is not due, unless the reset went from beyond onto the guard."""
         if not watch.edge.direction:
             watch.way, watch.beyond, watch.turned = -self._side(watch.edge), False, True
             return
@@ -244,10 +244,10 @@ class _Runner:
         watch.fired = watch.beyond and not watch.due
 
     def _asked(self, watch: Watch, before: Fraction) -> None:
-        """After the reset of another transition."""
+        """Update a watch after the reset of another transition."""
         value, speed = watch.value(self.t, self.x), watch.speed(self.velocity)
         if watch.edge.marks:
-            # It marks what the flow crosses.
+            # A marker records only crossings by the flow.
             watch.due = watch.due and value == 0 and speed > 0
             watch.beyond = value > 0 or (value == 0 and speed > 0)
             return
@@ -264,7 +264,7 @@ class _Runner:
         watch.fired = watch.fired and not crossed
 
     def _entered(self, old_x: Vector) -> dict[int, Watch]:
-        """Another mode has been entered: a guard that was watched before keeps its side."""
+        """Watches after entering another mode: a guard that was watched before keeps its side."""
         old, watches = self.watches, {}
         for i, edge in self._edges(self.mode).items():
             same = [
@@ -279,7 +279,7 @@ class _Runner:
         return watches
 
     def _new(self, edge: Edge) -> Watch:
-        """A guard not watched before: who lands beyond it must leave, unless the mode lives on both sides."""
+        """A guard not watched before: a state beyond it must leave, unless the mode exists on both sides."""
         watch = self._fresh(edge)
         value, speed = watch.value(self.t, self.x), watch.speed(self.velocity)
         watch.beyond = value > 0 or (value == 0 and speed > 0)
@@ -294,14 +294,14 @@ class _Runner:
         return False
 
     def _kept(self, edge: Edge, same: list[tuple[Watch, int]], old_x: Vector) -> Watch:
-        # A guard that looks the same way knows most.
+        # A guard with the same direction on the same surface takes precedence.
         if edge.direction:
             alike = [watch for watch, turn in same if watch.way * turn == edge.direction]
             watch = Watch(edge, edge.direction)
         else:
             if any(watch.edge.direction for watch, _ in same):
                 raise Open("direction 0 beside another direction")
-            # A crossing that has fired is over: the state was on the other side already.
+            # A crossing that has fired is complete: the state is already on the other side.
             fired = [(watch, turn) for watch, turn in same if watch.fired]
             known, turn = (fired or same)[0]
             watch = Watch(edge, known.way * turn * (-1 if fired and not known.turned else 1))
@@ -314,7 +314,7 @@ class _Runner:
         elif before == 0 and any(other.resting for other, _ in same):
             raise Open("at rest on a guard that was watched the other way")
         else:
-            # It keeps the side that the other one knows; a crossing that nobody watched for is over.
+            # Keep the side that the other watch recorded; an unwatched crossing is complete.
             watch.beyond = before > 0 or (before == 0 and not any(other.beyond for other, _ in same))
         due = watch.due
         self._asked(watch, before)

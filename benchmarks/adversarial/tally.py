@@ -1,4 +1,4 @@
-"""Sums over structures, and the rows of the tables."""
+"""Totals over structures, and the rows of the tables."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from benchmarks.adversarial.pool import Hung
 from benchmarks.adversarial.trial import Part
 
 COUNTS = ("runs", "crossings", "missed", "invented", "doubled", "mistimed", "off_zero", "stopped", "unclear")
-# Edges of the sharpness in the chart; guards without one come before them.
+# Edges of the sharpness bins in the chart; guards without a sharpness are in no bin.
 EDGES = 10.0 ** np.arange(0.0, 4.01, 0.5)
 Table = tuple[Sequence[str], list[list[str]]]
 
 
 class Tally:
-    """All outcomes, by method and family."""
+    """All outcomes by method and family."""
 
     def __init__(self) -> None:
         self.outcomes: dict[str, dict[str, list[Outcome]]] = defaultdict(lambda: defaultdict(list))
@@ -42,7 +42,7 @@ class Tally:
 
 
 class InstantTally:
-    """All comparisons with the exact rules, by method."""
+    """All comparisons with the exact rules by method."""
 
     def __init__(self) -> None:
         self.compared: dict[str, list[Compared]] = defaultdict(list)
@@ -90,7 +90,7 @@ def family_rows(tally: Tally, method: str) -> Table:
 
 
 def error_rows(tally: Tally) -> Table:
-    """Errors of event times in units of what rounding may do to them."""
+    """Errors of event times in units of the rounding error."""
     rows = []
     for method in tally.outcomes:
         errors = np.concatenate([outcome.errors for outcome in tally.of(method)] or [np.zeros(0)])
@@ -100,7 +100,7 @@ def error_rows(tally: Tally) -> Table:
 
 
 def by_sharpness(tally: Tally, method: str) -> np.ndarray:
-    """Shares ``(bins, 3)`` of crossings missed, invented and doubled, nan where there are none."""
+    """Shares ``(bins, 3)`` of crossings missed, invented and doubled; nan for bins without crossings."""
     outcomes = tally.of(method)
     sharpness = np.concatenate([outcome.sharpness for outcome in outcomes])
     numbers = np.concatenate([outcome.per_run for outcome in outcomes])

@@ -1,4 +1,4 @@
-"""One structure: a flow with some guards, many parameter values, every method, beside the truth."""
+"""One structure: a flow with guards and many parameter values, by every method, against the exact answer."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, T
 SOLVERS: dict[str, Any] = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
 SCIPY = "SciPy DOP853"
 METHODS = (*SOLVERS, SCIPY)
-# Slow methods get one run in so many.
+# Slow methods run only every n-th sample.
 ONE_IN = {"RadauIIA": 4, SCIPY: 16}
 SCIPY_OPTIONS: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
-# Guards of one model: alone, and beside others whose events cut the steps.
+# Numbers of guards in a model; the events of other guards cut the steps.
 SIZES = (1, 1, 2, 4)
 MOST_JUMPS = 2000
-# Times at which a draw is looked at before it is taken.
+# Number of times at which a draw is checked for overflow.
 LOOKS = 65
 
 
 class Structure(NamedTuple):
-    """What is compiled once."""
+    """A system that is compiled once, and the parameter values of its runs."""
 
     index: int
     flow: Flow
     guards: tuple[RandomGuard, ...]
     system: HybridSystem
-    # Names and values (N,) of all parameters, those of the motion too.
+    # Names and values (N,) of all parameters, including those of the motion.
     values: dict[str, np.ndarray]
 
 
@@ -57,13 +57,13 @@ def structure(seed: int, index: int, samples: int) -> Structure:
         ranges |= guard.parameters
     values = {name: draw(rng, how, 2 * samples) for name, how in ranges.items()}
     good = np.flatnonzero(bounded(flow, guards, values))[:samples]
-    # Where few are bounded some are taken more than once.
+    # If too few draws are bounded, some are used more than once.
     values = {name: np.resize(column[good], samples) for name, column in values.items()}
     return Structure(index, flow, guards, model(flow, guards, values), values)
 
 
 def bounded(flow: Flow, guards: tuple[RandomGuard, ...], values: dict[str, np.ndarray]) -> np.ndarray:
-    """Draws ``(N,)`` with which no guard overflows on the way."""
+    """Draws ``(N,)`` for which no guard overflows along the motion."""
     runs = np.arange(len(next(iter(values.values()))))
     motion = [Scalar(text) for text in flow.motion]
     fine = np.ones(len(runs), dtype=bool)
@@ -119,7 +119,7 @@ def starts(made: Structure, samples: int) -> np.ndarray:
 def our_runs(
     made: Structure, method: str, samples: int, begin: Callable[[int], None], left_out: set[int]
 ) -> list[Found]:
-    """What the library finds, for each guard; ``begin`` is told of each run."""
+    """Events that the library finds, per guard; calls ``begin`` before each run."""
     x0, n = starts(made, samples), len(made.flow.state)
     filler = [0.0] * (made.system.dimension - n)
     names = list(made.system.parameters)
@@ -146,12 +146,12 @@ def our_runs(
 
 
 def scipy_runs(made: Structure, samples: int) -> list[Found]:
-    """What SciPy's events find on a part of the runs."""
+    """Events that SciPy finds, on a part of the runs."""
     x0, n = starts(made, samples), len(made.flow.state)
     found = [Found.empty(samples, n) for _ in made.guards]
     names = list(made.system.parameters)
     texts = [*made.flow.field, *(guard.text for guard in made.guards)]
-    # x.q and p.k as places in plain arguments: SciPy's user would write numbers too.
+    # Replace x.q and p.k by plain indexing, as a SciPy user would write it.
     for place, name in enumerate(made.flow.state):
         texts = [re.sub(rf"\bx\.{name}\b", f"x[{place}]", text) for text in texts]
     texts = [re.sub(r"\bp\.(\w+)", r"p['\1']", text) for text in texts]
@@ -174,7 +174,7 @@ def scipy_runs(made: Structure, samples: int) -> list[Found]:
             with np.errstate(all="ignore"):
                 run = solve_ivp(field, (0.0, made.flow.end), x0[k], events=events, **SCIPY_OPTIONS)
         except RuntimeError:
-            # Its root finder gave up: nothing comes of the run.
+            # SciPy's root finder failed, so the run has no result.
             for one in found:
                 one.end(k, 0.0, x0[k], False)
             continue
@@ -187,14 +187,14 @@ def scipy_runs(made: Structure, samples: int) -> list[Found]:
 
 
 class Part(NamedTuple):
-    """Outcomes of one method on the guards of one structure, and seconds."""
+    """Outcomes of one method on the guards of one structure, and the time taken."""
 
     index: int
     method: str
     families: list[str]
     outcomes: list[Outcome]
     seconds: dict[str, float]
-    # Runs whose changes of sign do not alternate: the truth itself would be wrong.
+    # Runs whose changes of sign do not alternate, so that the exact answer must be wrong.
     doubts: int
 
 
@@ -206,7 +206,7 @@ def trial(
     begin: Begin = lambda method, run: None,
     left_out: Mapping[str, set[int]] = MappingProxyType({}),
 ) -> Iterator[Part]:
-    """One part per method; ``begin`` is told of each run of the library's, and some may be left out."""
+    """Yield one part per method; call ``begin`` before each library run, and skip those in ``left_out``."""
     clock = time.perf_counter
     made = structure(seed, index, samples)
     began = clock()
@@ -235,7 +235,7 @@ def trial(
 
 
 def sharpness(made: Structure, guard: int) -> np.ndarray:
-    """The largest sharpness in a guard, ``(N,)``; nan for guards that have none."""
+    """The largest sharpness in a guard, ``(N,)``; nan for guards without a sharpness."""
     names = made.guards[guard].sharpness
     samples = len(next(iter(made.values.values())))
     if not names:
@@ -244,7 +244,7 @@ def sharpness(made: Structure, guard: int) -> np.ndarray:
 
 
 def doubtful(roots: Roots) -> int:
-    """Runs without touches whose changes of sign do not alternate."""
+    """Number of runs without touches whose changes of sign do not alternate."""
     bad = roots.run[1:][(roots.run[1:] == roots.run[:-1]) & (roots.direction[1:] == roots.direction[:-1])]
     first = np.ones(len(roots.run), dtype=bool)
     first[1:] = roots.run[1:] != roots.run[:-1]
@@ -253,7 +253,7 @@ def doubtful(roots: Roots) -> int:
 
 
 def described(seed: int, index: int, samples: int, guard: int, run: int) -> str:
-    """A failing case as text, enough to write it down elsewhere."""
+    """A failing case as text, complete enough to reproduce it."""
     made = structure(seed, index, samples)
     values = {name: float(column[run]) for name, column in made.values.items()}
     start = starts(made, samples)[run].tolist()

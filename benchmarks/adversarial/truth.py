@@ -1,8 +1,8 @@
-"""All changes of sign of a guard along a known motion, proved by intervals.
+"""All changes of sign of a guard along a known motion, proved by interval arithmetic.
 
-The guard and its derivative in time are bounded over pieces of the run, and a piece is halved until it holds
-no zero, one simple zero, or cannot be told from a point. Many runs of one guard are treated at once: a run is
-an index into arrays of parameters.
+The guard and its derivative in time are bounded over pieces of the run. A piece is cut until it holds no zero
+or one simple zero, or until it is as short as a point. Many runs of one guard are computed at once: a run is
+an index into the arrays of parameters.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ import numpy as np
 
 from benchmarks.adversarial.interval import FUNCTIONS, Enclosure, down, up
 
-# Pieces that a run is cut into at first, and where a piece is cut: beside the middle.
+# Number of initial pieces of a run, and place of a cut: not at the middle.
 PIECES, CUT = 16, 0.4871
-# A piece is a point if it has this many units in the last place.
+# A piece of this many units in the last place is a point.
 SMALLEST = 4
-# A guard that stays within this many roundings of zero over a piece has no sign there.
+# A guard has no sign on a piece if it stays within this many roundings of zero.
 UNRESOLVED = 32
 BISECTIONS = 64
-# Pieces in work at once, so that memory stays small.
+# Largest number of pieces computed at once, to limit memory.
 CHUNK = 200_000
 
 
 class Roots(NamedTuple):
-    """Changes of sign, sorted by run and time, and touches: intervals on which the sign is not known."""
+    """Changes of sign, sorted by run and time, and touches: intervals with an unknown sign."""
 
     run: np.ndarray
     time: np.ndarray
-    # How far rounding may move it.
+    # Effect of rounding on the time.
     error: np.ndarray
     direction: np.ndarray
     touch_run: np.ndarray
@@ -40,7 +40,7 @@ class Roots(NamedTuple):
 
 
 class Scalar:
-    """A guard, or one state of a motion, as text: on numbers and on enclosures."""
+    """A guard or one state of a motion as text, compiled for numbers and for enclosures."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -69,7 +69,7 @@ class Composed:
             return self.guard.on_enclosures(t, SimpleNamespace(**x), p)
 
     def near(self, run: np.ndarray, time: np.ndarray, ulps: float, away: dict[str, np.ndarray]) -> Enclosure:
-        """Bounds of the guard over all states within ``away`` of the motion's and times within some ulps."""
+        """Bounds of the guard over states within ``away`` of the motion and times within ``ulps`` ulps."""
         p = self._parameters(run)
         t = Enclosure(time - ulps * np.spacing(np.abs(time)), time + ulps * np.spacing(np.abs(time)))
         x = {}
@@ -93,7 +93,7 @@ class Composed:
 
 
 def all_roots(composed: Composed, start: float, end: float, runs: int) -> Roots:
-    """Changes of sign of a guard on each of some runs."""
+    """All changes of sign of a guard on runs ``0`` to ``runs - 1``."""
     edges = start + (end - start) * np.linspace(0.0, 1.0, PIECES + 1)
     run = np.repeat(np.arange(runs), PIECES)
     work = [(run, np.tile(edges[:-1], runs), np.tile(edges[1:], runs))]
@@ -146,12 +146,12 @@ def picked(a: Enclosure, which: np.ndarray) -> Enclosure:
 def sharpened(
     composed: Composed, run: np.ndarray, low: np.ndarray, high: np.ndarray, value: Enclosure
 ) -> tuple[Enclosure, np.ndarray]:
-    """Bounds over pieces by the mean value form too, and whether a piece lies within rounding of zero."""
+    """Bounds over pieces, tightened by the mean value form, and whether the guard is zero to rounding."""
     middle = low + 0.5 * (high - low)
     half = up(0.5 * (high - low))
     with np.errstate(invalid="ignore", over="ignore"):
         reach = up(np.maximum(np.abs(value.slope_low), np.abs(value.slope_high)) * half)
-    # Only where the derivative is bounded.
+    # The mean value form needs a bounded derivative.
     smooth = np.flatnonzero(np.isfinite(reach))
     tiny = np.zeros(len(run), dtype=bool)
     thin = full(composed.over(run[smooth], middle[smooth], middle[smooth]), middle[smooth])
@@ -163,7 +163,7 @@ def sharpened(
 
 
 def full(a: Enclosure, like: np.ndarray) -> Enclosure:
-    """All four bounds as arrays of their own; what is undefined is unbounded."""
+    """All four bounds as separate arrays, with infinite bounds in place of undefined values."""
 
     def bound(values: Any, undefined: float) -> np.ndarray:
         values = np.array(np.broadcast_to(values, like.shape), dtype=float)
@@ -198,7 +198,7 @@ def bisected(
 def gathered(
     composed: Composed, run: np.ndarray, low: np.ndarray, high: np.ndarray, start: float, end: float
 ) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, np.ndarray]]:
-    """Points next to each other as one: a change of sign, or a touch."""
+    """Merge adjacent points into a change of sign or a touch."""
     order = np.lexsort((low, run))
     run, low, high = run[order], low[order], high[order]
     begins = np.ones(len(run), dtype=bool)
@@ -209,7 +209,7 @@ def gathered(
     first = full(composed.over(run, low, low), low).sign
     last = full(composed.over(run, high, high), low).sign
     step = np.spacing(np.maximum(np.abs(low), np.abs(high)))
-    # Outwards until the sign is certain, but not far.
+    # Move the ends outwards until their signs are certain, at most 16 times.
     for _ in range(16):
         low = np.where(first == 0, np.maximum(low - step, start), low)
         high = np.where(last == 0, np.minimum(high + step, end), high)
