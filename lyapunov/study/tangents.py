@@ -113,9 +113,7 @@ def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
     return Trap(truth, np.array(TOLERANCES), np.array(inside), np.array(outside))
 
 
-def _uncontrolled_exponents(
-    extended: HybridSystem, omega: float, solver: Solver, periods: int
-) -> np.ndarray:
+def _uncontrolled_exponents(extended: HybridSystem, omega: float, solver: Solver, periods: int) -> np.ndarray:
     """Exponents ``(4,)`` from start I, by QR of tangent vectors outside the error control.
 
     The columns are computed one at a time. The steps follow the state alone, so all columns have the same.
