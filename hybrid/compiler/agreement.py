@@ -19,7 +19,7 @@ EPSILON = float(np.finfo(float).eps)
 # Sizes of state and time at which functions are compared, besides those near 1.
 SIZES = (1e-3, 30.0, 1e3)
 # Values that differ by less than this, relative to them, are the same without a closer look.
-SAME = 16 * EPSILON
+SAME_VALUE = 16 * EPSILON
 # How often a function is computed with roundings made up by chance, to see what they do to it.
 SHAKES = 8
 # The compiler's elementary functions are not NumPy's. What is traced can be shaken at each operation.
@@ -157,7 +157,7 @@ def _difference(
     if wanted is None or len(wanted) != len(found):
         return None
     apart = np.abs(found - wanted)
-    if np.all(apart <= SAME * np.abs(wanted)):
+    if np.all(apart <= SAME_VALUE * np.abs(wanted)):
         return None
     band = rounding_band(system, function, t, x, values, wanted)
     # What is nothing but rounding in Python may be a quotient of zeros in other operations. An opaque

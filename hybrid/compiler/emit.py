@@ -131,7 +131,6 @@ def _emitted(system: HybridSystem) -> Emitted:
         traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,
-        affine_mode=tuple(_is_affine(field, symbols.x) for field in fields),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
         discontinuities=tuple(
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))

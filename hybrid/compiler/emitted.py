@@ -121,8 +121,6 @@ class Emitted:
         By residue: the component of the state whose rate it is.
     traced_field
         By mode: whether tracing could follow the field.
-    affine_mode
-        By mode: whether the field's derivative in the state is proved not to depend on the state.
     surface, orientation
         By transition: the number of the guard's zero set, the same for guards that differ by a constant
         factor, and the sign of that factor.
@@ -152,7 +150,6 @@ class Emitted:
     traced_field: tuple[bool, ...]
     surface: tuple[int, ...]
     orientation: tuple[int, ...]
-    affine_mode: tuple[bool, ...]
     autonomous: tuple[bool, ...]
     discontinuities: tuple[str, ...]
     proved_period: bool

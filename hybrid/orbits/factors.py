@@ -11,7 +11,7 @@ from hybrid.status import StatusCode
 
 # The tangent vectors are orthonormalised where their condition number is above this, or their size leaves the
 # range.
-CONDITION = 1e2
+WORST_CONDITION = 1e2
 SMALLEST, LARGEST = 1e-50, 1e50
 # A step of an implicit method that strains them by more than this is taken again, shorter.
 LONGEST_STEP = 1e3
@@ -50,14 +50,14 @@ def fundamental_factors(trajectory: Trajectory, t: float) -> tuple[list[np.ndarr
             sizes = np.linalg.svd(trajectory.tangent_matrix, compute_uv=False)
             if not np.all(np.isfinite(sizes)):
                 return factors, codes.NON_FINITE
-            if before is not None and sizes[0] > CONDITION * LONGEST_STEP * sizes[-1]:
+            if before is not None and sizes[0] > WORST_CONDITION * LONGEST_STEP * sizes[-1]:
                 length = run.last_step
                 run.restore(before)
                 run.next_step = SHORTER * length
                 trajectory.replace_tangents(trajectory.tangent_matrix)
                 continue
             strained = True
-            if sizes[0] > CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
+            if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
                 orthonormalise()
         if code == codes.MAX_JUMPS:
             if strained:

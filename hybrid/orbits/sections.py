@@ -20,13 +20,13 @@ from hybrid.simulation.memory import empty_record
 from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status
-from hybrid.system.elements import Guard, Transition
+from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.transform.markers import with_section
 
 POINTS_AT_ONCE = 500
 # A surface that is not met within this many steps is taken to be missed for good.
 STEPS_BETWEEN_POINTS = 1_000_000
-MARKER = "section"
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -227,15 +227,6 @@ def poincare_section(
     trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
     with trajectory.stop, progress_bar(transient + points, "Section", progress, "point") as bar:
         return _collect(trajectory, len(system.modes), transient, points, bar)
-
-
-def with_section(system: HybridSystem, section: Guard) -> HybridSystem:
-    """The system with a marker transition in every mode, in the order of the modes.
-
-    They come first: where an event lies on the section, the point before it counts.
-    """
-    markers = [Transition(name, name, section, name=f"{MARKER} in {name}") for name in system.mode_names]
-    return attrs.evolve(system, transitions=(*markers, *system.transitions))
 
 
 def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, bar: Any) -> Section:

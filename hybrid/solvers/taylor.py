@@ -11,11 +11,11 @@ from hybrid.solvers.dop853 import DOP853
 from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Tableau
 
-LOWEST_ORDER = 12
+LOWEST_SERIES_ORDER = 12
 # What a contact loses by the longer steps of higher orders is felt by its energy first.
-HIGHEST_ORDER = 28
+HIGHEST_SERIES_ORDER = 28
 # Orders beyond those of the fewest operations per unit of time: a step has costs of its own.
-BEYOND = 6
+MORE_ORDERS = 6
 
 
 @attrs.frozen
@@ -55,4 +55,4 @@ class Taylor(Solver):
         Where a step of length 1/e of the convergence radius would meet the tolerance, the series alone would
         cost least; some orders more make it longer.
         """
-        return min(HIGHEST_ORDER, max(LOWEST_ORDER, ceil(-log(self.rtol)) + BEYOND))
+        return min(HIGHEST_SERIES_ORDER, max(LOWEST_SERIES_ORDER, ceil(-log(self.rtol)) + MORE_ORDERS))

@@ -67,7 +67,7 @@ def _read(path: Path) -> Emitted | None:
     try:
         found: dict[str, Any] = json.loads(text)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        of_modes = ("affine_mode", "autonomous", "discontinuities", "traced_field")
+        of_modes = ("autonomous", "discontinuities", "traced_field")
         parts = ("first_forcing", "forcing_component", "first_residue", "residue_component")
         for name in (*of_transitions, *of_modes, "timed_guard", *parts):
             found[name] = tuple(found[name])

@@ -7,7 +7,8 @@ import pytest
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS, SERIES, TANGENT_SERIES, VARIATIONAL
-from hybrid.orbits.sections import with_section
+from hybrid.kernels.types.codes import DESINGULARISED, EXACT
+from hybrid.transform.markers import with_section
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
 
@@ -50,7 +51,7 @@ def test_repr():
 
 def test_what_tracing_proves():
     emitted = compile_system(vibroimpact()).emitted
-    assert list(emitted.affine_mode) == [True, False]
+    assert [each.kind for each in emitted.propagators] == [EXACT, DESINGULARISED]
     assert list(emitted.affine_guard) == [True, True]
     assert not emitted.opaque
 

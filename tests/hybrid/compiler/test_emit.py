@@ -12,6 +12,7 @@ from hybrid.compiler.emit import emit
 from hybrid.compiler.llvm.functions import compiled_part, own_functions
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS
 from hybrid.errors import ModelError
+from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA
 from hybrid.system.derivatives import sample_points
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function, guard_function, reset_function
@@ -257,18 +258,18 @@ def test_half_powers_are_roots_and_whole_powers_products():
 
 def test_what_is_proved():
     emitted = emit(two_modes())
-    assert emitted.affine_mode == (True, False)
+    assert [each.kind == EXACT for each in emitted.propagators] == [True, False]
     assert emitted.autonomous == (False, False)
     assert emitted.affine_guard == (False, False)
-    assert emit(ball()).affine_guard == emit(ball()).affine_mode == emit(ball()).autonomous == (True,)
+    assert emit(ball()).affine_guard == emit(ball()).autonomous == (True,)
     unknown = emit(opaque())
-    assert unknown.affine_mode == unknown.autonomous == unknown.affine_guard == (False,)
+    assert unknown.autonomous == unknown.affine_guard == (False,)
 
 
 def test_a_constant_slope_between_jumps_is_not_affine():
-    assert emit(mode_system(lambda t, x, p: (x.v, -np.sign(x.v)))).affine_mode == (False,)
-    assert emit(mode_system(lambda t, x, p: (x.v, np.mod(x.q, 1.0)))).affine_mode == (False,)
-    assert emit(mode_system(lambda t, x, p: (x.v, np.sign(np.sin(t))))).affine_mode == (True,)
+    for force in (lambda t, x: -np.sign(x.v), lambda t, x: np.mod(x.q, 1.0)):
+        [found] = emit(mode_system(lambda t, x, p, force=force: (x.v, force(t, x)))).propagators
+        assert found.kind == RUNGE_KUTTA
 
 
 SEEDED = """
