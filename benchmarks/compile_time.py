@@ -1,4 +1,4 @@
-"""How long a model that was never seen waits for its compiler: the first run less the second."""
+"""Compile time of a new model: the time of the first run minus that of the second."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy as np
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 def chain(n):
-    '''n masses in a row on cubic springs, the last of which hits a wall.'''
+    '''A row of n masses on cubic springs; the last mass hits a wall.'''
     def field(t, x, p):
         q, v = x[:n], x[n:]
         stretch = np.diff(np.concatenate([[0.0], q]))
@@ -57,11 +57,11 @@ MODELS = {
 RUNS = {"with tangent vectors": True, "state alone": False}
 # Numbers of masses in the chain.
 CHAINS = (2, 5, 10, 20, 50)
-# The same chain for heyoka, in the mode that it has for large systems.
+# The same chain for heyoka, in its compact mode for large systems.
 HEYOKA = """
 import json, time
 import heyoka as hy
-# It keeps what it has compiled on disk, as this library does.
+# Disable heyoka's cache of compiled code on disk.
 hy.llvm_state.set_diskcache_enabled(False)
 hy.taylor_adaptive(hy.model.pendulum(), [0.0, 0.1])
 begin = time.perf_counter()
@@ -80,7 +80,7 @@ integrator = hy.taylor_adaptive(rates, start, t_events=[wall], compact_mode=True
 integrator.propagate_until(1e-3)
 print(json.dumps(time.perf_counter() - begin))
 """
-# And for diffrax on JAX, whose arrays make the text that XLA compiles no longer for more masses.
+# The same chain for diffrax on JAX; with arrays, XLA's program does not grow with the number of masses.
 JAX = """
 import os
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
@@ -114,7 +114,7 @@ jax.block_until_ready(jax.jit(run)((start, jnp.eye(2 * n) if {tangent} else None
 print(json.dumps(time.perf_counter() - begin))
 """
 KERNELS = "from hybrid.__main__ import compile_kernels; compile_kernels(2)"
-# The kernels are loaded by a model that is small and another one.
+# Two small models load the kernels first.
 PROGRAM = """
 import json, time
 import hybrid, models
@@ -134,7 +134,7 @@ print(json.dumps(seconds[0] - seconds[1]))
 
 
 def wait(model: str, cache: str, tangent: bool = True) -> float:
-    """Seconds that a model waits in a new process whose kernels are compiled; it is unknown each time."""
+    """Compile time in seconds of an uncached model, in a new process with compiled kernels."""
     program = PROGRAM.format(chain=CHAIN, model=model, tangent=tangent)
     with TemporaryDirectory() as folder:
         own = shutil.copytree(cache, Path(folder) / "cache")
@@ -153,7 +153,7 @@ LOOKS = {"hybrid": ("0.1", "*"), "heyoka": ("tab:orange", "^"), "diffrax on JAX"
 
 
 def picture(waits: Mapping[str, Sequence[float]], path: Path) -> None:
-    """Waits over the number of states."""
+    """Draw the compile times over the number of states."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -180,7 +180,7 @@ def picture(waits: Mapping[str, Sequence[float]], path: Path) -> None:
             [0.02 * n for n in states],
             color="0.75",
             linewidth=1.0,
-            label="in proportion to the states",
+            label="proportional to the states",
         )
         axes.set(
             xscale="log", yscale="log", xlabel="states of the chain", ylabel="seconds before the first run"
@@ -198,9 +198,9 @@ def picture(waits: Mapping[str, Sequence[float]], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--picture", type=Path, help="where to draw the waits of the chains")
+    options.add_argument("--picture", type=Path, help="file for the picture of the chains")
     given = options.parse_args(arguments)
-    heading("Seconds that a model never seen waits: the first run with tangent vectors, less the second.")
+    heading("Compile time of a new model: seconds of the first run with tangent vectors minus the second.")
     with TemporaryDirectory() as folder:
         fresh_process(KERNELS, {"HYBRID_CACHE_DIR": folder})
         fresh_process(

@@ -1,4 +1,4 @@
-"""How simple a law of contact may be: exponents of the founding system with each, and what they cost."""
+"""Exponents and cost of the founding system with each contact law, from simple to detailed."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from models.vibroimpact import hertz_stiffness
 PICTURE = ROOT / "docs" / "contact_laws.png"
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
 MASS = 1000 * 100 / 1100
-# The impact of the orbit at 7.40.
+# Impact speed on the orbit at 7.40, m/s.
 SPEED = 0.40
 OMEGAS = np.round(np.arange(7.0, 8.0001, 0.025), 3)
-# Below, every law has a stable orbit of one period; above there are tori, chaos and several attractors.
+# Up to here every law has a stable orbit of one period; above are tori, chaos and coexisting attractors.
 LAST_PERIODIC = 7.40
 SOLVER = Taylor(rtol=1e-9, atol=1e-11)
 TOLERANCES = (3e-1, 3e-2, 1e-3, 1e-6)
@@ -35,12 +35,12 @@ STYLES = {
     "Hertz": {"color": COLOURS[0], "marker": "o"},
     "Hunt-Crossley": {"color": COLOURS[0], "marker": "o"},
 }
-# Differences that the tolerances of the solver leave.
+# Differences below this come from the solver's tolerances.
 LEAST = 1e-8
 
 
 def comparison(laws: dict[str, ContactLaw], omegas: np.ndarray, intervals: int) -> ModelComparison:
-    """Every law over the frequencies, the last one the reference."""
+    """Every law over the frequencies, with the last law as the reference."""
     return compare_models(
         {name: models.vibroimpact(law) for name, law in laws.items()},
         START,
@@ -54,7 +54,7 @@ def comparison(laws: dict[str, ContactLaw], omegas: np.ndarray, intervals: int) 
 
 
 def microseconds(law: ContactLaw, periods: int = 1000) -> float:
-    """Processor time of a period at 7.40 with four tangent vectors."""
+    """Processor time per period at the default frequency with four tangent vectors."""
     system = models.vibroimpact(law)
 
     def run(count: int) -> Any:
@@ -120,12 +120,12 @@ def picture(elastic: ModelComparison, damped: ModelComparison) -> None:
 
 def main() -> None:
     heading(
-        "The founding system with every law of contact, omega from 7 to 8 rad/s, four tangent vectors,\n"
+        "The founding system with every contact law, omega from 7 to 8 rad/s, four tangent vectors,\n"
         f"rtol = {SOLVER.rtol:.0e}. Distance: largest difference of an exponent from the last law's, in 1/s."
     )
     columns = [
         "law",
-        "a period",
+        "time per period",
         "steps",
         f"largest distance to {LAST_PERIODIC}",
         "median distance above",

@@ -1,7 +1,7 @@
-"""How many crossings are missed or doubled over random near-double roots, and how exact event times are.
+"""Counts crossings missed or doubled at random near-double roots, and measures errors of event times.
 
-``python -m benchmarks.events --pairs 1000000`` sends that many polynomials with known roots through the
-isolation of the library, and some such motions through whole runs and through SciPy.
+``python -m benchmarks.events --pairs 1000000`` passes that many polynomials with known roots to the root
+isolation of the library. Fewer such motions are run with the library's solvers and with SciPy.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from hybrid.simulation.memory import ISOLATION_DEPTH
 
 DEGREE = 7
 BATCH = 50_000
-# Roots are told apart if they are this many roundings of the coefficients apart in value.
+# Two roots can be resolved if the polynomial between them exceeds this share of its coefficients.
 ROUNDING = 64 * np.finfo(float).eps
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 
 
 def random_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Two close roots, and two pairs of complex ones: ``(count, 2)``, ``(count, 2)``, ``(count, 2)``.
+    """Two close real roots and two complex pairs: ``(count, 2)``, ``(count, 2)``, ``(count, 2)``.
 
-    The distance of the roots is ``10^-u`` with ``u`` uniform in 0..8, in an interval of length 1; the complex
-    pairs, given by real and imaginary part, make the polynomial positive but not flat.
+    The distance of the real roots is ``10^-u`` with ``u`` uniform in 0..8, in an interval of length 1. The
+    complex pairs, given by real and imaginary parts, contribute positive factors that are not constant.
     """
     apart = 10.0 ** -rng.uniform(0, 8, count)
     first = rng.uniform(0, 1 - apart)
@@ -42,7 +42,7 @@ def random_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.n
 
 
 def bernstein(roots: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients ``(count, 7)`` of the products: factor by factor, without cancellation."""
+    """Bernstein coefficients ``(count, 7)`` of the polynomials, multiplied factor by factor."""
     rows = product(linear(roots[:, 0]), linear(roots[:, 1]))
     for a, b in zip(real.T, imaginary.T, strict=True):
         square = product(linear(a), linear(a))
@@ -65,7 +65,7 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @njit
 def count_crossings(polynomials, found, stack):
-    """Crossings that the isolation finds, one after the other, ``(count,)``; up to three."""
+    """Add to ``found (count,)`` the crossings that the isolation finds one after another, up to three."""
     degree = polynomials.shape[1] - 1
     rest = np.empty(degree + 1)
     for row in range(polynomials.shape[0]):
@@ -96,7 +96,7 @@ def isolation(rng: np.random.Generator, pairs: int) -> list[list[str]]:
         polynomials = bernstein(roots, real, imaginary)
         found = np.zeros(count, dtype=np.int64)
         count_crossings(polynomials, found, stack)
-        # The dip between the roots, against the rounding of the coefficients.
+        # Compare the dip between the roots with the rounding of the coefficients.
         middle = 0.5 * roots.sum(axis=1)
         depth = (0.5 * (roots[:, 1] - roots[:, 0])) ** 2
         for a, b in zip(real.T, imaginary.T, strict=True):
@@ -118,7 +118,7 @@ def isolation(rng: np.random.Generator, pairs: int) -> list[list[str]]:
     ]
 
 
-# The same roots as a motion: x' is the derivative of the polynomial, its roots parameters.
+# The same roots as a motion: x' is the derivative of the polynomial, and the roots are parameters.
 def polynomial_motion(bent: bool) -> HybridSystem:
     def derivative(t, p):
         a, b = t - p.r1, t - p.r2
@@ -164,7 +164,7 @@ def whole_runs(rng: np.random.Generator, pairs: int) -> list[list[str]]:
         system = polynomial_motion(bent)
         for method in (Taylor, DOP853, Tsit5):
             tally, solver = Tally(pairs), method(rtol=1e-10, atol=1e-12)
-            # Compiled before the clock starts.
+            # Compile before the clock starts.
             simulate(system, (1.0, 0.0), (0.0, 0.0), mode="run", solver=solver)
             begin = time.perf_counter()
             for row in values:
@@ -191,7 +191,7 @@ def whole_runs(rng: np.random.Generator, pairs: int) -> list[list[str]]:
 
 
 class Tally:
-    """Counts of crossings missed and doubled where the tolerance tells them, and of the rest."""
+    """Counts of missed and doubled crossings that the tolerance resolves, and of unresolved cases."""
 
     def __init__(self, pairs: int) -> None:
         self.pairs, self.missed, self.doubled, self.reported, self.silent = pairs, 0, 0, 0, 0
@@ -230,10 +230,10 @@ def scipy_crossings(row: np.ndarray, largest: float) -> int:
 
 
 def event_times() -> list[list[str]]:
-    """Errors of the times at which a ball bounces, in ulp: of the first, and the largest of ten."""
+    """Errors of the bounce times of a ball, in ulp: the first, and the largest of ten."""
     ball = models.bouncing_ball()
     e, g = Fraction(0.5), Fraction(9.81)
-    # From the ground, so that the exact times are rational: 2 v (1 + e + ... + e^(k-1)) / g.
+    # The ball starts on the ground, so that the exact times are rational: 2 v (1 + e + ... + e^(k-1)) / g.
     speed = Fraction(3.0)
     rows = []
     for method in (Taylor, DOP853, Tsit5):
@@ -252,12 +252,12 @@ def event_times() -> list[list[str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pairs", type=int, default=1_000_000, help="polynomials through the isolation")
-    parser.add_argument("--runs", type=int, default=2000, help="of them whole runs, and runs with SciPy")
+    parser.add_argument("--runs", type=int, default=2000, help="runs per solver, and with SciPy")
     arguments = parser.parse_args()
-    heading("Two crossings 10^-u apart in a unit interval, u uniform in 0..8: how many are found?")
+    heading("Crossings found of two that are 10^-u apart in a unit interval, u uniform in 0..8.")
     rng = np.random.default_rng(0)
     rows = isolation(rng, arguments.pairs) + whole_runs(rng, arguments.runs)
-    table(["", "pairs", "missed", "doubled", "other than two, dip within tolerance", "time each"], rows)
+    table(["", "pairs", "missed", "doubled", "other than two, dip within tolerance", "time per pair"], rows)
     print("Error of the times of ten bounces of a ball, e = 0.5, in units in the last place.\n")
     table(["solver", "rtol = 100 atol", "first", "largest"], event_times())
 

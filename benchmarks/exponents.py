@@ -1,7 +1,7 @@
-"""What buys the third digit of an exponent: the number of intervals, the tolerance, or the method.
+"""Error of an exponent by number of intervals, tolerance and method.
 
-``python -m benchmarks.exponents`` makes ``docs/exponents_work.png``; ``pip install '.[benchmarks]'`` brings
-the packages that it measures beside this one.
+``python -m benchmarks.exponents`` makes ``docs/exponents_work.png``; ``pip install '.[benchmarks]'``
+installs the packages that are compared.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
 REGULAR = -0.05489356622830292
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 INTERVALS = (10, 30, 100, 300, 1000, 3000)
-# The companion's distance is 1e-8: looser steps would be all that it sees.
+# The companion's distance is 1e-8; with looser tolerances it would show only the solver error.
 TWO_ORBITS = Taylor(rtol=1e-12, atol=1e-14)
 SKEW = 0.3
 CHAOTIC = -SKEW * math.log(SKEW) - (1 - SKEW) * math.log(1 - SKEW)
 STARTS = np.random.default_rng(4).uniform(0.05, 0.95, 12)
-# Seconds, and relative error, after M intervals.
+# Number of intervals M, seconds, and relative error.
 Points = list[tuple[int, float, float]]
 Curves = dict[str, Points]
 LABELS = {
@@ -56,7 +56,7 @@ LINES = {
 
 
 def skew_tent() -> HybridSystem:
-    """Skew tent map, once a unit of time: its exponent is known and its orbits are as random as coins."""
+    """Skew tent map, once per unit of time; its exponent is known, and its growth rates are independent."""
     return HybridSystem(
         name="skew tent",
         state=("x", "clock"),
@@ -82,7 +82,7 @@ def timed(work: Callable[[], object]) -> tuple[float, object]:
 def estimates(
     system: HybridSystem, x0: tuple[float, ...], M: int, solvers: dict[str, Taylor], **options: float
 ) -> dict[str, tuple[float, float]]:
-    """Seconds and estimate of every method after M intervals."""
+    """Time in seconds and estimate of every method after M intervals."""
     found = {}
     for name, solver in solvers.items():
         seconds, spectrum = timed(
@@ -101,13 +101,13 @@ def estimates(
 
 
 def warm(system: HybridSystem, x0: tuple[float, ...]) -> None:
-    """Compile apart."""
+    """Compile first, so that the time of compilation is not measured."""
     lyapunov_spectrum(system, x0, k=1, intervals=1, transient=0)
     two_orbit_exponents(system, x0, intervals=1)
 
 
 def regular_curves() -> Curves:
-    """Errors on the stable orbit of the founding system, from a point of it."""
+    """Errors on the stable orbit of the founding system, from a point on the orbit."""
     solvers = {
         f"tolerance {tolerance:.0e}": Taylor(rtol=tolerance, atol=tolerance / 100) for tolerance in TOLERANCES
     }
@@ -169,7 +169,7 @@ def draw_work(axes: plt.Axes, curves: Curves) -> None:
             markerfacecolor="white" if ":" in marker else colour,
         )
     axes.axhline(5e-4, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
-    axes.set_title("the same, over time")
+    axes.set_title("The same errors over time")
     axes.set_xlabel("seconds")
     axes.grid(True)
 
@@ -196,9 +196,9 @@ def summary(curves: Curves) -> None:
 
 
 def main() -> None:
-    heading("Relative error of the first exponent over the number of intervals; three digits are 5e-4.")
+    heading("Relative error of the first exponent by number of intervals; three digits are 5e-4.")
     regular, chaotic = regular_curves(), chaotic_curves()
-    print("Founding system at omega = 7.40, one tangent vector; tapered means unless it says otherwise:\n")
+    print("Founding system at omega = 7.40, one tangent vector; tapered means unless noted:\n")
     summary(regular)
     print(f"Skew tent map, exponent {CHAOTIC:.6f}, root mean square over {len(STARTS)} starts:\n")
     summary(chaotic)

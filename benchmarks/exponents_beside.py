@@ -1,8 +1,8 @@
-"""The first exponent from 500 periods, beside packages that run straight through the contact.
+"""The first exponent from 500 periods, compared with packages that integrate across the contact.
 
-Part of ``python -m benchmarks.exponents``. What is printed differs from the exponent for two reasons: it is a
-mean over so many periods, and the integration has an error. The matrix of the orbit tells what a perfect
-integration finds for the same tangent vector over the same periods, and so the second by itself.
+Part of ``python -m benchmarks.exponents``. The printed value differs from the exponent for two reasons: it is
+a mean over a finite number of periods, and the integration has an error. The fundamental matrix of the orbit
+gives the exact mean for the same tangent vector and periods, and thus the error of the integration alone.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from lyapunov.spectrum import first_vectors
 PERIODS = 500
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 PEERS = {"pynamicalsys_straight": "pynamicalsys", "jitcode_straight": "jitcode"}
-# Metres, over which the force is rounded off, and the method and tolerance that this is tried with.
+# Widths in metres over which the force is smoothed, and the method and tolerance of these runs.
 WIDTHS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 SMOOTH = ("jitcode_lyap dop853", 1e-10)
 
@@ -49,7 +49,7 @@ class Case(NamedTuple):
         return PERIODS * self.system.forcing_period()
 
     def mean_of(self, vector: np.ndarray, left_out: int) -> float:
-        """Mean rate at which a tangent vector grows over the run, some periods at its beginning left out."""
+        """Mean growth rate of a tangent vector over the run without its first ``left_out`` periods."""
         logs = []
         for _ in range(round(self.t_end / self.orbit.period)):
             vector = self.orbit.fundamental @ (vector / np.linalg.norm(vector))
@@ -59,7 +59,7 @@ class Case(NamedTuple):
 
 
 class Point(NamedTuple):
-    """What is printed, the error of the integration, seconds of a run and of what comes before it."""
+    """The printed exponent, the error of the integration, and the seconds of a run and of its compilation."""
 
     tolerance: float
     exponent: float
@@ -82,7 +82,7 @@ def cases() -> dict[str, Case]:
 
 
 def peers() -> list[Any]:
-    """The packages that are there; of each other one a word."""
+    """The installed packages; prints a line for each package that is missing."""
     found = []
     for module, package in PEERS.items():
         try:
@@ -139,7 +139,7 @@ def point(case: Case, method: Method, tolerance: float, repeats: int = 3) -> Poi
 
 
 def rounded_off(case: Case, found: Sequence[Any]) -> list[Point]:
-    """Over the widths, if the package is there that can."""
+    """Points over the widths, if jitcode_lyap is installed."""
     name, tolerance = SMOOTH
     return [
         point(case, by_peer(peer, case, width=width)[name], tolerance, repeats=1)
@@ -150,7 +150,7 @@ def rounded_off(case: Case, found: Sequence[Any]) -> list[Point]:
 
 
 class Beside(NamedTuple):
-    """All that is measured, by the gap."""
+    """All measurements, by the gap."""
 
     cases: dict[str, Case]
     points: dict[str, Points]
@@ -185,7 +185,7 @@ def summary(result: Beside) -> None:
             rows,
         )
     if any(result.rounded.values()):
-        print(f"The force rounded off over a width, {SMOOTH[0]} at {SMOOTH[1]:.0e}:\n")
+        print(f"The force smoothed over a width, {SMOOTH[0]} at {SMOOTH[1]:.0e}:\n")
         rows = [
             [f"D = {D} m, {what}", *(form(p) for p in points)]
             for D, points in result.rounded.items()
@@ -198,7 +198,7 @@ def summary(result: Beside) -> None:
 
 
 def draw(axes: Sequence[plt.Axes], result: Beside) -> None:
-    """Error over time at each gap, and error over the width of a rounded force."""
+    """Error over time for each gap, and error over the width of a smoothed force."""
     for ax, (D, points) in zip(axes, result.points.items(), strict=False):
         exact = result.cases[D].exact
         for colour, (name, row) in zip(COLOURS, points.items(), strict=False):
@@ -206,7 +206,7 @@ def draw(axes: Sequence[plt.Axes], result: Beside) -> None:
             printed = [abs(p.exponent / exact - 1) for p in row]
             ax.loglog(seconds, printed, "o:", color=colour, markersize=4, markerfacecolor="white")
             ax.loglog(seconds, [p.integration for p in row], "o-", color=colour, markersize=4, label=name)
-        ax.set_title(f"{PERIODS} periods beside others, D = {D} m")
+        ax.set_title(f"{PERIODS} periods, all packages, D = {D} m")
         ax.set_xlabel("seconds; dotted: as printed, lines: integration")
     axes[0].set_ylabel("relative error of the first exponent")
     for colour, (D, row) in zip(COLOURS, result.rounded.items(), strict=False):
@@ -218,7 +218,7 @@ def draw(axes: Sequence[plt.Axes], result: Beside) -> None:
             markersize=4,
             label=f"D = {D} m",
         )
-    axes[2].set_title("The force rounded off, integration")
+    axes[2].set_title("Integration with a smoothed force")
     axes[2].set_xlabel("width, m")
     if any(result.rounded.values()):
         axes[2].legend()

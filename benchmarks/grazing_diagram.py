@@ -1,6 +1,6 @@
-"""The impact oscillator through a grazing: its section and largest exponent, against closed forms.
+"""The impact oscillator through a grazing: its section and largest exponent, compared with closed forms.
 
-``python -m benchmarks.grazing_diagram`` makes ``docs/grazing_diagram.png`` and prints how far off they are.
+``python -m benchmarks.grazing_diagram`` makes ``docs/grazing_diagram.png`` and prints the errors.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ START = (0.0, 0.0)
 
 
 class Point(NamedTuple):
-    """One amplitude: what the attractor looks like, its largest exponent, and what that should be."""
+    """One amplitude: points of the attractor, its largest exponent, and the exact value."""
 
     beyond: float
-    # States once a period, and speeds before the impacts.
+    # Displacements once per period, and speeds before the impacts.
     strobe: np.ndarray
     speeds: np.ndarray
-    # Which of those impacts grazed within the tolerances.
+    # Whether each of these impacts grazed within the tolerances.
     grazed: np.ndarray
     exponent: float
     error: float
-    # In closed form for at most one impact every n periods, from two orbits for all else. The other is nan.
+    # Closed form for at most one impact every n periods, else an estimate from two orbits; the other is nan.
     exact: float
     two_orbits: float
     # Whether the status of the spectrum counts grazed jumps.
@@ -57,7 +57,7 @@ def parameters(beyond: float) -> dict[str, float]:
 
 
 def exact_exponent(beyond: float, impacts: np.ndarray) -> float:
-    """Largest exponent of the orbit with such times of impacts, if that is a stable one in closed form."""
+    """Largest exponent of the orbit with these impact times, or nan if it has no stable closed form."""
     if beyond < 0:
         return SLOW
     flights = np.diff(impacts) / PERIOD
@@ -70,14 +70,14 @@ def exact_exponent(beyond: float, impacts: np.ndarray) -> float:
 
 def point(beyond: float, transient: int = 20_000, intervals: int = 1000, shown: int = 150) -> Point:
     run: dict[str, Any] = {"parameters": parameters(beyond)}
-    # Settled without tangent vectors, which are not needed yet.
+    # The transient is run without tangent vectors.
     settled = stroboscopic_section(SYSTEM, START, periods=shown, transient=transient, **run)
     x0 = settled.x[-1]
     jumps = simulate(SYSTEM, x0, (0.0, shown * PERIOD), samples=[shown * PERIOD], **run).jumps
     spectrum = lyapunov_spectrum(SYSTEM, x0, k=1, intervals=intervals, transient=50, **run)
     exact, pair = exact_exponent(beyond, jumps.t), math.nan
     if math.isnan(exact):
-        # A separation far below the depth of the impacts, whose square root bends the map.
+        # The separation must be far below the depth of the impacts, where the map has a square root.
         run |= {"solver": DOP853(rtol=1e-12, atol=1e-14), "separation": 1e-11}
         pair = two_orbit_exponents(SYSTEM, x0, intervals=intervals, transient=50, **run).renormalised_exponent
     return Point(
@@ -106,7 +106,7 @@ def draw_exponents(axes: Any, points: list[Point], x: np.ndarray) -> None:
         markersize=3.5,
         label="no impacts, or one every $n$ periods",
     )
-    axes.plot(x[~closed], measured[~closed], ".", color=COLOURS[1], markersize=3.5, label="all else")
+    axes.plot(x[~closed], measured[~closed], ".", color=COLOURS[1], markersize=3.5, label="other orbits")
     axes.plot(x, exact, "o", color="0.3", markersize=5.5, markerfacecolor="none", markeredgewidth=0.5,
               label="closed form")  # fmt: skip
     axes.plot(x, pair, "+", color="0.3", markersize=5.5, markeredgewidth=0.5, label="two orbits")
@@ -124,7 +124,7 @@ def picture(sweep: list[Point], before: list[Point], after: list[Point]) -> None
     for p in sweep:
         strobe.plot(np.full(len(p.strobe), p.beyond), p.strobe, ".", color=COLOURS[0], markersize=1.2)
     strobe.axvline(0, color="0.6", linewidth=0.7)
-    strobe.set_ylabel("$x$ once a period")
+    strobe.set_ylabel("$x$ once per period")
     strobe.set_title("a  Through the grazing", loc="left", fontsize=9.5, fontweight="bold")
     draw_exponents(whole, sweep, np.array([p.beyond for p in sweep]))
     whole.set(ylabel="largest exponent", xlabel="$A / A_g - 1$")
@@ -132,7 +132,7 @@ def picture(sweep: list[Point], before: list[Point], after: list[Point]) -> None
     draw_exponents(left, before, np.array([-p.beyond for p in before]))
     left.set(xscale="log", xlabel="$1 - A / A_g$")
     left.invert_xaxis()
-    left.set_title("b  Up to it", loc="left", fontsize=9.5, fontweight="bold")
+    left.set_title("b  Before the grazing", loc="left", fontsize=9.5, fontweight="bold")
 
     for p in after:
         scaled = p.speeds / math.sqrt(p.beyond)
@@ -142,7 +142,7 @@ def picture(sweep: list[Point], before: list[Point], after: list[Point]) -> None
             x[p.grazed], scaled[p.grazed], "s", color=COLOURS[3], markersize=5, markerfacecolor="none"
         )
     speeds.set(ylabel=r"speed of impacts $/\,\sqrt{A / A_g - 1}$", ylim=(0, None))
-    speeds.set_title("c  From it on", loc="left", fontsize=9.5, fontweight="bold")
+    speeds.set_title("c  After the grazing", loc="left", fontsize=9.5, fontweight="bold")
     draw_exponents(right, after, np.array([p.beyond for p in after]))
     right.set(xscale="log", xlabel="$A / A_g - 1$")
 
@@ -170,15 +170,15 @@ def summary(name: str, points: list[Point]) -> list[str]:
 
 
 def main() -> None:
-    heading("Does the largest exponent spike at a grazing?")
+    heading("The largest exponent near a grazing.")
     begin = time.process_time()
     sweep = [point(beyond) for beyond in np.linspace(-0.05, 0.25, 120)]
     before = [point(-beyond) for beyond in 10.0 ** np.arange(-9, -0.9, 0.5)]
     after = [point(beyond) for beyond in 10.0 ** np.arange(-9, -0.95, 1 / 16)]
     parts = {"-0.05 to 0.25": sweep, "-0.1 to -1e-9": before, "1e-9 to 0.1": after}
     table(
-        ["A / A_g - 1", "largest", "closed form", "off it: median, most",
-         "all else", "standard errors off two orbits: median, most", "with a warning"],
+        ["A / A_g - 1", "largest", "closed form", "error: median, largest",
+         "other orbits", "standard errors from two orbits: median, largest", "with a warning"],
         [summary(name, points) for name, points in parts.items()],
     )  # fmt: skip
     with plt.rc_context({"font.size": 9, "axes.linewidth": 0.7}):

@@ -1,7 +1,7 @@
-"""How many instructions a forcing period takes, which other work on the machine does not change.
+"""Number of instructions per forcing period, which does not depend on other load of the machine.
 
-``python -m benchmarks.instructions`` needs ``valgrind``, and three minutes with it. One process makes runs of
-two lengths after a first one; the difference between them leaves out what a run costs to set up.
+``python -m benchmarks.instructions`` needs ``valgrind`` and takes three minutes. One process makes a first
+run and then runs of two lengths; the difference between the two excludes the cost of setting up a run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ RUNS = {
     "simulate, the end alone": "simulate(system, START, (0.0, M * T), mode='free', samples=[M * T])",
     "lyapunov_spectrum, k = 4": "lyapunov_spectrum(system, START, k=4, intervals=M, transient=0)",
 }
-# Nothing else calls getloadavg: each call ends a part of the count.
+# Each call of getloadavg ends a part of the count; nothing else calls it.
 CODE = f"""
 import os
 import models
@@ -37,8 +37,8 @@ for run in {tuple(RUNS.values())!r}:
         assert result.status.ok
         os.getloadavg()
 """
-# Valgrind hides AVX-512, and numba's cache goes by the processor: one that both know, so that nothing is
-# compiled under valgrind.
+# Valgrind hides AVX-512, and numba's cache depends on the processor. With a processor that both support,
+# nothing is compiled under valgrind.
 PROCESSOR = {
     "NUMBA_CPU_NAME": "haswell",
     "NUMBA_CPU_FEATURES": "+64bit,+cmov,+cx16,+sse,+sse2,+sse3,+ssse3,+sse4.1,+sse4.2,+popcnt,+avx,"
@@ -67,7 +67,7 @@ def counts() -> list[int]:
             check=True,
         )
         if set(cache.rglob("*")) != kept:
-            raise RuntimeError("kernels were compiled anew under valgrind, in spite of their cache")
+            raise RuntimeError("kernels were compiled again under valgrind; their cache was not used")
         dumps = [out.with_suffix(f".{i + 1}") for i in range(len(RUNS) * (1 + len(PERIODS)))]
         return [_total(dump) for dump in dumps]
 
@@ -77,12 +77,12 @@ def _total(dump: Path) -> int:
 
 
 def main() -> None:
-    heading(f"Instructions a forcing period of the founding system, from runs of {PERIODS} periods.")
+    heading(f"Instructions per forcing period of the founding system, from runs of {PERIODS} periods.")
     if shutil.which("valgrind") is None:
-        print("Left out: valgrind is not on the path.")
+        print("Skipped: valgrind is not on the path.")
         return
     if platform.machine() != "x86_64":
-        print("Left out: the processor to compile for is named for x86-64 alone.")
+        print("Skipped: this benchmark runs on x86-64 only.")
         return
     found = counts()
     rows = []
@@ -91,7 +91,7 @@ def main() -> None:
         a_period = (last - first) / (PERIODS[1] - PERIODS[0])
         set_up = first - PERIODS[0] * a_period
         rows.append([name, f"{a_period:.0f}", f"{set_up:.0f}"])
-    table(["default solver", "instructions a period", "setting up"], rows)
+    table(["default solver", "instructions per period", "set-up"], rows)
     version = subprocess.run(["valgrind", "--version"], capture_output=True, text=True, check=True).stdout
     print(f"{version.strip()}, kernels compiled for {PROCESSOR['NUMBA_CPU_NAME']}")
 

@@ -1,6 +1,6 @@
-"""What a million forcing periods do: the phase of the impacts, and the energy of a system that keeps it.
+"""Errors after a million forcing periods: the phase of impacts, and the energy of a conservative system.
 
-``python -m benchmarks.long_run --periods 100000`` is a tenth of it.
+``python -m benchmarks.long_run --periods 100000`` runs a tenth of the periods.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def energy(p: dict[str, float], x: np.ndarray) -> float:
 
 
 def energy_drift(solver: Solver, counts: np.ndarray) -> tuple[np.ndarray, int]:
-    """Largest relative change of the energy up to each number of periods, and the impacts on the way."""
+    """Largest relative change of the energy up to each number of periods, and the number of impacts."""
     system = models.vibroimpact()
     trajectory = start(system, START, 0.0, parameters=CONSERVATIVE, solver=solver)
     p = {**system.parameters, **CONSERVATIVE}
@@ -49,7 +49,7 @@ def energy_drift(solver: Solver, counts: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def phase_error(system: HybridSystem, periods: int, solver: Solver) -> float:
-    """Largest error of the phase of an impact of the stable orbit, at some sixty of ``periods``."""
+    """Largest phase error of an impact of the stable orbit, checked at some sixty of the ``periods``."""
     p = dict(models.impact_oscillator().parameters)
     (orbit,) = one_impact_orbits(**p)
     period, phase = 2 * math.pi / p["w"], orbit.theta / p["w"]

@@ -1,4 +1,4 @@
-"""Whether memory grows with the number of intervals."""
+"""Peak memory of a spectrum by the number of intervals."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""``python -m benchmarks.mutants hybrid/accuracy.py`` plants faults, one at a time, for the nearest tests.
+"""``python -m benchmarks.mutants hybrid/status.py`` plants faults one at a time and runs the nearest tests.
 
-A fault is one operator, comparison, constant or condition changed. It is noticed if a test fails, or if the
-tests do not end. The copy that is changed lies in a temporary folder.
+A fault is one changed operator, comparison, constant or condition. It is noticed if a test fails or if the
+tests do not end. The changed copy is in a temporary folder.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ OTHER_COMPARISON = {
     ast.In: ast.NotIn,
     ast.NotIn: ast.In,
 }
-# Test files that are asked about one fault.
+# Most test files to run per fault.
 MOST_TESTS = 4
-# Where names and imports do not lead to the tests of a file.
+# Tests of files that names and imports do not lead to.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
     "hybrid/compiler/emitted.py": (
@@ -148,7 +148,7 @@ OTHER_NAME = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
 class Fault(NamedTuple):
-    """A changed source, and what was changed."""
+    """A changed source and a description of the change."""
 
     path: Path
     line: int
@@ -157,7 +157,7 @@ class Fault(NamedTuple):
 
 
 def faults(path: Path) -> Iterator[Fault]:
-    """Every fault that can be planted in a file; what only errors and texts say is left alone."""
+    """Every fault that can be planted in a file, except in errors and texts."""
     tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     skipped = {id(each) for node in ast.walk(tree) if _is_silent(node) for each in ast.walk(node)}
     for place, node in enumerate(ast.walk(tree)):
@@ -175,7 +175,7 @@ def faults(path: Path) -> Iterator[Fault]:
 
 
 def _is_silent(node: ast.AST) -> bool:
-    """Whether a fault here changes no result: texts, annotations, imports, errors' own words, tuning."""
+    """Whether a fault at the node changes no result: texts, annotations, imports, errors, constants."""
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.AnnAssign):
         return True
     if isinstance(node, ast.FunctionDef) and node.name in ("__repr__", "__getattr__"):
@@ -212,7 +212,7 @@ def _changes(node: ast.AST) -> list[Callable[[ast.AST], None]]:
 
 
 def nearest_tests(path: Path) -> list[str]:
-    """Test files of the same name, else those that import the module, else those of modules that do so."""
+    """Test files with the name of the module, or that import it, or of modules that import it."""
     if str(path) in NEAREST:
         return [f"tests/hybrid/{name}" for name in NEAREST[str(path)]]
     tests = _own_tests(path)
@@ -234,7 +234,7 @@ def _own_tests(path: Path) -> list[str]:
 
 
 def is_noticed(fault: Fault, seconds: float) -> bool:
-    """Whether the nearest tests fail on a copy with the fault."""
+    """Whether the nearest tests fail or do not end on a copy with the fault."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for each in COPIED:
@@ -262,17 +262,17 @@ def is_noticed(fault: Fault, seconds: float) -> bool:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("files", nargs="+", type=Path, help="sources, from the top of the project")
-    parser.add_argument("--each", type=int, default=8, help="faults in each file, drawn at random")
+    parser.add_argument("files", nargs="+", type=Path, help="sources, relative to the top of the project")
+    parser.add_argument("--each", type=int, default=8, help="number of random faults per file")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=300.0, help="after which tests count as not ending")
+    parser.add_argument("--seconds", type=float, default=300.0, help="time limit of the tests for one fault")
     parser.add_argument("--processes", type=int, default=1)
     given = parser.parse_args(arguments)
-    heading("Faults planted one at a time, and how many of them the nearest tests notice.")
+    heading("Faults planted one at a time, and the number that the nearest tests notice.")
     rows, planted, noticed = [], 0, 0
     for path in given.files:
         if not nearest_tests(path):
-            rows.append([str(path), "no tests of its own", "", ""])
+            rows.append([str(path), "no tests", "", ""])
             continue
         found = list(faults(path))
         drawn = random.Random(f"{given.seed} {path}").sample(found, min(given.each, len(found)))

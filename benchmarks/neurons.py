@@ -1,10 +1,10 @@
-"""Random integrate-and-fire neurons: spikes counted beside SciPy, and no limit where there is none.
+"""Random integrate-and-fire neurons: spikes compared with SciPy, and no false accumulation of jumps.
 
-    python -m benchmarks.neurons [how many of each kind]
+    python -m benchmarks.neurons [number of neurons of each kind]
 
 Adaptive exponential neurons (Brette and Gerstner 2005, doi:10.1152/jn.00686.2005) and those of Izhikevich
-(2003, doi:10.1109/TNN.2003.820440). Their resets leave the guard, so their jumps never accumulate, however
-short the intervals of a burst. Times are in ms, voltages in mV.
+(2003, doi:10.1109/TNN.2003.820440). Their resets leave the guard, so their jumps never accumulate, even if
+the intervals of a burst are short. Times are in ms, voltages in mV.
 """
 
 import sys
@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
 
 END = 400.0
-# Spikes whose time differs by more than this are different ones.
+# Spikes are different if their times differ by more than this share of the run.
 CLOSE = 1e-3
 
 
@@ -68,7 +68,7 @@ def izhikevich():
 
 
 def draw(system, rng):
-    """Parameters and a start."""
+    """Random parameters, and a start."""
     if system is izhikevich():
         p = {
             "a": rng.uniform(0.01, 0.15), "b": rng.uniform(0.1, 0.3), "c": rng.uniform(-70.0, -40.0),
@@ -84,7 +84,7 @@ def draw(system, rng):
 
 
 def independent_spikes(system, parameters, start, end):
-    """Times of the spikes by ``solve_ivp``, one terminal event after the other."""
+    """Times of the spikes by ``solve_ivp``, with one call per spike."""
     names = type("Values", (), {})
     state, p = names(), names()
     vars_of = dict(parameters)
@@ -115,7 +115,7 @@ def independent_spikes(system, parameters, start, end):
 
 
 def compare(system, rng, end=END):
-    """Whether a random neuron spikes as the independent count says; spikes of both, and the run's status."""
+    """Whether both methods agree on a random neuron, the spikes of both, and the run's status."""
     parameters, start = draw(system, rng)
     arc = simulate(system, start, (0.0, end), mode="rise", parameters=parameters)
     wanted = independent_spikes(system, parameters, start, end)
@@ -127,12 +127,12 @@ def compare(system, rng, end=END):
 
 
 def _at_end(times, end):
-    """A spike so near the end that the two may differ in it."""
+    """1 if a spike is so near the end that the two methods may differ, else 0."""
     return int(len(times) > 0 and end - times[-1] < CLOSE)
 
 
 def main(count):
-    """Print how many of each kind differ."""
+    """Print the number of neurons of each kind that differ."""
     for system in (adaptive_exponential(), izhikevich()):
         rng = np.random.default_rng(0)
         results = [compare(system, rng) for _ in range(count)]

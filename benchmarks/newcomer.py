@@ -1,4 +1,4 @@
-"""How long a newcomer waits: from the first line of docs/newcomer.md to its Lyapunov spectrum."""
+"""Time of a first use: the program of docs/newcomer.md, from start to its Lyapunov spectrum."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from tempfile import TemporaryDirectory
 from benchmarks.common import ROOT, Process, fastest_process, fresh_process, heading, table
 
 PAGE = ROOT / "docs" / "newcomer.md"
-# The same with another law of friction: a model that was never seen.
+# The same program with another friction law, and thus a new model.
 LINE, OTHER_LINE = "link - direction * p.F", "link - direction * p.F - 0.01 * x.v2"
 
 
 def program() -> str:
-    """The model and its spectrum: the first two blocks of the page."""
+    """The first two Python blocks of the page: the model and its spectrum."""
     blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
     return "\n".join(blocks[:2])
 
@@ -30,7 +30,7 @@ def main() -> None:
         report("the first run ever", fresh_process(model, cache))
         report("the second run", fastest_process(model, cache))
         report("the first run of another model", fresh_process(model.replace(LINE, OTHER_LINE), cache))
-    table(["", "on the clock", "of a processor"], rows)
+    table(["", "wall clock", "processor"], rows)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The runs of the work-precision charts: four systems, what is true of them, and how the peers write them."""
+"""The runs of the work-precision charts: four systems, their exact answers, and models for the peers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybrid import Answer, Guard, HybridSystem, Mode, Reset, Transition
 
 
 def problems() -> dict[str, Problem]:
-    """By short name; what stands before the first dash is the chart."""
+    """Problems by short name; the part before the first dash is the name of the chart."""
     founding = {}
     for D in ("0", "0.05"):
         facts = stored("founding_system")["transients"][D]
@@ -39,7 +39,7 @@ def problems() -> dict[str, Problem]:
                 f"{title}, 100 periods", reference=Answer(facts["x100"]), **shape, **hundred
             ),
         }
-    # The long runs last.
+    # Sort the long runs to the end.
     made = dict(sorted(founding.items(), key=lambda item: item[1].t_span[1]))
     return made | {
         "impact": _impact_oscillator(),
@@ -53,7 +53,7 @@ def stored(name: str) -> Any:
 
 
 def always_touching(system: HybridSystem) -> HybridSystem:
-    """The contact's field everywhere: its force is zero apart."""
+    """The field of the contact everywhere; its force is zero where the bodies are apart."""
     contact = next(mode for mode in system.modes if mode.name == "contact")
     return attrs.evolve(system, modes=[contact], transitions=[])
 
@@ -70,7 +70,7 @@ def _impact_oscillator() -> Problem:
 
 
 def _buck_converter() -> Problem:
-    """Two hundred ramps along the orbit at 20 V and a quarter, over which the switch stays open."""
+    """Two hundred ramps along the orbit at 20 V, and a quarter ramp with the switch open."""
     facts, ramps = stored("buck_converter")[1], 200
     p = {**models.buck_converter().parameters, "E": facts["E"]}
     model = attrs.evolve(models.buck_converter(), parameters=p)
@@ -82,7 +82,7 @@ def _buck_converter() -> Problem:
     def ramp_ends() -> Guard:
         return Guard(lambda t, x, p: x.tau - 1, direction=+1)
 
-    # On this orbit the switch opens where the ramp ends, and nowhere else.
+    # On this orbit the switch opens only where the ramp ends.
     restart = Reset(lambda t, x, p: (x.v, x.i, 0.0))
     plain = attrs.evolve(
         model,
@@ -112,7 +112,7 @@ def _buck_converter() -> Problem:
 
 
 def _stick_slip() -> Problem:
-    """Forty slips of the limit cycle, from the middle of a stick to that of another."""
+    """Forty slips of the limit cycle, from one stick phase to another."""
     facts, slips = stored("stick_slip"), 40
     belt, Fs = 0.2, 1.0
     released = [(Fs - 0.5) / belt + k * facts["period"] for k in range(slips)]

@@ -1,4 +1,4 @@
-"""How long a forcing period of the founding system takes, beside SciPy's DOP853 with events and restarts."""
+"""Time per forcing period of the founding system, compared with SciPy's DOP853 with events and restarts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOLERANCES = (1e-6, 1e-8, 1e-10)
 
 
 def scipy_run(span: float) -> Callable[[float], np.ndarray]:
-    """End state at a tolerance: SciPy as a careful user writes it, each mode with its terminal event."""
+    """End state at a tolerance by SciPy, as a careful user would write it: one terminal event per mode."""
     p = models.vibroimpact().parameters
     chi, d1, d2 = p["m2"] / p["m1"], 2 * p["xi1"] * p["omega1"], 2 * p["xi2"] * p["omega2"]
     w1, w2, gap, stiffness = p["omega1"] ** 2, p["omega2"] ** 2, p["D"], p["K"]
@@ -66,7 +66,7 @@ def scipy_run(span: float) -> Callable[[float], np.ndarray]:
 
 def main() -> None:
     heading(
-        f"Founding system over {PERIODS} forcing periods, with its contacts: microseconds a period.\n"
+        f"Founding system over {PERIODS} forcing periods, with its contacts: microseconds per period.\n"
         "Error: of the state at the end, against this library at rtol = 1e-14."
     )
     system = models.vibroimpact()
@@ -93,15 +93,15 @@ def main() -> None:
             seconds = least_time(lambda run=run, tolerance=tolerance: run(tolerance), repeats)
             points[name].append((error, seconds))
             rows.append([f"{tolerance:.0e}", name, f"{seconds / PERIODS * 1e6:.1f}", f"{error:.1e}"])
-    table(["rtol = 100 atol", "", "us a period", "error"], rows)
+    table(["rtol = 100 atol", "", "us per period", "error"], rows)
     for name in ("Taylor", "DOP853"):
         ratios = [seconds / at_error(points[name], error) for error, seconds in points["SciPy"]]
         listed = ", ".join(f"{ratio:.0f}" for ratio in ratios)
-        print(f"SciPy's time over that of {name} at the same error: {listed}")
+        print(f"Ratio of SciPy's time to the time of {name} at the same error: {listed}")
 
 
 def at_error(points: list[tuple[float, float]], error: float) -> float:
-    """Seconds for an error, between the points measured on logarithmic scales and constant beyond them."""
+    """Seconds for an error, interpolated on logarithmic scales and constant beyond the measured points."""
     errors, seconds = np.log(np.array(sorted(points))).T
     return float(np.exp(np.interp(np.log(error), errors, seconds)))
 

@@ -1,4 +1,4 @@
-"""How long the paper's Benettin column takes: omega = 7.40, M = 10000 periods, four tangent vectors."""
+"""Time of the paper's Benettin column: omega = 7.40, M = 10000 periods, four tangent vectors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TOLERANCES = (1e-6, 2e-8, 1e-8, 1e-10)
 
 def main() -> None:
     heading(
-        f"Spectrum of the founding system, {PERIODS} periods, 4 tangent vectors, one core, compile apart.\n"
+        f"Spectrum of the founding system, {PERIODS} periods, 4 tangent vectors, one core, compiled first.\n"
         "Target: error of every exponent at most 1e-6 within 2.5 s."
     )
     system = models.vibroimpact()

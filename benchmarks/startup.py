@@ -1,4 +1,4 @@
-"""How long a user waits: the import, the first run ever, and the next process."""
+"""Start-up times: the import, the first run with an empty cache, and the next process."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ assert simulate(pendulum, (1.0, 0.0), (0.0, 5.0)).status.ok
 
 
 def main() -> None:
-    heading("Seconds of whole processes, the interpreter's own start among them.")
+    heading("Seconds of whole processes, including the start of the interpreter.")
     rows = []
 
     def report(what: str, process: Process, target: float | None = None) -> None:
@@ -43,14 +43,14 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         cache = {"HYBRID_CACHE_DIR": folder}
         first = fresh_process(RUN, cache)
-        report("first run ever, empty cache", first, 20)
+        report("first run, empty cache", first, 20)
         report("the next process", fastest_process(RUN, cache), 1)
         report("first spectrum after that", fresh_process(SPECTRUM, cache))
         report("the next process with a spectrum", fastest_process(SPECTRUM, cache), 1)
         report("first run of a new model", fresh_process(OWN_MODEL, cache))
-        report("the next process with it", fastest_process(OWN_MODEL, cache), 1)
-    table(["", "on the clock", "of a processor", "target"], rows)
-    print("Said meanwhile:", first.messages.replace("\n", " ") or "nothing")
+        report("the next process with that model", fastest_process(OWN_MODEL, cache), 1)
+    table(["", "wall clock", "processor", "target"], rows)
+    print("Messages of the first run:", first.messages.replace("\n", " ") or "none")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Error against time on four systems, beside every package that can be installed: tables and charts.
+"""Error against time on four systems, compared with other installed packages: tables and charts.
 
-``pip install '.[benchmarks]'``, then ``OMP_NUM_THREADS=1 python -m benchmarks.work_precision``; with GNU
-Octave, if it is installed.
+Run ``pip install '.[benchmarks]'``, then ``OMP_NUM_THREADS=1 python -m benchmarks.work_precision``. GNU
+Octave is included if it is installed.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ PEERS = {
 OURS = {
     method.__name__: method(rtol=1.0, atol=ATOL_OVER_RTOL) for method in (Taylor, DOP853, Tsit5, RadauIIA)
 }
-# Errors at which the seconds are compared.
+# Errors at which times are compared.
 TARGETS = (1e-4, 1e-6, 1e-8, 1e-10)
 
 
 def peers(wanted: list[str]) -> Iterator[Any]:
-    """The peers that are there; of each other one a word."""
+    """The installed peers; prints a line for each peer that is missing."""
     for module, package in PEERS.items():
         if module not in wanted:
             continue
@@ -83,7 +83,7 @@ def measure(problem: Problem, found: list[Any], repeats: int) -> WorkPrecision:
 
 
 def compare(result: WorkPrecision) -> None:
-    """Milliseconds to each of some errors, the quickest of a package's tolerances."""
+    """Print each method's milliseconds for each error of ``TARGETS``, between its measured points."""
     print("ms to an error of".ljust(34) + "".join(f"{target:10.0e}" for target in TARGETS) + "   compile ms")
     for method in result.methods:
         rows = result.rows_of(method)
@@ -114,10 +114,10 @@ def draw(results: dict[str, WorkPrecision], path: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--repeats", type=int, default=7, help="runs that the median is taken of, at least")
+    parser.add_argument("--repeats", type=int, default=7, help="least number of runs for the median")
     parser.add_argument("--peers", nargs="*", choices=PEERS, default=list(PEERS), help="all by default")
-    parser.add_argument("--only", nargs="*", default=None, help="problems whose short names begin so")
-    parser.add_argument("--full", action="store_true", help="print every run, too")
+    parser.add_argument("--only", nargs="*", default=None, help="beginnings of the short names of problems")
+    parser.add_argument("--full", action="store_true", help="also print every run")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder of the pictures")
     arguments = parser.parse_args()
     heading("Error against processor time: this library and its peers, one thread each.")
@@ -136,7 +136,7 @@ def main() -> None:
         if arguments.full:
             print(result)
         compare(result)
-        # After every problem, so that a run that is broken off leaves a picture.
+        # Draw after every problem, so that an interrupted run leaves a picture.
         draw(results[group], arguments.out / f"work_precision_{group}.png")
     print(f"Load at the end: {os.getloadavg()[0]:.1f}")
 

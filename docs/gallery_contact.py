@@ -1,4 +1,4 @@
-"""Pictures of the models of single impacts for the gallery, each drawn on axes it is given."""
+"""Gallery pictures of models with impacts; each function draws on given axes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COARSE = DOP853(rtol=1e-8, atol=1e-10)
 
 
 def vibroimpact(ax: Axes) -> None:
-    """One impact by itself at 0.4 m/s: force over penetration, with the restitution 0.6 where it is free."""
+    """Force over penetration in a single impact at 0.4 m/s; the damped laws have a restitution of 0.6."""
     K, mass, speed, e = hertz_stiffness(), 1000 * 100 / 1100, 0.4, 0.6
     laws = {
         "Hertz": Hertz(K),
@@ -30,7 +30,7 @@ def vibroimpact(ax: Axes) -> None:
         arc = simulate(models.vibroimpact(law), start, (0.0, 0.01), mode="free", parameters=alone)
         t = np.linspace(arc.jumps[0].t, arc.jumps[1].t, 400)
         x1, x2, v1, _ = arc(t).T
-        # The force is what slows the first body down.
+        # The force follows from the deceleration of the first body.
         force = -1000 * np.gradient(v1, t, edge_order=2)
         depth = (x1 - x2) * 1e6
         ax.plot(np.append(0, depth), np.append(0, force) / 1e3, color=colour, label=name)
@@ -71,17 +71,17 @@ def bouncing_ball(ax: Axes) -> None:
 PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     (
         "vibroimpact",
-        "Force over penetration in one impact, by the laws of contact that the two bodies may have.",
+        "Force over penetration in one impact, for each contact law of the model.",
         vibroimpact,
     ),
     (
         "impact_oscillator",
-        "The chaotic attractor of an oscillator at a rigid stop, seen once a forcing period.",
+        "The chaotic attractor of an oscillator at a rigid stop, with one point per forcing period.",
         impact_oscillator,
     ),
     (
         "bouncing_ball",
-        "A ball comes to rest after infinitely many bounces, where the run ends; dots are the limits.",
+        "A ball comes to rest after infinitely many bounces, where the run ends; dots mark the limits.",
         bouncing_ball,
     ),
 ]

@@ -1,4 +1,4 @@
-"""Pictures of the models of friction and walking, each drawn on axes given to it."""
+"""Gallery pictures of models of friction and walking; each function draws on given axes."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def dry_friction_oscillator(ax: Axes) -> None:
 
 
 def largest_displacement(system: HybridSystem, parameters: Mapping[str, float]) -> float:
-    """Of the settled motion, where it turns or stops."""
+    """Largest displacement of the settled motion, at which the mass turns or stops."""
     period = system.forcing_period(parameters)
     t_end = 25 * period
     arc = simulate(system, (0.0, 1.0), (0.0, t_end), parameters=parameters, solver=LOOSE, samples=[t_end])
@@ -82,7 +82,7 @@ def simplest_walker(ax: Axes) -> None:
         heelstrikes = arc.jumps.x_plus[[jump.transition == "heelstrike" for jump in arc.jumps]]
         angles = heelstrikes[-70:, 0]
         ax.plot(np.full(len(angles), gamma), angles, ",", color=COLOURS[0], rasterized=True)
-        # The next slope begins where this one ended: only walks close to the attractor do not fall.
+        # Start the next slope at the last state, because only walks close to the attractor do not fall.
         x0, mode = arc.x[-1], str(arc.mode[-1])
     ax.set(xlabel="slope γ (rad)", ylabel="angle after heelstrike θ (rad)")
     plain(ax)
@@ -109,14 +109,14 @@ def slip_hopper(ax: Axes) -> None:
 
 
 def next_apex(arc: HybridArc) -> float:
-    """Height of the first apex, nan if the runner has fallen."""
+    """Height of the first apex; nan if the runner has fallen."""
     touchdown, takeoff, apex = arc.jumps[:3]
     up = takeoff.transition == "takeoff" and takeoff.x_minus[3] > 0
     return apex.x_minus[1] if up and apex.x_minus[1] > touchdown.x_minus[1] else np.nan
 
 
 def fade(ax: Axes) -> None:
-    """Make what is drawn so far a background."""
+    """Turn all lines drawn so far into a background."""
     for line in ax.lines:
         line.set_alpha(0.4)
         line.set_linewidth(0.9)
@@ -129,12 +129,12 @@ def plain(ax: Axes) -> None:
 PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     (
         "stick_slip",
-        "A block on a moving belt: from any start it comes to a limit cycle of sticking and slipping.",
+        "A block on a moving belt reaches a limit cycle of sticking and slipping from every start shown.",
         stick_slip,
     ),
     (
         "coulomb_stick_slip",
-        "Displacement at three speeds of the belt: carried along to x = 1, the static friction, and let go.",
+        "Displacement at three belt speeds: the mass sticks up to x = 1, the static friction, then slips.",
         coulomb_stick_slip,
     ),
     (
@@ -144,17 +144,18 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     ),
     (
         "rimless_wheel",
-        "Two starts that roll down the slope come to one gait, and one that is too slow rocks to rest.",
+        "Two starts roll down the slope and reach the same gait; one start is too slow and rocks to rest.",
         rimless_wheel,
     ),
     (
         "simplest_walker",
-        "Steps of the simplest walker on steeper slopes: the period doubles up to chaos.",
+        "Steps of the simplest walker on steeper and steeper slopes: period doublings lead to chaos.",
         simplest_walker,
     ),
     (
         "slip_hopper",
-        "Apex return map of a runner at one energy: running is stable where it crosses the diagonal gently.",
+        "Apex return map of a runner at one energy: running is stable where the map crosses the diagonal "
+        "with a slope between -1 and 1.",
         slip_hopper,
     ),
 ]

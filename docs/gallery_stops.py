@@ -1,4 +1,4 @@
-"""Pictures of the models of impacts and stops for the gallery, each drawn on axes it is given."""
+"""Gallery pictures of models of impacts and stops; each function draws on given axes."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def bouncing_table(ax: Axes) -> None:
     system = models.bouncing_table()
     period, g, w = system.forcing_period(), 9.81, 36.0
     accelerations = np.linspace(1.06, 1.76, 240)
-    # From the orbit with one bounce a period: at t = 0 the ball is about to land at its phase.
+    # Start on the orbit with one bounce per period; the ball lands when the table reaches ``phase``.
     phase = np.arccos(np.pi / (3 * accelerations[0]))
     V, left, A = np.pi * g / w, phase / w, accelerations[0] * g / w**2
     x, mode = np.array([A * np.sin(phase) + V * left - g * left**2 / 2, g * left - V - A * w]), "flight"
     for acceleration in accelerations:
         parameters = {"A": acceleration * g / w**2}
-        for periods in (60, 60):  # the first are transient
+        for periods in (60, 60):  # the first run is a transient
             end = periods * period
             arc = simulate(
                 system, x, (0.0, end), mode=mode, parameters=parameters, samples=[end], solver=COARSE
@@ -58,7 +58,7 @@ def bilinear_oscillator(ax: Axes) -> None:
         x, mode = section.x[-1], str(section.mode[-1])
         ax.plot(np.full(len(section), w), section.x[:, 0], **DOTS)
     ax.set_xlabel("forcing frequency $w$")
-    ax.set_ylabel("$x$ once a period")
+    ax.set_ylabel("$x$ once per period")
 
 
 def stop_oscillator(ax: Axes) -> None:
@@ -97,18 +97,18 @@ def rocking_block(ax: Axes) -> None:
 PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     (
         "bouncing_table",
-        "A ball on a vibrating table: impact speeds over the acceleration, from one bounce a period through "
-        "its period doublings to chaos.",
+        "A ball on a vibrating table: impact speeds over the acceleration, from one bounce per period "
+        "through period doublings to chaos.",
         bouncing_table,
     ),
     (
         "impact_pair",
-        "A mass rattling in a shaken box: phase and velocity of its impacts on the right wall, in chaos.",
+        "A mass rattling in a shaken box: phase and velocity of its chaotic impacts on the right wall.",
         impact_pair,
     ),
     (
         "bilinear_oscillator",
-        "Bilinear oscillator with the stiffnesses 1 and 50: subharmonics and the chaos between them.",
+        "Bilinear oscillator with stiffnesses 1 and 50: subharmonic orbits and chaos between them.",
         bilinear_oscillator,
     ),
     (
@@ -118,7 +118,7 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     ),
     (
         "rocking_block",
-        "A rocking block set free near the edge of overturning, which is the grey curve.",
+        "A rocking block released close to the boundary of overturning, the grey curve.",
         rocking_block,
     ),
 ]

@@ -1,4 +1,4 @@
-"""Pictures of the models that switch and of those that collide: one function a model, on given axes."""
+"""Gallery pictures of models that switch or collide; each function draws on given axes."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def rattling_ball(axes: Axes) -> None:
 
 
 def scattering_by_three_disks(axes: Axes) -> None:
-    """Seven particles that start together, one ten thousandth of a radian apart."""
+    """Seven particles that start at one point in directions 1e-4 rad apart."""
     system = three_disk_billiard()
     a, R = system.parameters["a"], system.parameters["R"]
     for k in range(3):
@@ -99,7 +99,7 @@ def scattering_by_three_disks(axes: Axes) -> None:
 PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     (
         "chua_circuit",
-        "The double scroll, a colour an affine region; crosses mark the three equilibria.",
+        "The double scroll, with one colour per affine region; crosses mark the three equilibria.",
         double_scroll,
     ),
     (
@@ -109,22 +109,23 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     ),
     (
         "solvable_oscillator",
-        "The oscillation grows about the set point s, which flips at whole times; dots follow the exact map.",
+        "The oscillation grows about the set point s, which flips at integer times; there the states (dots) "
+        "follow an exact map.",
         solvable_chaos,
     ),
     (
         "switched_arrival",
-        "Work in the buffers: straight lines across a triangle, twice as far apart after each switch.",
+        "Work in the buffers: straight lines across a triangle; distances double at each switch.",
         orbit_in_the_triangle,
     ),
     (
         "ball_chain",
-        "A light ball turns two heavy ones back, in 7 collisions of at most ceil(pi / phi) = 8.",
+        "A light ball reverses two heavy balls in 7 collisions; the bound is ceil(pi / phi) = 8.",
         rattling_ball,
     ),
     (
         "three_disk_billiard",
-        "Seven particles that start within a milliradian leave three disks in all directions.",
+        "Seven particles start within a milliradian and leave three disks in very different directions.",
         scattering_by_three_disks,
     ),
 ]

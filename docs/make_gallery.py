@@ -1,7 +1,7 @@
-"""Make the gallery, a picture a model: ``python docs/make_gallery.py``.
+"""Make the gallery with one picture per model: ``python docs/make_gallery.py``.
 
-The parts ``gallery_*.py`` beside this file each hold a list ``PICTURES``: name of a model, caption, and a
-function that draws on the axes it is given.
+Each part ``gallery_*.py`` in this folder holds a list ``PICTURES`` of entries: name of a model, caption, and
+a function that draws on given axes.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ SIZE = (4.0, 3.0)
 COLUMNS = 3
 HEAD = """# Gallery
 
-A picture a model, drawn by [make_gallery.py](make_gallery.py); the names lead to the models.
+One picture per model, drawn by [make_gallery.py](make_gallery.py). The names link to the models.
 
 """
 
 
 class Picture(NamedTuple):
-    """Name of a model in `models`, what there is to see, and who draws it."""
+    """Name of a model in `models`, caption, and drawing function."""
 
     model: str
     caption: str
@@ -41,12 +41,12 @@ class Picture(NamedTuple):
 
     @property
     def source(self) -> str:
-        """The file of the model, from here."""
+        """Path of the model's file, relative to this folder."""
         return f"../{getattr(models, self.model).__module__.replace('.', '/')}.py"
 
 
 def pictures() -> list[Picture]:
-    """The pictures of all parts, by name of the model."""
+    """The pictures of all parts, sorted by the name of the model."""
     parts = [importlib.import_module(path.stem) for path in sorted(HERE.glob("gallery_*.py"))]
     found = sorted((Picture(*entry) for part in parts for entry in part.PICTURES), key=lambda p: p.model)
     names = [picture.model for picture in found]
@@ -54,7 +54,7 @@ def pictures() -> list[Picture]:
         if names.count(name) > 1:
             raise SystemExit(f"Gallery: {name!r} has {names.count(name)} pictures. Keep one.")
         if not callable(getattr(models, name, None)):
-            raise SystemExit(f"Gallery: {name!r} is no model. Use a name that `models` exports.")
+            raise SystemExit(f"Gallery: {name!r} is not a model. Use a name that `models` exports.")
     return found
 
 
@@ -73,8 +73,8 @@ def page(found: list[Picture]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=HERE, help="where gallery.md and gallery/ are written")
-    parser.add_argument("models", nargs="*", help="names of models to draw anew, by default all")
+    parser.add_argument("--output", type=Path, default=HERE, help="folder for gallery.md and gallery/")
+    parser.add_argument("models", nargs="*", help="names of models to draw, by default all")
     arguments = parser.parse_args()
     found = pictures()
     unknown = set(arguments.models) - {picture.model for picture in found}

@@ -1,4 +1,4 @@
-"""Make the pictures of the documentation from the model in the README: ``python docs/make_pictures.py``."""
+"""Make the pictures of the documentation with the model of the README: ``python docs/make_pictures.py``."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ def rattler_picture(system: HybridSystem) -> None:
     for line in portrait.lines[len(lines) :]:
         line.set_linewidth(2.4 if line.get_color() in COLOURS else 0.9)
     portrait.set_ylabel("velocity v")
-    portrait.set_title("an unstable orbit in the chaos")
+    portrait.set_title("an unstable orbit in the attractor")
     portrait.set_xlabel("position q")
 
     strobe = figure.add_subplot(grid[:, 2], sharey=portrait)
     for index, mode in enumerate(system.mode_names):
         inside = section.mode == mode
         strobe.plot(*section.x[inside].T, ",", color=COLOURS[index], alpha=0.7, rasterized=True)
-    strobe.set_title("once a forcing period")
+    strobe.set_title("once per forcing period")
     strobe.set_xlabel("position q")
     strobe.tick_params(labelleft=False)
     strobe.spines[["top", "right"]].set_visible(False)
@@ -83,7 +83,7 @@ def graph_picture(system: HybridSystem) -> None:
 
 
 def chart_picture(system: HybridSystem) -> None:
-    """Sections and exponents over the forcing frequency, the attractor carried along."""
+    """Sections and exponents over the forcing frequency, with the attractor followed from row to row."""
     with style():
         swept = chart(
             system,
@@ -96,7 +96,7 @@ def chart_picture(system: HybridSystem) -> None:
             solver=DOP853(rtol=1e-8, atol=1e-10),
         )
         figure = plot_chart(swept)
-        figure.axes[0].set_ylabel("position q, once a period")
+        figure.axes[0].set_ylabel("position q, once per period")
         figure.axes[1].set_xlabel("forcing frequency w")
         save(figure, HERE / "chart.png")
 
@@ -109,7 +109,7 @@ def save(figure: Any, path: Path) -> None:
 
 
 def quantise(path: Path) -> None:
-    """Two hundred and fifty-six colours are enough, and a third of the size."""
+    """Reduce a picture to 256 colours, which is a third of the size."""
     from PIL import Image
 
     with Image.open(path) as image:

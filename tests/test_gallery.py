@@ -40,7 +40,7 @@ def test_a_model_has_a_picture(name, gallery):
 
 
 def test_the_page_shows_the_gallery_as_it_is(gallery):
-    """``python docs/make_gallery.py`` writes it anew."""
+    """``python docs/make_gallery.py`` writes the page again."""
     found = gallery.pictures()
     page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
     assert page == gallery.page(found)
@@ -51,7 +51,7 @@ def test_the_page_shows_the_gallery_as_it_is(gallery):
 def test_a_picture_of_no_model_is_refused(gallery, monkeypatch):
     part = importlib.import_module("gallery_contact")
     monkeypatch.setattr(part, "PICTURES", [("no_such_model", "Nothing.", lambda ax: None)])
-    with pytest.raises(SystemExit, match="'no_such_model' is no model"):
+    with pytest.raises(SystemExit, match="'no_such_model' is not a model"):
         gallery.pictures()
 
 

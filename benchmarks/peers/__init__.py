@@ -1,4 +1,4 @@
-"""How others solve these problems, a file a package; each makes functions of the tolerance of a problem.
+"""Solutions of the problems with other packages, one file per package; each returns functions of a tolerance.
 
-All are handed the same equations, traced from one model, in the form each of them compiles.
+All packages receive the same equations, traced from one model, in the form that they compile.
 """

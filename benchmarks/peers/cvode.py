@@ -1,4 +1,4 @@
-"""CVODE of SUNDIALS with its root finding, through scikit-sundae: stop at a root, reset, start again."""
+"""CVODE of SUNDIALS with root finding, through scikit-sundae: stop at a root, reset, start again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_STEPS = 1_000_000
 
 
 def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
-    """Adams' and Gear's formulas with root finding, and straight through; functions compiled with numba."""
+    """Adams and BDF formulas with root finding, and BDF without; functions compiled with numba."""
     given = equations(problem.model)
     fields = [compiled(field) for field in given.fields]
     roots = [_roots(exits) for exits in given.exits]

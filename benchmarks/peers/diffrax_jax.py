@@ -22,7 +22,7 @@ from hybrid import Answer
 
 jax.config.update("jax_enable_x64", True)
 MOST_STEPS = 65536
-# Tighter and it gives up now and then, on the rounding of its interpolant.
+# With tighter tolerances the root finder sometimes fails because of rounding in the interpolant.
 ROOT = optimistix.Newton(1e-8, 1e-8)
 SOLVERS = {"Dopri8": diffrax.Dopri8, "Tsit5": diffrax.Tsit5}
 
@@ -43,7 +43,7 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
         ]
 
         def run(rtol: float) -> Answer:
-            # As arrays: a number of Python's would be compiled in.
+            # Arrays, because Python numbers would be compiled into the function.
             t, end, tolerance = map(jnp.asarray, (*problem.t_span, rtol))
             mode, x, times, steps = problem.first_mode, jnp.array(problem.x0, dtype=float), [], 0
             while True:

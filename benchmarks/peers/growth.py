@@ -1,4 +1,4 @@
-"""What a package hands back of the growth of one tangent vector."""
+"""Growth of one tangent vector, as a package returns it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 
 class Growth(NamedTuple):
-    """The vector at the start ``(n,)``, the mean rate at which it grew, and the exponent that is printed.
+    """The vector at the start ``(n,)``, its mean growth rate, and the exponent that the package returns.
 
-    The first intervals are left out of both, as far as the package allows.
+    Both exclude the first ``left_out`` intervals if the package allows it.
     """
 
     vector: np.ndarray
@@ -20,5 +20,5 @@ class Growth(NamedTuple):
     exponent: float
 
 
-# From the tolerance to a run, for which everything is compiled.
+# Maps a tolerance to a run whose functions are compiled.
 Method = Callable[[float], Callable[[], Growth]]

@@ -1,9 +1,9 @@
-"""heyoka: Taylor series with terminal events, an integrator a mode, the state handed from one to the next.
+"""heyoka: Taylor series with terminal events and one integrator per mode.
 
-A Hertz force has no Taylor series where the contact begins. So a mode with a half-integer power of a gap
-``z`` is written on the clock ``dt = w ds`` with ``w = sqrt(z)`` and carries ``w`` and the time along, which
-makes it smooth; without that heyoka does not start. Each event costs it time: only a stay that the end of the
-run cuts short is integrated again, with the end as an event.
+A Hertz force has no Taylor series where the contact begins, and heyoka cannot start there. Therefore a mode
+with a half-integer power of a gap ``z`` uses the clock ``dt = w ds`` with ``w = sqrt(z)``, and ``w`` and the
+time as extra states, which makes it smooth. Each event costs time, so the end of the run is an event only
+where a stay in a mode passes it; this stay is integrated again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DIRECTIONS = {
     1: hy.event_direction.positive,
 }
 W, END = sympy.symbols("w t_end")
-# Longer than any stay in a mode on its own clock, and more steps than one takes.
+# Longer than any stay in a mode on its own clock, and more steps than a stay takes.
 FOREVER, MOST_STEPS = 1e9, 10_000
 
 
@@ -69,7 +69,7 @@ class _Stay:
         start = np.zeros(n)
         if gap is not None:
             symbols |= {W: hy.make_vars("w"), given.t: hy.make_vars("t"), END: hy.expression(t_end)}
-            # Not w**3: the series of a power divides by its base, which is zero at the start.
+            # W * gap in place of w**3: the series of a power divides by its base, which is zero at the start.
             smooth = [e.subs(sympy.Max(0, gap) ** sympy.Rational(3, 2), W * gap) for e in field]
             rate = sum(gap.diff(s) * e for s, e in zip(given.x, smooth, strict=True))
             field = (*(W * e for e in smooth), rate / 2, W)
@@ -91,7 +91,7 @@ class _Stay:
         self.to_the_end = integrator([*guards, (given.t - END, 1)]) if self.clocked else None
 
     def run(self, t: float, x: np.ndarray, end: float) -> tuple[float, np.ndarray, int | None, int]:
-        """Time and state where the mode is left, the exit or None at the end of the run, steps."""
+        """Time and state at the end of the stay, the exit or None at the end of the run, and the steps."""
         if not self.clocked:
             return self._advanced(self.integrator, t, x, end)
         stay = self._advanced(self.integrator, t, x, FOREVER)
@@ -118,7 +118,7 @@ class _Stay:
 
 
 def _gap(field: tuple[sympy.Expr, ...]) -> sympy.Expr | None:
-    """``z`` of a force ``max(z, 0)**1.5``, if there is one."""
+    """The gap ``z`` of a force ``max(z, 0)**1.5``, or None."""
     bases = {sum(m.args) for e in field for m in e.atoms(sympy.Max)}
     return bases.pop() if bases else None
 

@@ -1,7 +1,7 @@
-"""jitcode_lyap: SciPy's explicit methods straight through the contact, on C that it writes and compiles.
+"""jitcode_lyap: SciPy's explicit methods across the contact, on generated and compiled C code.
 
-It takes its own derivatives, and C has none for a maximum. With a case distinction in its place ``dop853``
-gives up at a tolerance of 1e-10; with a corner that is rounded off over a nanometre it does not.
+jitcode_lyap computes derivatives itself and has none for a maximum. With a case distinction in place of the
+maximum, ``dop853`` fails at a tolerance of 1e-10. With a corner smoothed over a nanometre it succeeds.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hybrid import HybridSystem
 if not (shutil.which("gcc") or shutil.which("cc")):
     raise ImportError("a C compiler is not on the path")
 
-# Those that its documentation names for small systems.
+# Methods that the documentation of jitcode recommends for small systems.
 FORMULAS = ("dop853", "dopri5")
 WIDTH = 1e-9
 
@@ -31,23 +31,23 @@ WIDTH = 1e-9
 def methods(
     system: HybridSystem, x0: Sequence[float], t_end: float, intervals: int, width: float = WIDTH
 ) -> dict[str, Method]:
-    """Of a system of one mode. The tangent vector is under the error control, and normalised each interval.
+    """Methods for a system with one mode; the error control includes the tangent vector.
 
-    In the place of ``max(z, 0)`` stands ``(z + sqrt(z**2 + width**2)) / 2``, in metres. A tenth of the run
-    is left out at its beginning.
+    The vector is normalised after each interval. ``(z + sqrt(z**2 + width**2)) / 2``, in metres, replaces
+    ``max(z, 0)``. The first tenth of the run is excluded.
     """
     given = equations(system)
     symbols = {given.t: t, **{x: y(i) for i, x in enumerate(given.x)}}
     field = [_converted(e, symbols, width) for e in given.fields[0]]
     ends, left_out = np.linspace(0.0, t_end, intervals + 1), intervals // 10
-    # Its own would be another one each time.
+    # A fixed vector, because jitcode draws a new one each time.
     vector = np.random.default_rng(13).normal(size=len(given.x))
     start = np.append(x0, vector / np.linalg.norm(vector))
 
     def with_formula(formula: str) -> Method:
         def at(rtol: float) -> Callable[[], Growth]:
             model = jitcode_lyap(field, n_lyap=1, verbose=False)
-            # Its compilation reads the project of the folder that it runs in.
+            # Compile in an empty folder, because the compilation reads the project file of its folder.
             with tempfile.TemporaryDirectory() as elsewhere, contextlib.chdir(elsewhere):
                 model.compile_C()
             model.set_integrator(formula, rtol=rtol, atol=rtol * ATOL_OVER_RTOL)

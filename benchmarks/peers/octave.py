@@ -26,7 +26,7 @@ printf("%.17g ", x(end, :)); printf("\\n%d\\n%.9g\\n", numel(t) - 1, median(s(mi
 
 
 def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
-    """One run of Octave a tolerance: it repeats the run and takes the time there, without its own start."""
+    """One Octave process per tolerance; it repeats and times the run itself, excluding its start."""
     if shutil.which("octave") is None:
         raise ImportError("GNU Octave is not on the path")
     if problem.straight is None:
@@ -51,7 +51,7 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
             text=True,
             check=True,
             timeout=PATIENCE,
-            # Where it leaves its workspace when it is broken off.
+            # Octave saves its workspace here if it is interrupted.
             cwd=tempfile.gettempdir(),
         )
         state, steps, seconds = done.stdout.strip().splitlines()
@@ -63,6 +63,6 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
 
 
 def version() -> str:
-    """As Octave says it."""
+    """The version that Octave reports."""
     done = subprocess.run(["octave", "--version"], capture_output=True, text=True, check=True)
     return done.stdout.splitlines()[0].removeprefix("GNU Octave, version ")

@@ -1,4 +1,4 @@
-"""A problem as every peer gets it: a model's fields, guards and resets as expressions, and what is true."""
+"""A problem for all packages: a model's fields, guards and resets as expressions, and the exact answer."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_EVENTS = 2000
 
 
 def limit_events(times: Sequence[float]) -> None:
-    """RuntimeError if a run has more events than any of these problems."""
+    """Raise a RuntimeError if a run has more events than any of these problems."""
     if len(times) > MOST_EVENTS:
         raise RuntimeError(f"more than {MOST_EVENTS} events, the last at t = {times[-1]:.6g}")
 
@@ -37,13 +37,13 @@ class Problem:
     system, x0, t_span, mode
         The run, as :func:`hybrid.simulate` takes it.
     reference
-        What is true.
+        The exact answer.
     peers
-        The model the peers solve: ``system``, or one with the same motion and simpler guards.
+        The model that other packages solve: ``system``, or a model with the same motion and simpler guards.
     straight
-        One mode with the discontinuity inside; None where the state jumps.
+        A model of one mode that contains the discontinuity; None if the state jumps.
     left_out
-        Values at the end of the last components of the state, where ``straight`` does without them.
+        Final values of the last components of the state that ``straight`` lacks.
     tangent
         Whether the fundamental matrix is computed.
     """
@@ -76,7 +76,7 @@ class Problem:
 
 
 class Leave(NamedTuple):
-    """Where a mode is left: expressions of guard and reset, direction, index of the mode that follows."""
+    """An exit of a mode: expressions of guard and reset, direction, index of the next mode."""
 
     guard: sympy.Expr
     direction: int
@@ -85,7 +85,7 @@ class Leave(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """Fields and exits by mode, in the symbols ``t`` and ``x``, the parameters replaced by their values."""
+    """Fields and exits by mode, in the symbols ``t`` and ``x``, with numbers in place of parameters."""
 
     t: sympy.Symbol
     x: tuple[sympy.Symbol, ...]
@@ -120,7 +120,7 @@ def equations(system: HybridSystem) -> Equations:
 
 
 def _plain(expression: sympy.Expr) -> sympy.Expr:
-    """Choices and kinks as SymPy's own, which its printers know."""
+    """Replace the library's choices and kinks by SymPy's own functions, which SymPy's printers support."""
     for ours, theirs in (
         (sym.Maximum, sympy.Max),
         (sym.Absolute, sympy.Abs),
@@ -146,7 +146,7 @@ def compiled(expressions: Sequence[sympy.Expr]) -> Callable[[float, np.ndarray, 
 
 
 def returning(expressions: Sequence[sympy.Expr], scalar: bool = False) -> Callable[[float, np.ndarray], Any]:
-    """``f(t, x)``, compiled with numba: an array, or the one value."""
+    """``f(t, x)``, compiled with numba: returns an array, or one number."""
     import numba
 
     fill, n = compiled(expressions), len(expressions)

@@ -1,4 +1,4 @@
-"""pynamicalsys: its adaptive Runge-Kutta method straight through the contact, compiled with numba."""
+"""pynamicalsys: its adaptive Runge-Kutta method across the contact, compiled with numba."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ SEED = 13
 
 
 def methods(system: HybridSystem, x0: Sequence[float], t_end: float, intervals: int) -> dict[str, Method]:
-    """Of a system of one mode. The tangent vector is under the error control, and normalised at each step.
+    """Methods for a system with one mode; the error control includes the tangent vector.
 
-    Its transient is without the tangent vector, so that there is none.
+    The vector is normalised at each step. No transient is used, because pynamicalsys runs it without the
+    tangent vector.
     """
     given = equations(system)
     (field,), n = given.fields, len(given.x)
     value = returning(field)
-    # The slope of max(z, 0)**1.5 is a root that is zero where the step of the maximum is.
+    # Replace the step function in the slope of max(z, 0)**1.5 by 1: it is multiplied by a root that is zero.
     slopes = returning(
         [e.diff(x).replace(sympy.Heaviside, lambda *_: sympy.Integer(1)) for e in field for x in given.x]
     )
@@ -44,7 +45,7 @@ def methods(system: HybridSystem, x0: Sequence[float], t_end: float, intervals: 
         number_of_parameters=0,
         parameters=[],
     )
-    # As it draws its own.
+    # The vector that pynamicalsys draws with this seed.
     vector = 2 * np.random.RandomState(SEED).rand(n) - 1
 
     def at(rtol: float) -> Callable[[], Growth]:

@@ -1,4 +1,4 @@
-"""SciPy: events and restarts, the documented way, or straight through the discontinuity."""
+"""SciPy: with events and restarts, as documented, or across the discontinuity without events."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from benchmarks.peers.problem import ATOL_OVER_RTOL, Problem, equations, returni
 from hybrid import Answer
 
 Field = Callable[[float, np.ndarray], Sequence[float]]
-# More right-hand sides than this and the run is given up, if the caller has no other limit.
+# A run is aborted after this many evaluations of the right-hand side, unless the caller sets a limit.
 MOST_EVALUATIONS = 1_000_000
 
 
 class GivenUp(Exception):
-    """A run that would take too long to be worth a point."""
+    """The run needs too many evaluations."""
 
 
 class Edge(NamedTuple):
-    """Where a mode is left: guard, direction, mode that follows, reset."""
+    """An exit of a mode: guard, direction, next mode, reset."""
 
     guard: Callable[[float, np.ndarray], float]
     direction: int
@@ -30,7 +30,7 @@ class Edge(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """End state, times of events, right-hand sides evaluated, mode at the end, steps."""
+    """End state, times of events, number of evaluations, mode at the end, number of steps."""
 
     x: np.ndarray
     events: np.ndarray
@@ -57,7 +57,7 @@ def straight(
     most_evaluations: int = MOST_EVALUATIONS,
     **options: Any,
 ) -> Outcome:
-    """One call, no events: the error control is left to cope with the discontinuity."""
+    """One call without events; only the error control handles the discontinuity."""
     count = [0]
     solution = solve_ivp(counted(field, count, most_evaluations), t_span, x0, **options)
     return Outcome(solution.y[:, -1], np.array([]), count[0], 0, len(solution.t) - 1)
@@ -74,7 +74,7 @@ def with_events(
     most_evaluations: int = MOST_EVALUATIONS,
     **options: Any,
 ) -> Outcome:
-    """Terminal events of the current mode, its reset, and a new call from there: the documented way."""
+    """The documented way: a terminal event of the current mode, its reset, and a new call."""
     (t, end), x, count, times = t_span, np.array(x0, dtype=float), [0], []
     steps = 0
     while t < end and len(times) < most_events:
@@ -108,7 +108,7 @@ STRAIGHT = ("DOP853", "LSODA", "Radau")
 
 
 def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
-    """SciPy's methods with events and restarts, and straight through; functions compiled with numba."""
+    """SciPy's methods with events and restarts, and without events; functions compiled with numba."""
     given = equations(problem.model)
     fields = [returning(field) for field in given.fields]
     edges = [
@@ -152,5 +152,5 @@ def methods(problem: Problem) -> dict[str, Callable[[float], Answer]]:
 
 
 def at_event(reset: Callable[[float, np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-    """Resets of these problems do not depend on time."""
+    """The reset as a function of the state; resets of these problems do not depend on time."""
     return lambda x: reset(0.0, x)

@@ -1,1 +1,1 @@
-"""Where methods go wrong: measured errors and miscounted events, here and with SciPy as it is used today."""
+"""Where methods fail: errors and miscounted events of this library and of common uses of SciPy."""

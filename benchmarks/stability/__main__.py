@@ -1,4 +1,4 @@
-"""``python -m benchmarks.stability`` makes ``docs/stability.png`` and prints what it shows."""
+"""``python -m benchmarks.stability`` makes ``docs/stability.png`` and prints a summary of its curves."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--periods", type=int, default=1_000_000, help="periods of panel f")
     periods = parser.parse_args().periods
-    heading("Where methods go wrong: errors against closed forms, and miscounted events.")
+    heading("Where methods fail: errors against closed forms, and miscounted events.")
     jobs: dict[str, Callable[[], Curves]] = {
         "stiffness": stiffness_curves,
         "grazing": grazing_curves,

@@ -1,4 +1,4 @@
-"""Panels b, c and e: shallow dips below a guard, the limit of the bounces, a run split at an event."""
+"""Panels b, c and e: shallow dips below a guard, the limit of bounces, and a run split at an event."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from benchmarks.stability.methods import EVENTS, LEAST, OURS, SCIPY, Curves
 from benchmarks.stability.wall import G
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate
 
-# Calls of SciPy's after which its user is taken to have stopped waiting.
+# SciPy's run of the bouncing ball is stopped after this many events.
 MOST_EVENTS = 1000
-# Where a ball is drawn that never comes to rest.
+# Value drawn for a ball that never comes to rest.
 NEVER = 1.0
 
 
-# A motion that dips below its guard by the same depth once a turn.
+# A motion that dips below its guard by the same depth once per turn.
 def dipping() -> HybridSystem:
     return HybridSystem(
         name="dips",
@@ -35,7 +35,7 @@ def dipping() -> HybridSystem:
 
 
 def grazing_curves(turns: int = 10, phases: int = 6) -> Curves:
-    """Share of the crossings that a method misses without a word, over the depth of the dips."""
+    """Share of crossings that a method miscounts without a report, over the depth of the dips."""
     curves: Curves = {}
     system = dipping()
     rng = np.random.default_rng(1)
@@ -52,7 +52,7 @@ def grazing_curves(turns: int = 10, phases: int = 6) -> Curves:
             for phase in starts:
                 arc = simulate(system, begin(phase), (0, end), parameters={"depth": depth}, solver=solver)
                 found += len(arc.jumps)
-                # A grazing says that two crossings, or none, are within the tolerances there.
+                # A reported grazing stands for two crossings or none, within the tolerances.
                 said += 2 * len(arc.grazings)
             silent = max(expected - found - said, 0) if found <= expected else found - expected
             curves.setdefault(name, []).append((depth, silent / expected))
@@ -70,7 +70,7 @@ def grazing_curves(turns: int = 10, phases: int = 6) -> Curves:
     return curves
 
 
-# A ball on rigid ground, to one and a half times the limit of its bounces.
+# A ball on rigid ground, simulated to 1.5 times the limit of its bounces.
 def resting_ball() -> HybridSystem:
     return HybridSystem(
         name="ball",
@@ -90,7 +90,7 @@ def resting_ball() -> HybridSystem:
 
 
 def restitution_curves() -> Curves:
-    """Relative error of the time at which the ball comes to rest; ``NEVER`` where it does not."""
+    """Relative error of the time at which the ball comes to rest; ``NEVER`` if it does not."""
     curves: Curves = {}
     system = resting_ball()
     ends = 10.0 ** -np.arange(1, 4.1, 0.5)
@@ -103,7 +103,7 @@ def restitution_curves() -> Curves:
             error = max(abs(arc.jumps[-1].t / limit - 1), LEAST) if rests else NEVER
             curves.setdefault(name, []).append((e, error))
         bounces = with_events([fall], [[ground(e)]], *run, most_events=MOST_EVENTS, **SCIPY).events
-        # Without a limit the bounces go on, and nothing but the last of them could be its time.
+        # SciPy reports no limit, so the time of the last bounce is used unless the bounces go on.
         gone_on = len(bounces) == MOST_EVENTS
         curves.setdefault(EVENTS, []).append((e, NEVER if gone_on else abs(bounces[-1] / limit - 1)))
     return curves
@@ -129,7 +129,7 @@ def clock() -> HybridSystem:
 
 
 def split_curves(clocks: int = 40) -> Curves:
-    """Share of runs with a wrong count if they are split within ulps of an event: a clock that runs out."""
+    """Share of runs of a clock with a wrong event count if the run is split within ulps of the event."""
     curves: Curves = {}
     system = clock()
     options: dict[str, Any] = {"events": lambda t, x: x[0], **SCIPY}

@@ -1,4 +1,4 @@
-"""The methods compared, their tolerances, and how a run becomes a point of a curve."""
+"""The compared methods, their tolerances, and the conversion of a run into a point of a curve."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WITHOUT_PERIOD = "DOP853, time not split"
 SCIPY: dict[str, Any] = {"method": "DOP853", **TIGHT}
 # Width of the smoothed step, in units of the state.
 WIDTH = 1e-3
-# Errors below this are drawn here.
+# Smaller errors are drawn at this value.
 LEAST = 1e-17
 
 LOOSELY = {"markerfacecolor": "white", "linestyle": "-."}
@@ -58,7 +58,7 @@ def measure(
     *arguments: Any,
     **options: Any,
 ) -> None:
-    """Add the distance of a run's end from the truth as a point; none if the run was given up or failed."""
+    """Add the error at the end of a run as a point; nan if the run was aborted or failed."""
     try:
         result = run(*arguments, **options)
         x = result.x if isinstance(result, Outcome) else result.x[-1]

@@ -16,9 +16,9 @@ from hybrid import HybridSystem
 from hybrid.simulation.trajectory import start
 from models.one_impact import one_impact_orbits
 
-# Two units of time a forcing period, and so few steps.
+# A short forcing period, which needs few steps.
 PARAMETERS = {"w": 2.0, "d": 0.05}
-# Periods after which the slower methods are stopped, as shares of the whole.
+# Share of the periods after which the slower methods are stopped.
 SHARES = {"Tsit5, tight": 0.02, "Tsit5, loose": 0.1, "RadauIIA, tight": 0.001, "RadauIIA, loose": 0.02}
 SHARE_WITHOUT_PERIOD = 0.3
 SCIPY_PERIODS = 1000
@@ -61,7 +61,7 @@ def phases(
     counts: Iterable[int],
     solver: Any,
 ) -> list[tuple[float, float]]:
-    """Largest phase error so far of the impacts in the periods counted, in one run that keeps no history."""
+    """Largest phase error of the impacts up to each count of periods, in one run without a history."""
     trajectory = start(system, after, phase, parameters=PARAMETERS, solver=solver)
     record = trajectory.no_record()
     errors, largest = [], 0.0
@@ -69,9 +69,9 @@ def phases(
         trajectory.advance(phase + (count + 0.5) * period, record)
         run = trajectory.run
         cycles, found = run.jumps, run.last_jump_phase - phase
-        # With a period that is a phase already, without it a time.
+        # ``last_jump_phase`` is a phase if the model has a period, else a time.
         whole = round(found / period) if trajectory.model.period > 0 else cycles
-        # The largest so far: a time as one number is right now and then by chance.
+        # Keep the largest error, since a time held as one number may be right by chance.
         largest = max(largest, abs(found - whole * period) * 2 * math.pi / period)
         errors.append((float(count), max(largest, LEAST)))
     return errors

@@ -1,4 +1,4 @@
-"""The six panels as one picture."""
+"""Draws the six panels as one picture."""
 
 from __future__ import annotations
 

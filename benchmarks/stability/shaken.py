@@ -1,4 +1,4 @@
-"""Panel d: a ball on a shaken table with a damped contact: it lands, rides and is let go, again and again."""
+"""Panel d: a ball on a shaken table with a damped contact, which lands, rides and is released repeatedly."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ from hybrid import Guard, HybridSystem, Mode, Transition, simulate
 
 G, SHAKING, W, K = 9.81, 30.0, 20.0, 1e4
 START = (0.05, 0.0)
-# A flight, half a turn of the table after the fifth letting go.
+# During a flight, half a turn of the table after the fifth release.
 END = 1.725
 # At the tight tolerances SciPy's implicit method takes minutes.
 MEDIUM = {"rtol": 1e-7, "atol": 1e-9}
-# Steps here, and right-hand sides there, after which a run is given up.
+# Limits after which a run is aborted: steps of this library, evaluations of SciPy.
 MOST_STEPS, MOST_EVALUATIONS = 50_000, 50_000
 
 
-# The height is above the table. The contact pushes, K x + c v < 0, and does not pull: it lets go below zero.
+# x is the height above the table. The contact pushes while K x + c v < 0 and never pulls, so the ball is
+# released below zero.
 def shaken_table() -> HybridSystem:
     def weight(t):
         return SHAKING * np.cos(W * t) - G
@@ -84,7 +85,7 @@ def smoothed(c: float) -> Any:
 
 
 def exact_height(c: float, events: list[tuple[str, float]] | None = None) -> float:
-    """Height at the end, from the closed forms of flight and contact joined at roots, with 40 digits."""
+    """Height at the end with 40 digits, from closed forms of flight and contact joined at their roots."""
     with mpmath.workdps(40):
         piece, start, x, v = flight, mpmath.mpf(0), *map(mpmath.mpf, START)
         while True:
@@ -99,7 +100,7 @@ def exact_height(c: float, events: list[tuple[str, float]] | None = None) -> flo
 
 
 def first_crossing(due: Any, start: Any, scan: float = 1e-3) -> Any:
-    """Where ``due`` first turns from positive to negative before the end, or None."""
+    """Time at which ``due`` first changes from positive to negative before the end, or None."""
     before = start + scan / 1000
     while before < END:
         after = before + scan
@@ -151,7 +152,7 @@ def contact(c: Any, start: Any, x: Any, v: Any) -> Any:
 
 
 def damping_curves() -> Curves:
-    """Error of the height in the flight at the end."""
+    """Error of the height at the end, during a flight."""
     curves: Curves = {}
     system = shaken_table()
     for c in 10.0 ** np.arange(2.5, 8.6, 0.5):

@@ -25,7 +25,7 @@ from hybrid import Guard, HybridSystem, Mode, Transition, simulate
 G = 9.81
 
 
-# Piecewise linear, x'' = -g, and -K x more below zero: so in closed form.
+# Piecewise linear with a closed form: x'' = -g above zero and x'' = -g - K x below.
 def elastic_wall() -> HybridSystem:
     return HybridSystem(
         name="elastic wall",
@@ -64,7 +64,7 @@ def smoothed(K: float) -> Any:
 
 
 def bounced(K: float, bounces: int) -> float:
-    """Time half-way down from the top of the flight after that many elastic bounces from height 1."""
+    """Time at which the ball, after ``bounces`` elastic bounces from height 1, has fallen half-way."""
     speed, w = math.sqrt(2 * G), math.sqrt(K)
     # x = (-1 + cos s) g / K - (speed / w) sin s returns to zero at tan(s / 2) = -speed w / g.
     contact = 2 * (math.pi - math.atan2(speed * w, G)) / w
@@ -76,7 +76,7 @@ def off_the_middle(x: np.ndarray) -> float:
 
 
 def stiffness_curves(bounces: int = 5) -> Curves:
-    """Error of the height half-way down a flight, where an error of energy shows, and one of phase too."""
+    """Error of the height half-way down a flight, where errors of energy and of phase both show."""
     curves: Curves = {}
     system = elastic_wall()
     loosely = {**SCIPY, **LOOSE}
