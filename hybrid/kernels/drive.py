@@ -36,7 +36,6 @@ from hybrid.kernels.types.codes import (
     TERMINAL,
 )
 from hybrid.kernels.types.layout import ENTRY, KERNEL, PARTS, TASK
-from hybrid.kernels.types.task import task_of
 
 # More jumps than this at one instant, in all or per transition, are not going to end.
 MOST_JUMPS_AT_ONCE = 1000
@@ -88,6 +87,76 @@ def finite(run, length):
     return total < math.inf
 
 
+@njit(**KERNEL)
+def fire(parts, task, stop_cycle, stop_phase, max_jumps):
+    """Make the pending jump, and follow a chatter to its limit; returns ``GO_ON``, or why the run ends."""
+    model, run, record = task.model, task.run, task.record
+    if run.jumps >= max_jumps:
+        return MAX_JUMPS
+    # Room for one jump more: this one may complete a chatter, whose limit is a jump too.
+    if 0 < record.jump_phase.shape[0] <= record.jumps + 1:
+        return RECORD_FULL
+    if run.jumps_here > max(MOST_JUMPS_AT_ONCE, MOST_JUMPS_EACH * model.target.shape[0]):
+        return STUCK
+    fired = run.pending
+    run.pending = NO_TRANSITION
+    parts.jump(task, fired)
+    if model.target[fired] == NO_MODE:
+        return TERMINAL
+    ended = parts.finish_chatter(task, fired, time_left(model, run, stop_cycle, stop_phase))
+    if ended and model.accumulates_to[run.last_fired] == NO_MODE:
+        return ACCUMULATION
+    return GO_ON
+
+
+@njit(**KERNEL)
+def enter(parts, task):
+    """Begin a stay in a mode: take the side of every guard; returns ``GO_ON``, or why the run ends."""
+    model, run, mode = task.model, task.run, task.run.mode
+    if not finite(run, model.dimension * (1 + task.tangents)):
+        return NON_FINITE
+    fires = parts.enter(model, run, task.work)
+    if fires == RESTING:
+        limit_mode = model.accumulates_to[run.last_fired]
+        if limit_mode == NO_MODE:
+            run.at_rest = 1
+            return ACCUMULATION
+        parts.rest(task, limit_mode)
+        return GO_ON
+    if fires != NO_TRANSITION:
+        run.pending = fires
+        return GO_ON
+    if mode != run.previous_mode:
+        run.next_step = run.first_step[mode]
+        run.first_step[mode] = 0.0
+    run.last_step = 0.0
+    run.stage = STALE
+    return GO_ON
+
+
+@njit(**KERNEL)
+def is_full(record):
+    """Whether the next step might not fit into the record."""
+    if 0 < record.step_phase.shape[0] <= record.steps + 1:
+        return True
+    return 0 < record.grazing_phase.shape[0] == record.grazings
+
+
+@njit(**KERNEL)
+def step(parts, task, remaining):
+    """One step by the propagator of the mode; returns a code and the time that the step took."""
+    model, run = task.model, task.run
+    if model.propagator[run.mode] == RUNGE_KUTTA:
+        return parts.runge_kutta_step(task, remaining)
+    code, span = series_step(task, remaining)
+    if code == NON_FINITE and is_forced(model, run.mode):
+        # Terms of the series overflow far from a pulse, ``cosh`` in ``1 / cosh``; the field does not.
+        run.stage = STALE
+        code, span = parts.runge_kutta_step(task, remaining)
+        run.stage = STALE
+    return code, span
+
+
 @njit(int64(PARTS, TASK, int64, float64, int64, int64), **ENTRY)
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
@@ -95,77 +164,38 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record
     has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. Nothing is allocated.
     """
-    _, model, _, run, record, work = task_of(task)
-    length = model.dimension * (1 + task.tangents)
-    recording = record.step_phase.shape[0] > 0
+    model, run = task.model, task.run
     while True:
         if run.pending != NO_TRANSITION:
-            if run.jumps >= max_jumps:
-                return MAX_JUMPS
-            # One more than this jump: it may turn out to be the last of a chatter, whose limit follows at
-            # once.
-            if 0 < record.jump_phase.shape[0] <= record.jumps + 1:
-                return RECORD_FULL
-            if run.jumps_here > max(MOST_JUMPS_AT_ONCE, MOST_JUMPS_EACH * model.target.shape[0]):
-                return STUCK
-            fired = run.pending
-            run.pending = NO_TRANSITION
-            parts.jump(task, fired)
-            if model.target[fired] == NO_MODE:
-                return TERMINAL
-            remaining = time_left(model, run, stop_cycle, stop_phase)
-            ended = parts.finish_chatter(task, fired, remaining)
-            if ended and model.accumulates_to[run.last_fired] == NO_MODE:
-                return ACCUMULATION
+            code = fire(parts, task, stop_cycle, stop_phase, max_jumps)
+            if code != GO_ON:
+                return code
             continue
-        mode = run.mode
         if run.stage == ENTERING:
-            if not finite(run, length):
-                return NON_FINITE
-            fires = parts.enter(model, run, work)
-            if fires == RESTING:
-                limit_mode = model.accumulates_to[run.last_fired]
-                if limit_mode == NO_MODE:
-                    run.at_rest = 1
-                    return ACCUMULATION
-                parts.rest(task, limit_mode)
+            code = enter(parts, task)
+            if code != GO_ON:
+                return code
+            if run.stage == ENTERING or run.pending != NO_TRANSITION:
                 continue
-            if fires != NO_TRANSITION:
-                run.pending = fires
-                continue
-            if mode != run.previous_mode:
-                run.next_step = run.first_step[mode]
-                run.first_step[mode] = 0.0
-            run.last_step = 0.0
-            run.stage = STALE
         remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
-            fired = arrived(model, run, work)
+            fired = arrived(model, run, task.work)
             if fired == NO_TRANSITION:
                 return DONE
             run.pending = parts.first_in_order(task, fired)
             continue
-        if recording and record.steps + 1 >= record.step_phase.shape[0]:
-            return RECORD_FULL
-        if 0 < record.grazing_phase.shape[0] == record.grazings:
+        if is_full(task.record):
             return RECORD_FULL
         if run.steps >= max_steps:
             return MAX_STEPS
-        if model.propagator[mode] == RUNGE_KUTTA:
-            code, span = parts.runge_kutta_step(task, remaining)
-        else:
-            code, span = series_step(task, remaining)
-            if code == NON_FINITE and is_forced(model, mode):
-                # Terms of the series overflow far from a pulse, ``cosh`` in ``1 / cosh``; the field does not.
-                run.stage = STALE
-                code, span = parts.runge_kutta_step(task, remaining)
-                run.stage = STALE
+        mode = run.mode
+        code, span = step(parts, task, remaining)
         if code != GO_ON:
             return int(code)
         forward(run, model.period, span)
         run.since_entry += span
         if task.orthonormal != 0 and 0.0 < span < remaining:
-            keep_apart(model, run, mode, task.tangents, work.jacobian)
+            keep_apart(model, run, mode, task.tangents, task.work.jacobian)
         fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
