@@ -43,6 +43,34 @@ def shaken_table():
     )
 
 
+def fall(t, x, p):
+    return x.v, -p.g
+
+
+def height(t, x, p):
+    return x.q
+
+
+def rebound(t, x, p):
+    return 0.0, -p.e * x.v
+
+
+FLIGHT = Mode("flight", fall)
+BOUNCE = Transition("flight", "flight", Guard(height, -1), Reset(rebound), name="bounce")
+
+
+def ball(**changes):
+    """The bouncing ball, made of functions that can be pickled, with other parts."""
+    parts = {
+        "state": ("q", "v"),
+        "parameters": {"g": 9.81, "e": 0.8},
+        "modes": [FLIGHT],
+        "transitions": [BOUNCE],
+        "name": "ball",
+    }
+    return HybridSystem(**{**parts, **changes})
+
+
 PENDULUM = pendulum()
 BALL_SYSTEM = bouncing_ball()
 OSCILLATOR_SYSTEM = impact_oscillator()

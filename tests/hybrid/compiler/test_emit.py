@@ -18,6 +18,7 @@ from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, STATE, named_values
+from tests.hybrid.systems import ball
 from tests.hybrid.text import called
 
 
@@ -84,23 +85,6 @@ def central_difference(system, function, t, x, h=1e-5):
 def mode_system(field, *, state=("q", "v"), parameters=None, jacobian=None):
     parameters = {} if parameters is None else parameters
     return HybridSystem(state=state, parameters=parameters, modes=[Mode("a", field, jacobian=jacobian)])
-
-
-def ball():
-    return HybridSystem(
-        state=("q", "v"),
-        parameters={"g": 9.81, "e": 0.8},
-        modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
-        transitions=[
-            Transition(
-                "flight",
-                "flight",
-                Guard(lambda t, x, p: x.q, direction=-1),
-                Reset(lambda t, x, p: (0.0, -p.e * x.v)),
-                name="bounce",
-            )
-        ],
-    )
 
 
 def hertz_field(t, x, p):

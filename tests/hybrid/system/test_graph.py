@@ -10,33 +10,7 @@ import pytest
 import hybrid
 import models
 from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition
-
-
-def field(t, x, p):
-    return x.v, -p.g
-
-
-def down(t, x, p):
-    return x.q
-
-
-def flip(t, x, p):
-    return 0.0, -p.e * x.v
-
-
-FLIGHT = Mode("flight", field)
-BOUNCE = Transition("flight", "flight", Guard(down, -1), Reset(flip), name="bounce")
-
-
-def ball(**changes):
-    parts = {
-        "state": ("q", "v"),
-        "parameters": {"g": 9.81, "e": 0.8},
-        "modes": [FLIGHT],
-        "transitions": [BOUNCE],
-        "name": "ball",
-    }
-    return HybridSystem(**(parts | changes))
+from tests.hybrid.systems import BOUNCE, FLIGHT, ball, fall, height, rebound
 
 
 def bounce(**changes):
@@ -45,20 +19,20 @@ def bounce(**changes):
 
 CONSTRUCTION = [
     (lambda: Guard("q"), "Guard: function must be a function of (t, x, p); got 'q'."),
-    (lambda: Guard(down, 2), "Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got 2."),
-    (lambda: Guard(down, gradient=3), "Guard: gradient must be a function of (t, x, p); got 3."),
+    (lambda: Guard(height, 2), "Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got 2."),
+    (lambda: Guard(height, gradient=3), "Guard: gradient must be a function of (t, x, p); got 3."),
     (lambda: Reset(None), "Reset: function must be a function of (t, x, p); got None."),
-    (lambda: Reset(flip, jacobian=1), "Reset: jacobian must be a function of (t, x, p); got 1."),
-    (lambda: Mode("", field), "Mode: name must be a non-empty string; got ''."),
+    (lambda: Reset(rebound, jacobian=1), "Reset: jacobian must be a function of (t, x, p); got 1."),
+    (lambda: Mode("", fall), "Mode: name must be a non-empty string; got ''."),
     (lambda: Mode("flight", 1.0), "Mode: field must be a function of (t, x, p); got 1.0."),
-    (lambda: Mode("flight", field, jacobian=2), "Mode: jacobian must be a function of (t, x, p); got 2."),
-    (lambda: Transition("a", "b", down), "Transition: guard must be a Guard; got <function down"),
+    (lambda: Mode("flight", fall, jacobian=2), "Mode: jacobian must be a function of (t, x, p); got 2."),
+    (lambda: Transition("a", "b", height), "Transition: guard must be a Guard; got <function height"),
     (
-        lambda: Transition("a", "b", Guard(down), flip),
+        lambda: Transition("a", "b", Guard(height), rebound),
         "reset must be a Reset or None (identity); got <function",
     ),
-    (lambda: Transition(1, "b", Guard(down)), "Transition: source must be a non-empty string; got 1."),
-    (lambda: Transition("a", "", Guard(down)), "Transition: target must be a non-empty string; got ''."),
+    (lambda: Transition(1, "b", Guard(height)), "Transition: source must be a non-empty string; got 1."),
+    (lambda: Transition("a", "", Guard(height)), "Transition: target must be a non-empty string; got ''."),
     (lambda: ball(state="qv"), "state must be a tuple of names or a number of components; got 'qv'. Write"),
     (lambda: ball(state=0), "state needs at least one component; got 0."),
     (lambda: ball(state=()), "state needs at least one component; got an empty sequence."),
@@ -70,7 +44,7 @@ CONSTRUCTION = [
     (lambda: ball(parameters={"g": "big"}), "parameter 'g' must be a number; got 'big'."),
     (lambda: ball(parameters={"g": np.nan}), "parameter 'g' must be finite; got nan."),
     (lambda: ball(modes=[]), "HybridSystem: at least one mode is needed; got none."),
-    (lambda: ball(modes=[field]), "each mode must be a Mode; got <function field"),
+    (lambda: ball(modes=[fall]), "each mode must be a Mode; got <function fall"),
     (lambda: ball(transitions=[FLIGHT]), "each transition must be a Transition; got Mode("),
     (lambda: ball(modes=[FLIGHT, FLIGHT]), "mode names must differ; given twice: flight. Give each mode"),
     (lambda: ball(transitions=[BOUNCE, BOUNCE]), "transition names must differ; given twice: bounce."),
@@ -83,7 +57,7 @@ CONSTRUCTION = [
         "Transition 'bounce': source mode 'ground' does not exist. Modes: flight.",
     ),
     (
-        lambda: ball(modes=[FLIGHT, Mode("rest", field)]),
+        lambda: ball(modes=[FLIGHT, Mode("rest", fall)]),
         "no transition joins mode 'flight' to the others. Modes: flight, rest. Add a transition",
     ),
     (lambda: ball(modes=[Mode("flight", lambda x, p: x)]), "Mode 'flight': field must take (t, x, p); got a"),
@@ -200,7 +174,7 @@ def test_evolve():
     moon = attrs.evolve(system, parameters={"g": 1.62, "e": 0.8}, name="moon")
     assert moon.graph.name == "moon"
     assert moon.modes == system.modes
-    ground = [Mode("air", field)]
+    ground = [Mode("air", fall)]
     renamed = attrs.evolve(system, modes=ground, transitions=bounce(source="air", target="air"))
     assert renamed.mode_names == ("air",)
     with pytest.raises(ModelError, match="source mode 'flight' does not exist"):
@@ -208,9 +182,9 @@ def test_evolve():
 
 
 def test_markers():
-    assert Transition("a", "a", Guard(down)).is_marker
+    assert Transition("a", "a", Guard(height)).is_marker
     assert not BOUNCE.is_marker
-    assert not Transition("a", "b", Guard(down)).is_marker
+    assert not Transition("a", "b", Guard(height)).is_marker
 
 
 def test_a_system_is_shown_as_a_table():

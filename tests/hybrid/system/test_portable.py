@@ -10,19 +10,8 @@ import pytest
 import hybrid
 import lyapunov
 import models
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
-
-
-def fall(t, x, p):
-    return x.v, -p.g
-
-
-def height(t, x, p):
-    return x.q
-
-
-def rebound(t, x, p):
-    return 0.0, -p.e * x.v
+from hybrid import Guard, HybridSystem, Transition
+from tests.hybrid import systems
 
 
 def second(p):
@@ -30,15 +19,7 @@ def second(p):
 
 
 def ball(**changes):
-    parts = {
-        "state": ("q", "v"),
-        "parameters": {"g": 9.81, "e": 0.8},
-        "modes": [Mode("flight", fall)],
-        "transitions": [Transition("flight", "flight", Guard(height, -1), Reset(rebound), name="bounce")],
-        "period": second,
-        "name": "ball",
-    }
-    return HybridSystem(**{**parts, **changes})
+    return systems.ball(**{"period": second, **changes})
 
 
 BALL = ball()
