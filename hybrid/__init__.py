@@ -1,7 +1,7 @@
 """Event-driven simulation and linearisation of hybrid (piecewise-smooth) dynamical systems.
 
-A model is a graph: modes are smooth vector fields, transitions are guards and resets. Compilation, and with
-it the import of the compiler, waits for the first call that needs it.
+A model is a graph: modes are smooth vector fields, transitions are guards and resets. The compiler is
+imported and runs only when a call first needs it.
 """
 
 from hybrid.accuracy.answer import Answer

@@ -1,4 +1,4 @@
-"""``python -m hybrid compile``: compile the kernels ahead, so that no first run has to wait for them."""
+"""``python -m hybrid compile``: compile the kernels in advance, so that the first run does not wait."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hybrid.compiler.cache.folder import cache_directory
 from hybrid.compiler.cache.loader import ALL_KERNELS, is_kept
 from hybrid.display.progress import progress_bar
 
-# Seconds between two looks at what has been compiled.
+# Seconds between two checks of the progress.
 LOOK = 0.3
 
 
 def parser() -> argparse.ArgumentParser:
-    """Options of the command line."""
+    """Parser of the command line."""
     options = argparse.ArgumentParser(prog="python -m hybrid", description=__doc__)
     commands = options.add_subparsers(dest="command", required=True)
     compiling = commands.add_parser("compile", help="compile the kernels that all models share")
@@ -32,9 +32,9 @@ def parser() -> argparse.ArgumentParser:
 
 
 def compile_kernels(processes: int) -> list[str]:
-    """Have every kernel that is not on disk yet compiled, by several processes; returns those that failed."""
+    """Compile every kernel that is not on disk yet, in several processes; returns those that failed."""
     missing = [module for module in ALL_KERNELS if not is_kept(module)]
-    # Modules share functions, which each process compiles once.
+    # Modules share functions, which each process compiles only once: hence one process per share.
     shares = [missing[i :: max(1, processes)] for i in range(max(1, processes))]
     running = [_compiling(share) for share in shares if share]
     done: set[str] = set()

@@ -1,7 +1,7 @@
-"""Checks of arguments: each returns the value as the library works with it, or raises an ArgumentError.
+"""Checks of arguments: each returns the value in the library's form, or raises an ArgumentError.
 
-Every text begins with the name of the argument and says what is allowed and what was given. Nothing is taken
-for a number that is none: no text, no truth value, no complex number.
+Every error text begins with the name of the argument and says what is allowed and what was given. Strings,
+booleans and complex numbers are not accepted as numbers.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _short.maxstring = _short.maxother = 100
 
 
 def shown(value: object) -> str:
-    """A value as error texts show it: long ones are cut."""
+    """A value as error texts show it; long values are shortened."""
     return _short.repr(value)
 
 
 def refusal(name: str, wanted: str, value: object) -> ArgumentError:
-    """The error for an argument that must be something else."""
+    """The error for a value that is not allowed; ``wanted`` says what is."""
     return ArgumentError(f"{name} must {wanted}; got {shown(value)}.")
 
 
@@ -44,7 +44,7 @@ def number(name: str, value: object) -> float:
 
 
 def positive(name: str, value: object, wanted: str = "be positive", *, infinite: bool = False) -> float:
-    """A number above zero, infinity only if it is allowed."""
+    """A number above zero; infinity only if ``infinite``."""
     found = _as_float(value)
     if found is None or not found > 0 or not (infinite or isfinite(found)):
         raise refusal(name, wanted, value)
@@ -52,7 +52,7 @@ def positive(name: str, value: object, wanted: str = "be positive", *, infinite:
 
 
 def not_negative(name: str, value: object, wanted: str = "be at least 0", *, infinite: bool = False) -> float:
-    """A number of at least zero, infinity only if it is allowed."""
+    """A number of at least zero; infinity only if ``infinite``."""
     found = _as_float(value)
     if found is None or not found >= 0 or not (infinite or isfinite(found)):
         raise refusal(name, wanted, value)
@@ -77,7 +77,7 @@ def flag(name: str, value: object) -> bool:
 
 
 def numbers(name: str, value: object, wanted: str) -> np.ndarray:
-    """Numbers as a new array of floats, of the shape in which they come."""
+    """Numbers as a new array of floats, with their shape."""
     found = floats(value)
     if found is None:
         raise refusal(name, wanted, value)
@@ -105,7 +105,7 @@ def time_span(name: str, value: object) -> tuple[float, float]:
 
 
 def increasing_times(name: str, value: object, t0: float, t1: float) -> np.ndarray:
-    """Times ``(N,)`` in order, within ``[t0, t1]``; equal ones may follow each other."""
+    """Times ``(N,)`` within ``[t0, t1]`` that never decrease; equal times are allowed."""
     times = numbers(name, value, "be increasing times of shape (N,)")
     if times.ndim != 1:
         raise ArgumentError(f"{name} must be increasing times of shape (N,); got shape {times.shape}.")
@@ -122,7 +122,7 @@ def increasing_times(name: str, value: object, t0: float, t1: float) -> np.ndarr
         )
     if times.size and not (times[0] >= t0 and times[-1] <= t1):
         raise ArgumentError(
-            f"{name} must lie in t_span, [{t0}, {t1}]; they run from {times[0]} to {times[-1]}."
+            f"{name} must lie in t_span, [{t0}, {t1}]; got times from {times[0]} to {times[-1]}."
         )
     return times
 
@@ -137,17 +137,17 @@ def mapping(name: str, value: object, wanted: str = "map names to numbers") -> d
 
 
 def items(name: str, value: object, wanted: str) -> list[Any]:
-    """The items of a collection, which a text or a number is not."""
+    """The items of a collection; a string is not a collection here."""
     if not isinstance(value, Iterable) or isinstance(value, str | bytes):
         raise refusal(name, wanted, value)
     try:
         return list(value)
-    except TypeError:  # an array of no dimension
+    except TypeError:  # a zero-dimensional array
         raise refusal(name, wanted, value) from None
 
 
 def instance(name: str, value: object, kind: type[Kind], hint: str = "") -> Kind:
-    """An object of a class; ``hint`` says where it comes from."""
+    """An object of a class; ``hint`` says how to get one."""
     if isinstance(value, kind):
         return value
     article = "an" if kind.__name__[0] in "AEIO" else "a"
@@ -172,7 +172,7 @@ def one_of(name: str, value: object, allowed: tuple[Any, ...]) -> Any:
 
 
 def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
-    """A name that exists; ``what`` opens the text for one that does not and ``kind`` heads the list."""
+    """A name that exists; in the error text ``what`` comes first and ``kind`` heads the list of names."""
     names = list(allowed)
     if not isinstance(value, str) or value not in names:
         raise ArgumentError(unknown_name(what, value, names, kind))
@@ -180,7 +180,7 @@ def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
 
 
 def _as_float(value: object) -> float | None:
-    """A real number as a float, infinite if it is too large for one; None for all else."""
+    """A real number as a float (infinity if it is too large); None for anything else."""
     if type(value) is float:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
@@ -194,7 +194,7 @@ def _as_float(value: object) -> float | None:
 
 
 def floats(value: object) -> np.ndarray | None:
-    """Real numbers as a new array of floats; None if there is anything else among them."""
+    """Real numbers as a new array of floats; None if any item is not a real number."""
     if isinstance(value, np.ndarray):
         if value.dtype.kind in "fiu" and not np.ma.is_masked(value):
             return np.array(value, dtype=float)

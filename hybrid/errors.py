@@ -1,4 +1,4 @@
-"""Errors that say what is wrong, which part, what was given, what is allowed and what to do."""
+"""Errors of the library; a text names the part, what is wrong, what is allowed and the next step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class HybridError(Exception):
 
 
 class ModelError(HybridError, ValueError):
-    """A model, or what a call asks of it, does not make sense; the text says how to mend it."""
+    """A model, or a call that uses it, is invalid; the text says how to fix it."""
 
 
 class ArgumentError(ModelError):
@@ -19,7 +19,7 @@ class ArgumentError(ModelError):
 
 
 def unknown_name(what: str, name: object, allowed: Iterable[str], kind: str) -> str:
-    """Text for a name that does not exist: lists those that do and the nearest of them.
+    """Error text for an unknown name: lists the existing names and suggests the closest one.
 
     ``what`` opens the sentence (``"Transition 'impact': target mode"``), ``kind`` heads the list.
     """

@@ -38,8 +38,8 @@ class StatusCode(IntEnum):
 class Status:
     """Code, message and remedy of a result.
 
-    ``status.ok`` is true only for a complete and valid one. What was computed before a run ended early is in
-    the result all the same.
+    ``status.ok`` is true only for a complete and valid result. If a run ended early, the result holds
+    everything that was computed before.
     """
 
     code: StatusCode
@@ -60,16 +60,17 @@ NAME_THE_LIMIT = (
     "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
 )
 DECLARE_PERIOD = (
-    "This mode depends on time, and late times are rounded coarsely. If its forcing has a period, declare "
+    "This mode depends on time, and large times are rounded coarsely. If its forcing is periodic, declare "
     "the period with HybridSystem(period=...): the phase of the forcing then keeps all its digits."
 )
 SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
 
 
 def run_status(code: int, where: str, transition: str | None, *, bare_time: bool) -> Status:
-    """Status of a run that ended with a kernel code, after a transition (or None).
+    """Status for the code with which the kernel ended a run.
 
-    ``bare_time`` says that the mode depends on time and no forcing period is declared.
+    ``transition`` names the last transition, if any. ``bare_time`` says that the mode depends on time and no
+    forcing period is declared.
     """
     if code == StatusCode.SUCCESS:
         return SUCCESS
@@ -85,25 +86,26 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         ),
         StatusCode.STEP_TOO_SMALL: (
             f"No step was small enough for the tolerance {where}.",
-            "Loosen rtol and atol; a singular or discontinuous field wants a transition there."
+            "Loosen rtol and atol; if the field is singular or discontinuous there, add a transition."
             + (f" {DECLARE_PERIOD}" if bare_time else ""),
         ),
         StatusCode.NON_FINITE: (
             f"The field or the state became infinite or nan {where}.",
-            "Check the model there; a field must be defined a little beyond the guards that end its mode.",
+            "Check the model there; a field must also be defined slightly beyond the guards of its mode.",
         ),
         StatusCode.ACCUMULATION: (
-            f"After {last} the state rests on its guard {where} and is pushed through it: jumps of "
-            "length zero accumulate.",
+            f"After {last} the state rests on its guard {where} and the field pushes it through the guard: "
+            "jumps with no time between them accumulate.",
             NAME_THE_LIMIT,
         ),
         StatusCode.INTERRUPTED: (
             f"Interrupted {where}.",
-            "What was computed so far is in the result. Go on from that time, state and mode, or call again.",
+            "The result holds everything up to that time. Continue from its last time, state and mode, or "
+            "call again.",
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",
-            "The model goes no further: that transition has no target.",
+            "That transition has no target mode, so the run stops there.",
         ),
     }
     kind = StatusCode(code)
@@ -111,45 +113,45 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
 
 
 def chatter_status(where: str, names: Sequence[str]) -> Status:
-    """Status of a run that ended in the limit of jumps of these transitions, in turn."""
+    """Status of a run that ended at the limit of chatter; the named transitions fire in turn."""
     told = f"transition {names[0]!r}" if len(names) == 1 else "transitions " + ", ".join(map(repr, names))
     in_turn = "" if len(names) == 1 else " in turn"
     return Status(
         StatusCode.ACCUMULATION,
-        f"Jumps of {told}{in_turn} accumulate {where}: the flights between them shorten by a steady ratio, "
-        "and infinitely many take a finite time.",
+        f"Jumps of {told}{in_turn} accumulate {where}: the times between jumps shrink by a constant ratio, "
+        "so infinitely many jumps take a finite time.",
         NAME_THE_LIMIT,
     )
 
 
 def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) -> Status:
-    """Status of a run in which transitions go round at one instant, in the order in which they fire.
+    """Status of a run whose transitions, given in firing order, repeat endlessly at one instant.
 
-    ``facing`` says that two modes send the state back to each other across one guard.
+    ``facing`` says that two modes send the state back to each other across the same guard.
     """
     names = ", ".join(repr(transition.name) for transition in transitions)
-    message = f"Jumps follow one another without end {where}: {names}, and again from the first on."
+    message = f"Jumps repeat endlessly {where}: {names}, then the first again."
     if facing:
         return Status(
             StatusCode.STUCK,
-            f"{message[:-1]}: the fields on both sides point at the guard.",
+            f"{message[:-1]}: the fields on both sides point towards the guard.",
             "Add a sliding mode, or derive one with hybrid.filippov.",
         )
     return Status(
         StatusCode.STUCK,
-        f"{message} Each one takes the state beyond the guard of the next.",
-        "Change the resets so that one of them leaves the state on the near side of these guards, or give a "
-        "guard a condition (when=).",
+        f"{message} Each jump takes the state beyond the guard of the next.",
+        "Change the resets so that one of them leaves the state before the next guard, or give a guard a "
+        "condition (when=).",
     )
 
 
 def discontinuous_status(jumps: Mapping[str, str]) -> Status:
-    """Status of a run with tangent vectors in a system whose fields jump: where, by the name of the mode."""
+    """Status of a run with tangent vectors if fields jump; ``jumps`` maps modes to the places."""
     places = [f"the field of mode {mode!r} jumps where {where}" for mode, where in jumps.items()]
     return Status(
         StatusCode.DISCONTINUOUS_FIELD,
-        f"Reached the end, but {', and '.join(places)}: tangent vectors, and what is made of them, are not "
-        "valid beyond such a jump.",
-        "Make the pieces of the field modes joined by guards there; where they point at each other, "
+        f"Reached the end, but {', and '.join(places)}: tangent vectors, and results computed from them, are "
+        "not valid beyond such a jump.",
+        "Split the field into modes joined by guards there; if the fields point towards each other, "
         "hybrid.filippov derives the sliding mode between them.",
     )

@@ -1,1 +1,1 @@
-"""What a user writes down: the graph of modes and transitions, its variables, functions and checks."""
+"""The model as the user defines it: the graph of modes and transitions, variables, functions, checks."""

@@ -1,4 +1,4 @@
-"""A few calls of every model function when a system is made, to meet a slip where it is made."""
+"""Trial calls of every model function when a system is made, so that mistakes show up early."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from hybrid.system.periodicity import Period, period_at, period_fault
 from hybrid.system.variables import Variables
 
 SAMPLE_TIME = np.float64(0.7548776662466927)
-# Multiples of an irrational number modulo 1 keep the components apart, clear of kinks and symmetries.
+# Multiples of an irrational number modulo 1 give every component another value, away from kinks and
+# symmetries.
 SAMPLE_STRIDE = 0.6180339887498949
 
 
 def check_functions(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
-    """Call every model function at a few generic points and check what comes back.
+    """Call every model function at a few generic points and check the returned values.
 
-    Arithmetic trouble there (a logarithm of a negative number, a division by zero) is no error: the
-    points are arbitrary. Given derivatives are compared with the functions they belong to, and all functions
-    with themselves: called again, and one declared period later.
+    An arithmetic failure there (a logarithm of a negative number, a division by zero) is not an error,
+    because the points are arbitrary. Given derivatives are compared with their functions. Every function is
+    also compared with itself: called again, and one declared period later.
 
     Raises
     ------
@@ -41,13 +42,13 @@ def check_functions(variables: Variables, functions: Sequence[ModelFunction], pe
 
 
 def sample_state(variables: Variables) -> np.ndarray:
-    """The fixed point ``(n,)`` of the probe, in (1/2, 3/2)."""
+    """The fixed state ``(n,)`` of the trial call, with components in (1/2, 3/2)."""
     fractions: np.ndarray = np.mod(SAMPLE_STRIDE * np.arange(1, variables.dimension + 1), 1.0)
     return 0.5 + fractions
 
 
 def derivative_has_time_column(variables: Variables, function: ModelFunction) -> bool:
-    """Whether a given derivative returns ``n + 1`` columns; no, if it cannot be told at the sample point."""
+    """Whether a given derivative returns ``n + 1`` columns; False if it fails at the sample point."""
     assert function.derivative is not None
     value = _call(function.derivative_title, function.derivative, _arguments(variables))
     if value is None:
@@ -71,7 +72,7 @@ def _check_function(variables: Variables, function: ModelFunction) -> None:
 
 
 def _check_pure(variables: Variables, function: ModelFunction) -> None:
-    """The same arguments must give the same values, however often and in whatever order they come."""
+    """Check that the same arguments give the same values in repeated calls."""
     values, points = variables.defaults, [*sample_points(variables.dimension)]
     passes = [[evaluate(variables, function.value, t, x, values) for t, x in points] for _ in range(2)]
     for (t, x), first, second in zip(points, *passes, strict=True):
@@ -79,7 +80,7 @@ def _check_pure(variables: Variables, function: ModelFunction) -> None:
             raise ModelError(
                 f"{function.title} returned {first.tolist()} and, called again with the same arguments "
                 f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
-                "random numbers, no counters, nothing kept between calls."
+                "random numbers, no counters, no memory of earlier calls."
             )
 
 
@@ -99,11 +100,11 @@ def _check_period_function(variables: Variables, period: Callable[..., Any]) -> 
 
 
 def _check_period(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
-    """A declared period must be one at the declared parameters."""
+    """Check the declared period at the default parameters."""
     values = variables.defaults
     try:
         declared = period_at(period, variables, values)
-    except (ArithmeticError, ValueError):  # the run reports it at these parameters
+    except (ArithmeticError, ValueError):  # a run at these parameters reports the error
         return
     fault = None if declared is None else period_fault(variables, functions, values, declared)
     if fault is not None:
@@ -113,7 +114,7 @@ def _check_period(variables: Variables, functions: Sequence[ModelFunction], peri
 def _call(
     title: str, function: Callable[..., Any], arguments: tuple[Any, ...], signature: str = "t, x, p"
 ) -> tuple[Any] | None:
-    """The value in a 1-tuple, or None where the arithmetic fails at the sample point."""
+    """The value in a 1-tuple, or None if the arithmetic fails at the sample point."""
     _check_arity(title, function, arguments, signature)
     try:
         with np.errstate(all="ignore"):
@@ -128,7 +129,7 @@ def _call(
         if isinstance(error, ValueError) and "read-only" in str(error):
             raise ModelError(
                 f"{title} writes into its argument, which is the state of the run: {error}. Take a copy "
-                "first, x = x.copy(), or build the values anew."
+                "first, x = x.copy(), or return new values."
             ) from error
         raise ModelError(
             f"{title} fails when called with ({signature}): {type(error).__name__}: {error}."
@@ -140,7 +141,7 @@ def _check_arity(
 ) -> None:
     try:
         expected = inspect.signature(function)
-    except (TypeError, ValueError):  # some builtins and ufuncs have none to look at
+    except (TypeError, ValueError):  # some builtins and ufuncs have no signature
         return
     try:
         expected.bind(*arguments)
@@ -153,11 +154,11 @@ def _check_value(variables: Variables, function: ModelFunction, value: Any) -> N
         if function.kind == CONDITION:
             if not _is_number(value):
                 raise ModelError(
-                    f"{function.title} must return one number, positive where the guard may fire, or a truth "
-                    f"value; got {value!r}."
+                    f"{function.title} must return one number, positive where the guard may fire, or True or "
+                    f"False; got {value!r}."
                 )
             return
-        # A truth value has no side to cross from and no slope to cross with.
+        # A boolean has no zero crossing and no slope.
         if isinstance(value, bool | np.bool_) or not _is_number(value):
             raise ModelError(f"{function.title} must return one number that changes sign; got {value!r}.")
         return

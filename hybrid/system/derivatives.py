@@ -1,6 +1,6 @@
-"""Numerical derivatives of model functions, to check others against.
+"""Numerical derivatives of model functions, as a reference for given and derived ones.
 
-Every derivative has ``n + 1`` columns, one per state and the one for time last.
+Every derivative has ``n + 1`` columns: one per state, and the last for time.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from hybrid.system.functions import ModelFunction
 from hybrid.system.variables import Variables
 
 COMPLEX_STEP = 1e-30
-# A central difference carried twice, so that its own convergence gives its error.
+# The central difference is taken with this step and half of it; the change estimates the error.
 DIFFERENCE_STEP = 2.0**-16
 
 
 def check_derivative(variables: Variables, function: ModelFunction) -> None:
-    """Compare the derivative a user gives with the complex step of the function, at default parameters.
+    """Compare a given derivative with the complex step of its function, at default parameters.
 
-    The complex step is believed where central differences confirm it (``np.abs`` of a complex number,
-    for one, has no complex derivative); elsewhere the central differences themselves are the measure,
-    to their own accuracy. Points where the function is not finite are passed over.
+    The complex step is used where central differences confirm it (``np.abs``, for example, has no complex
+    derivative). Elsewhere the central differences are the reference, to their own accuracy. Points where
+    the function is not finite are skipped.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def check_derivative(variables: Variables, function: ModelFunction) -> None:
 def complex_step_error(variables: Variables, function: ModelFunction) -> Exception | None:
     """Why the complex step cannot be taken through a function, or None if it can.
 
-    It must run on complex numbers, and agree with central differences.
+    The function must run on complex numbers, and its complex step must agree with central differences.
     """
     values = variables.defaults
     for t, x in sample_points(variables.dimension):
@@ -64,7 +64,7 @@ def complex_step_error(variables: Variables, function: ModelFunction) -> Excepti
 
 
 def sample_points(n: int) -> Iterator[tuple[float, np.ndarray]]:
-    """A few fixed points ``(t, x)`` of size near 1, in the positive orthant first."""
+    """A few fixed points ``(t, x)`` with components of size near 1; all are positive at the first points."""
     rng = np.random.default_rng(20240507)
     for signs in (np.ones(n), np.ones(n), rng.choice([-1.0, 1.0], n), -np.ones(n)):
         yield rng.uniform(0.5, 1.5), signs * rng.uniform(0.5, 1.5, n)
@@ -72,7 +72,7 @@ def sample_points(n: int) -> Iterator[tuple[float, np.ndarray]]:
 
 @attrs.frozen(eq=False)
 class Reference:
-    """Derivative of a model function at a point, and how far to believe it.
+    """Derivative of a model function at a point, with its tolerance.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Reference:
     values, tolerance
         ``(rows, n + 1)``; the tolerance is infinite where the function has a kink or a jump.
     source
-        How it was found, for error texts.
+        The method, for error texts.
     """
 
     t: float
@@ -91,27 +91,27 @@ class Reference:
     source: str
 
     def confirms(self, other: np.ndarray) -> bool:
-        """Whether another derivative agrees; an entry that is nan says nothing against it."""
+        """Whether another derivative agrees; entries that are nan are not compared."""
         return not np.any(np.abs(other - self.values) > self.tolerance)
 
 
 def reference_derivative(
     variables: Variables, function: ModelFunction, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> Reference | None:
-    """Complex step where central differences confirm it, else those; None where the function is not finite.
+    """The complex step if central differences confirm it, else the central differences.
 
-    ``parameters`` is the vector ``(m,)`` of their values.
+    None if the function is not finite at the point. ``parameters`` is the vector ``(m,)`` of values.
     """
     difference = _central_difference(variables, function, t, x, parameters)
     if difference is None:
         return None
     try:
         values = complex_step(variables, function, t, x, parameters)
-    except Exception:  # whatever stops it, the central difference stands in
+    except Exception:  # whatever the cause, the central difference is the fallback
         return difference
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
         return difference
-    # Where a magnitude with a small factor hides its derivative the two differ by that factor.
+    # A term such as 1e-8*abs(x), without a complex derivative, makes the two differ by its small factor.
     tolerance = 1e-9 * (1.0 + np.abs(values)) + 2.0 * np.abs(values - difference.values)
     tolerance[np.isinf(difference.tolerance)] = np.inf
     return Reference(t, x, values, tolerance, "complex step")
@@ -124,13 +124,13 @@ def evaluate(
     x: np.ndarray,
     parameters: np.ndarray,
 ) -> Any:
-    """Values of a model function as a flat array, or None where they do not exist or are not finite."""
+    """Values of a model function as a flat array, or None if the call fails or a value is not finite."""
     assert function is not None
     p = variables.parameter_view(parameters)
     try:
         with np.errstate(all="ignore"):
             values = np.ravel(np.asarray(function(np.float64(t), variables.state_view(x), p), dtype=float))
-    except Exception:  # whatever stops it there, it has no value there
+    except Exception:  # whatever the cause, the function has no value there
         return None
     return values if np.all(np.isfinite(values)) else None
 
@@ -138,14 +138,14 @@ def evaluate(
 def derivative_fault(
     variables: Variables, function: ModelFunction, given: np.ndarray, reference: Reference
 ) -> str | None:
-    """What is wrong with a derivative ``(rows, n)`` or ``(rows, n + 1)``, in words; None if nothing is."""
+    """Error text for a wrong derivative ``(rows, n)`` or ``(rows, n + 1)``; None if it is right."""
     n = variables.dimension
     missing_time = given.shape[1] == n
     full = np.column_stack([given, np.zeros(function.rows)]) if missing_time else given
     wrong = np.abs(full - reference.values) > reference.tolerance
     if not np.any(wrong):
         return None
-    # Look at the states first: a wrong entry there tells more than a missing column.
+    # The states come first: a wrong entry there is more informative than a missing column.
     j, i = (int(k) for k in np.argwhere(wrong.T)[0])
     place = f"t = {reference.t:.6g}, x = ({', '.join(f'{value:.6g}' for value in reference.x)})"
     row = "" if function.size is None else f" of {variables.state_names[i]}"
@@ -158,8 +158,8 @@ def derivative_fault(
     column = (*variables.state_names, "t")[j]
     return (
         f"{function.derivative_title}: entry D_{column}{row} is {full[i, j]:.10g} at {place}; the "
-        f"{reference.source} of the {function.kind} gives {expected}. Fix it, or leave it out: "
-        "the library derives it."
+        f"{reference.source} of the {function.kind} gives {expected}. Fix it, or omit "
+        f"{function.derivative_name}=: the library derives it."
     )
 
 
@@ -177,7 +177,7 @@ def _central_difference(
     size = 1.0 + np.abs(half_central)
     rounding = 1e-10 * np.abs(here).reshape(-1, 1)
     tolerance = 1e-7 * size + rounding + 4.0 * np.abs(half_central - central)
-    # The slopes ahead and behind approach each other with the step, save where the function has a kink.
+    # One-sided slopes approach each other as the step shrinks, except at a kink.
     kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size + rounding)
     tolerance[kink] = np.inf
     return Reference(t, x, (4.0 * half_central - central) / 3.0, tolerance, "central difference")
@@ -192,7 +192,7 @@ def _differences(
     here: np.ndarray,
     h: float,
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Central differences, and how much the slopes ahead and behind differ."""
+    """Central differences, and how much the two one-sided slopes differ."""
     central, bend = [], []
     for shift in h * np.eye(len(x) + 1):
         ahead = evaluate(variables, function.value, t + shift[-1], x + shift[:-1], parameters)
@@ -205,7 +205,7 @@ def _differences(
 
 
 class _ComplexState(np.ndarray):
-    """Gives out Python's complex numbers, which have no order, as in compiled code; NumPy's have one."""
+    """Gives Python's complex numbers, which have no order, as in compiled code; NumPy's have one."""
 
     def __getitem__(self, key: Any) -> Any:
         value = super().__getitem__(key)
@@ -225,7 +225,7 @@ def complex_step(
             z.view(_ComplexState) if isinstance(variables.state, int) else variables.state_view(z.tolist())
         )
         with warnings.catch_warnings(), np.errstate(all="ignore"):
-            # Storing a complex number in a real array drops the derivative, with a mere warning.
+            # A complex number stored in a real array loses the derivative, with only a warning.
             warnings.simplefilter("error", np.exceptions.ComplexWarning)
             values = np.asarray(function.value(complex(t, shift[-1]), state, p), dtype=complex)
         columns.append(np.ravel(values).imag / COMPLEX_STEP)

@@ -1,4 +1,4 @@
-"""What a graph is made of: guards, resets, modes and transitions."""
+"""The elements of a graph: guards, resets, modes and transitions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybrid.errors import ModelError
 from hybrid.system.portable import Portable
 
 Function = Callable[..., Any]
-# Node of the graph that stands for the end of a run.
+# Node of the graph that means the end of a run.
 END = "(end)"
 
 
@@ -42,30 +42,30 @@ def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object
 
 @attrs.frozen
 class Guard(Portable):
-    """A scalar function ``g(t, x, p)``; its transition fires when it crosses zero in its direction.
+    """A scalar function ``g(t, x, p)``; the transition fires when ``g`` crosses zero in ``direction``.
 
     Parameters
     ----------
     function
         ``g(t, x, p)``, one scalar.
     direction
-        -1 fires from positive to negative, +1 from negative to positive, 0 both ways.
+        -1 fires from positive to negative, +1 from negative to positive, 0 in both directions.
     gradient
         Optional ``(D_x g, D_t g)`` as a function of ``(t, x, p)`` that returns ``n + 1`` values, or
-        ``n`` if the guard does not depend on time. Derived from ``function`` when left out.
+        ``n`` if the guard does not depend on time. Derived from ``function`` if omitted.
     when
-        Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if it is positive
-        (or true) there, and is passed as if there were no guard if not. It is asked at crossings and at the
-        entry of the mode only, and need not be continuous.
+        Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if the condition
+        is positive (or true) there, and is ignored otherwise. The condition is evaluated only at crossings
+        and on entry to the mode, and need not be continuous.
     at_start
-        True for a guard whose crossings are not looked for: its transition fires only where a run starts in
-        the mode, beyond the guard by more than rounding. ``direction`` says which side that is.
+        If True, crossings are not searched for: the transition fires only if a run starts in the mode with
+        the state beyond the guard by more than rounding. ``direction`` says which side is beyond.
 
     Raises
     ------
     ModelError
-        If a given function is not callable, ``direction`` is none of -1, 0, +1, or ``at_start`` is no bool or
-        comes without a direction.
+        If a given function is not callable, ``direction`` is not -1, 0 or +1, or ``at_start`` is not a bool
+        or is True while ``direction`` is 0.
     """
 
     function: Function = attrs.field(validator=_callable)
@@ -102,7 +102,7 @@ class Reset(Portable):
         ``R(t, x, p)``, ``n`` values.
     jacobian
         Optional ``(t, x, p)`` function that returns the rows of ``D_x R``, each of ``n`` values, or of
-        ``n + 1`` with ``D_t R`` last. Derived from ``function`` when left out.
+        ``n + 1`` with ``D_t R`` last. Derived from ``function`` if omitted.
 
     Raises
     ------
@@ -121,12 +121,12 @@ class Mode(Portable):
     Parameters
     ----------
     name
-        How transitions refer to it.
+        Name by which transitions refer to the mode.
     field
         ``f(t, x, p)``, one value per state: the time derivative of the state.
     jacobian
         Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, each of ``n`` values, or of
-        ``n + 1`` with ``D_t f`` last. Derived from ``field`` when left out.
+        ``n + 1`` with ``D_t f`` last. Derived from ``field`` if omitted.
 
     Raises
     ------
@@ -157,24 +157,24 @@ def _as_reset(value: Any) -> Reset | None:
 
 @attrs.frozen
 class Transition(Portable):
-    """An edge of the graph: where it leaves from, where it leads, when it fires and what it does.
+    """An edge of the graph: from a source mode to a target mode, with a guard and a reset.
 
-    A transition from a mode to itself without a reset changes nothing and only marks the crossing: a
-    section.
+    A transition from a mode to itself without a reset changes nothing: it only marks a crossing, as a
+    section does.
 
     Parameters
     ----------
     source, target
-        Names of modes; without a target (``None``) the run ends where the transition fires, with the status
+        Names of modes. If the target is ``None``, the run ends where the transition fires, with the status
         ``TERMINAL``.
     guard
-        When it fires.
+        When the transition fires.
     reset
-        What happens to the state there; ``None`` is the identity.
+        Map of the state at the jump; ``None`` is the identity.
     accumulates_to
-        Mode in which the state goes on after infinitely many jumps in finite time (chatter), of this
-        transition alone or of several in turn. One of those in turn is enough to name the mode. Without it a
-        run ends at the limit.
+        Mode in which the run continues after infinitely many jumps in finite time (chatter), of this
+        transition alone or of several in turn. If several fire in turn, only one of them has to name the
+        mode. If none does, the run ends at the limit.
     name
         Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
 
@@ -195,8 +195,8 @@ class Transition(Portable):
     def _check_reset(self, attribute: attrs.Attribute[Reset | None], value: object) -> None:
         if value is not None and self.target is None:
             raise ModelError(
-                f"Transition {self.source}->{END}: nothing follows a reset where there is no target. "
-                "Leave the reset out, or name a target mode."
+                f"Transition {self.source}->{END}: a reset has no effect without a target. "
+                "Omit the reset, or name a target mode."
             )
 
     @accumulates_to.validator
@@ -204,7 +204,7 @@ class Transition(Portable):
         if value is not None and self.target is None:
             raise ModelError(
                 f"Transition {self.source}->{END}: accumulates_to={value!r} is for transitions whose jumps "
-                "may accumulate, and this one ends the run. Leave it out, or name a target mode."
+                "may accumulate, and this one ends the run. Omit it, or name a target mode."
             )
 
     @name.default
@@ -213,5 +213,5 @@ class Transition(Portable):
 
     @property
     def is_marker(self) -> bool:
-        """Whether it changes neither mode nor state, and so only marks a crossing."""
+        """Whether the transition changes neither mode nor state, and only marks a crossing."""
         return self.source == self.target and self.reset is None

@@ -1,4 +1,4 @@
-"""The functions of a model, each with the derivative that may come with it and the words to name it by."""
+"""The functions of a model, each with its optional derivative and its names in error texts."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class ModelFunction:
     Parameters
     ----------
     owner
-        Whose it is, as an error text begins: ``"Mode 'flight'"``.
+        Mode or transition of the function, as error texts begin: ``"Mode 'flight'"``.
     kind, derivative_name
-        What the function and its derivative are called: ``"field"`` and ``"jacobian"``.
+        Names of the function and its derivative, for example ``"field"`` and ``"jacobian"``.
     value, derivative
-        The user's functions of ``(t, x, p)``; ``derivative`` is None where it is to be derived. A condition
-        has none.
+        The user's functions of ``(t, x, p)``; ``derivative`` is None if the library derives it, and for a
+        condition, which has no derivative.
     size
         Number of values, or None for a scalar.
     """
@@ -43,12 +43,12 @@ class ModelFunction:
 
     @property
     def title(self) -> str:
-        """How an error text about the function begins."""
+        """Beginning of error texts about the function."""
         return f"{self.owner}: {self.kind}"
 
     @property
     def derivative_title(self) -> str:
-        """How an error text about the derivative begins."""
+        """Beginning of error texts about the derivative."""
         return f"{self.owner}: {self.derivative_name}"
 
 
@@ -65,14 +65,14 @@ def guard_function(transition: Transition) -> ModelFunction:
 
 
 def condition_function(transition: Transition) -> ModelFunction | None:
-    """The condition of a guard, None if it has none."""
+    """The condition of a transition's guard; None without a condition."""
     if transition.guard.when is None:
         return None
     return ModelFunction(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
 
 
 def reset_function(transition: Transition, dimension: int) -> ModelFunction | None:
-    """The reset of a transition, None if that is the identity."""
+    """The reset of a transition; None for the identity."""
     reset = transition.reset
     if reset is None:
         return None

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 TRANSITION_COLUMNS = ("transition", "from", "to", "guard", "condition", "reset", "limit of chatter")
-# Columns of text in a terminal.
+# Width of a terminal, in characters.
 WIDTH = 100
 GUARD_SIDES = {-1: "falls", 0: "either way", 1: "rises"}
 
@@ -55,19 +55,19 @@ class HybridSystem(Portable):
 
     Model functions are plain Python on scalars, ``f(t, x, p)``, with ``x.q`` and ``p.e`` by name and
     NumPy functions for mathematics. They must be pure: they are traced once, not called in the loop. A field
-    should be smooth: tangent vectors are not valid beyond a jump of it inside its mode.
+    should be smooth in its mode: tangent vectors are not valid beyond a jump of the field.
 
     Parameters
     ----------
     state
-        Names of the components, or their number ``n`` (then model functions get a plain array).
+        Names of the components, or their number ``n`` (model functions then get a plain array).
     parameters
         Default values by name; any call may override them.
     modes, transitions
-        Nodes and edges. Among simultaneous crossings the transition listed first fires.
+        Nodes and edges. If guards are crossed at the same time, the transition listed first fires.
     period
         Forcing period, a number or a function of ``p``. Every model function must have this period in
-        ``t``, which is checked; time is then kept as whole periods and a phase.
+        ``t``, which is checked. Time is then stored as a number of whole periods and a phase.
     name
         For reports and figures.
 
@@ -84,7 +84,7 @@ class HybridSystem(Portable):
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
-    # What compile_system makes of the system: it lives as long as the system, and is not part of it.
+    # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
@@ -99,7 +99,7 @@ class HybridSystem(Portable):
         return "\n".join([*heading, "", table(TRANSITION_COLUMNS, rows) if rows else "no transitions"])
 
     def _repr_html_(self) -> str:
-        """The same for a notebook."""
+        """The table of the system for a notebook."""
         heading = "<br>".join(map(escape, self._heading()))
         return f"<p>{heading}</p>\n{html_table(TRANSITION_COLUMNS, self._transition_rows())}"
 
@@ -159,10 +159,10 @@ class HybridSystem(Portable):
 
     @cached_property
     def graph(self) -> nx.MultiDiGraph:
-        """The modes and transitions as a networkx graph, for looking at, checking and drawing.
+        """The modes and transitions as a networkx graph, to inspect, check or draw.
 
-        Nodes carry ``mode``, edges are keyed by the transition's name and carry ``transition``. Transitions
-        that end the run lead to the node ``"(end)"``, which carries no mode.
+        Nodes have the attribute ``mode``. Edges have the transition's name as key and the attribute
+        ``transition``. Transitions that end the run lead to the node ``"(end)"``, which has no mode.
         """
         import networkx as nx
 
@@ -178,20 +178,20 @@ class HybridSystem(Portable):
         return graph
 
     def mode_index(self, name: str) -> int:
-        """Index of a mode; ModelError with the available names if there is none."""
+        """Index of a mode; an unknown name raises a ModelError that lists the modes."""
         if not isinstance(name, str) or name not in self.mode_names:
             raise ModelError(unknown_name("Mode", name, self.mode_names, "Modes"))
         return self.mode_names.index(name)
 
     def transition_index(self, name: str | Transition) -> int:
-        """Index of a transition given by name or object; ModelError with the available names if none."""
+        """Index of a transition, by name or object; a ModelError lists the names if it does not exist."""
         key = name.name if isinstance(name, Transition) else name
         if not isinstance(key, str) or key not in self.transition_names:
             raise ModelError(unknown_name("Transition", key, self.transition_names, "Transitions"))
         return self.transition_names.index(key)
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
-        """Parameter vector ``(m,)`` with the given overrides; ArgumentError for unknown names."""
+        """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
         return self.variables.parameter_values(overrides)
 
     def forcing_period(self, overrides: Mapping[str, float] | None = None) -> float | None:
@@ -210,13 +210,13 @@ class HybridSystem(Portable):
             names = [item.name for item in items]
             if END in names:
                 raise ModelError(
-                    f"HybridSystem: {what} name {END!r} stands for the end of a run. Choose another name."
+                    f"HybridSystem: {what} name {END!r} is reserved for the end of a run. Use another name."
                 )
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise ModelError(
                     f"HybridSystem: {what} names must differ; given twice: {', '.join(twice)}. "
-                    f"Give each {what} a name of its own."
+                    f"Give each {what} its own name."
                 )
         for transition in self.transitions:
             for end in ("source", "target", "accumulates_to"):
@@ -227,7 +227,7 @@ class HybridSystem(Portable):
         self._check_reachable()
 
     def _check_reachable(self) -> None:
-        """A mode that no transition enters or leaves, in a system of several, is a slip of the pen."""
+        """Among several modes, one that no transition enters or leaves is assumed to be a mistake."""
         linked = set()
         for transition in self.transitions:
             ends = {transition.source, transition.target, transition.accumulates_to} - {None}
@@ -236,7 +236,7 @@ class HybridSystem(Portable):
         if len(self.modes) > 1 and lonely:
             raise ModelError(
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
-                f"{', '.join(self.mode_names)}. Add a transition, or make it a system of its own."
+                f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."
             )
 
 

@@ -1,4 +1,4 @@
-"""Whether a declared forcing period is a period of the functions of a model."""
+"""Check that a declared forcing period is a period of the model functions."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from hybrid.system.functions import ModelFunction
 from hybrid.system.variables import Variables
 
 Period = float | Callable[..., Any] | None
-# Where in the period functions are compared, and with which sizes of the state.
+# Functions are compared at these fractions of the period, with the sample states scaled by these sizes.
 PHASES = (0.1180, 0.3651, 0.7487)
 SIZES = (1.0, 1e-2, 1.0, 10.0)
-# A period may be off by this much, relative to it.
+# Relative error allowed in a period.
 LOOSE = 1e-12
-# Spacing of the numbers near one.
+# Spacing of floats near one.
 EPSILON = float(np.finfo(float).eps)
 
 
@@ -29,7 +29,7 @@ def period_at(period: Period, variables: Variables, values: np.ndarray) -> float
     Raises
     ------
     ArgumentError
-        If it is no positive number.
+        If the period is not a positive number.
     """
     if period is None:
         return None
@@ -43,7 +43,7 @@ def period_at(period: Period, variables: Variables, values: np.ndarray) -> float
 def period_fault(
     variables: Variables, functions: Iterable[ModelFunction], values: np.ndarray, period: float
 ) -> str | None:
-    """Which function does not have the declared period at the parameter vector ``(m,)``, in words."""
+    """Error text for the first function without the declared period, or None if all have it."""
     points = [x for _, x in sample_points(variables.dimension)]
     states = [size * x for size, x in zip(SIZES, points, strict=True)]
     for function in functions:
@@ -58,7 +58,7 @@ def period_fault(
 def period_fault_at(
     variables: Variables, function: ModelFunction, t: float, x: np.ndarray, values: np.ndarray, period: float
 ) -> str | None:
-    """How a function differs a period later, in words; None if it does not by more than rounding."""
+    """Error text if a function differs one period later by more than rounding, else None."""
     here = evaluate(variables, function.value, t, x, values)
     there = evaluate(variables, function.value, t + period, x, values)
     if here is None or there is None:
@@ -77,7 +77,7 @@ def period_fault_at(
         return None
     i = int(np.argmax(wrong))
     return (
-        f"HybridSystem: period = {period:.10g} is no period of the functions. {function.title} is "
+        f"HybridSystem: period = {period:.10g} is not a period of the functions. {function.title} is "
         f"{here[i]:.10g} {variables.described(t, x, values)}, and {there[i]:.10g} one period later. Give the "
-        "period as a function of the parameters, period=lambda p: 2*np.pi/p.omega say, or leave it out."
+        "period as a function of the parameters, for example period=lambda p: 2*np.pi/p.omega, or omit it."
     )

@@ -1,4 +1,4 @@
-"""Pickling and copying of models: a model never changes, so a copy is the model itself."""
+"""Pickling and copying of models; models are immutable, so a copy is the model itself."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PICKLERS = (pickle.Pickler, pickle._Pickler)
 
 
 class Portable:
-    """Base of the classes that a model is made of: frozen attrs classes that may hold functions."""
+    """Base of the model's classes: frozen attrs classes that may hold functions."""
 
     __slots__ = ()
 
@@ -49,12 +49,12 @@ class Portable:
 
 
 def _made_again(kind: type[Any], fields: dict[str, Any]) -> Any:
-    """An object from its fields, validated like any other."""
+    """An object from its fields, validated as usual."""
     return kind(**fields)
 
 
 def _pickler_at_work() -> type[Any]:
-    """Class of the pickler that called; the usual one leaves no trace on the stack."""
+    """Class of the pickler that is calling; ``pickle.Pickler`` itself does not appear on the stack."""
     frame: FrameType | None = sys._getframe()
     while frame is not None:
         caller = frame.f_locals.get("self")
@@ -67,6 +67,6 @@ def _pickler_at_work() -> type[Any]:
 def _can_store(pickler: type[Any], function: Callable[..., Any]) -> bool:
     try:
         pickler(io.BytesIO()).dump(function)
-    except Exception:  # of any kind, as each pickler and each callable has its own
+    except Exception:  # each pickler and each callable may raise its own type
         return False
     return True

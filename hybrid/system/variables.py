@@ -1,4 +1,4 @@
-"""States and parameters: their names and number, and the views of them that model functions get."""
+"""States and parameters: names, sizes, and the form in which model functions get them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hybrid.errors import ArgumentError, ModelError, unknown_name
 
 STATE = "State components"
 PARAMETERS = "Parameters"
-# Classes of named values that are kept for the next model of the same names.
+# Number of named-value classes kept for later models with the same names.
 MOST_CLASSES = 256
 
 
@@ -28,7 +28,7 @@ class UnknownComponentError(ModelError, AttributeError):
 
 @lru_cache(MOST_CLASSES)
 def plain_class(kind: str, names: tuple[str, ...]) -> type[Any]:
-    """A bare namedtuple class with the given fields, of the sort that compiled code understands."""
+    """A plain namedtuple class with the given fields, which compiled code supports."""
     return namedtuple(kind.title().replace(" ", ""), names)
 
 
@@ -47,7 +47,7 @@ def named_values(kind: str, names: tuple[str, ...], values: Iterable[Any]) -> An
     Parameters
     ----------
     kind
-        What the names are, in the plural; it heads the list in the error text.
+        Plural noun for the names; it heads the list in the error text.
     names
         Field names, in order.
     values
@@ -100,7 +100,7 @@ class Variables:
         return values
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
-        """Parameter vector ``(m,)`` with the given overrides; ArgumentError for unknown names."""
+        """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
         values = dict(self.parameters)
         for name, number in arguments.mapping("parameters", overrides).items():
             arguments.known("parameters: Parameter", name, values, "Parameters")
@@ -108,12 +108,12 @@ class Variables:
         return np.array(list(values.values()), dtype=float)
 
     def state_values(self, name: str, value: object) -> np.ndarray:
-        """A finite state ``(n,)`` from the argument of that name: numbers in order, or by name.
+        """A finite state ``(n,)`` from the argument ``name``: numbers in order, or a mapping by name.
 
         Raises
         ------
         ArgumentError
-            If it has another shape, a component is missing or unknown, or one is not finite.
+            If the shape is wrong, or a component is missing, unknown or not finite.
         """
         names = self.state_names
         if isinstance(value, Mapping):
@@ -144,7 +144,7 @@ class Variables:
         return found
 
     def state_view(self, values: Any) -> Any:
-        """The state as model functions get it: by name, or a read-only array if it has no names."""
+        """The state as model functions get it: by name, or a read-only array without names."""
         if not isinstance(self.state, int):
             return named_values(STATE, self.state, values)
         view = np.asarray(values).view()
@@ -156,7 +156,7 @@ class Variables:
         return named_values(PARAMETERS, self.parameter_names, values)
 
     def described(self, t: float, x: np.ndarray, values: np.ndarray) -> str:
-        """A point in words, with the parameters that differ from their defaults."""
+        """Text for a point, with the parameters that differ from their defaults."""
         changed = "".join(
             f", {name} = {value:.10g}"
             for (name, declared), value in zip(self.parameters.items(), values, strict=True)
@@ -200,7 +200,7 @@ def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name[0] == "_":
             raise ModelError(
                 f"HybridSystem: {kind} name {name!r} cannot be written as an attribute. Use a Python "
-                "identifier that is no keyword and does not begin with an underscore."
+                "identifier that is not a keyword and does not begin with an underscore."
             )
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

@@ -54,7 +54,7 @@ def test_periodic_functions_of_many_kinds(force):
 
 @pytest.mark.parametrize("period", [4.83, 4.8332, 2 * np.pi / 1.3 * (1 + 1e-9), 2 * np.pi, 1e-3])
 def test_a_wrong_period_is_refused_when_the_system_is_made(period):
-    with pytest.raises(ModelError, match=r"period = .* is no period of the functions. Mode 'a': field is"):
+    with pytest.raises(ModelError, match=r"period = .* is not a period of the functions. Mode 'a': field is"):
         forced(period)
 
 

@@ -342,7 +342,7 @@ class TestModel:
         assert not Transition("a", None, Guard(height)).is_marker
 
     def test_errors(self):
-        with pytest.raises(hybrid.ModelError, match="nothing follows a reset where there is no target"):
+        with pytest.raises(hybrid.ModelError, match="a reset has no effect without a target"):
             Transition("a", None, Guard(height), Reset(lambda t, x, p: (0.0,)))
         with pytest.raises(
             hybrid.ModelError, match="accumulates_to='b' is for transitions whose jumps may accumulate"

@@ -250,7 +250,7 @@ class TestEnds:
         arc = simulate(stuck, (-gap,), (0.0, 3.0), mode="left")
         assert arc.status.code == StatusCode.STUCK
         assert arc.t[-1] == pytest.approx(gap, abs=1e-12)
-        assert "the fields on both sides point at the guard" in arc.status.message
+        assert "the fields on both sides point towards the guard" in arc.status.message
         assert "'left->right'" in arc.status.message
         assert "'right->left'" in arc.status.message
         assert "filippov" in arc.status.remedy

@@ -407,7 +407,7 @@ class TestStuck:
         arc = simulate(system, (0.0, 0.0, 0.0), (0.0, 2.0), mode="a")
         assert arc.status.code == StatusCode.STUCK
         rounds = ("'one', 'two', 'three'", "'two', 'three', 'one'", "'three', 'one', 'two'")
-        assert any(each + ", and again" in arc.status.message for each in rounds)
+        assert any(each + ", then the first again" in arc.status.message for each in rounds)
         assert "fields" not in str(arc.status)
         assert "Change the resets" in arc.status.remedy
 

@@ -216,7 +216,7 @@ class TestNoLimit:
         arc = simulate(system, (1.0, 0.0), (0.0, 5.0))
         assert arc.status.code == StatusCode.ACCUMULATION
         assert "rests on its guard" in arc.status.message
-        assert "pushed through" in arc.status.message
+        assert "pushes it through the guard" in arc.status.message
 
 
 @cache
