@@ -1,4 +1,4 @@
-"""Progress of long work, shown only where it was asked for."""
+"""Progress of long computations, shown only on request."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """What long work reports to."""
+    """Receiver of the progress of a long computation."""
 
     def update(self, n: float = 1) -> object:
         """Count ``n`` more units as done."""
@@ -21,7 +21,7 @@ class _Silent:
 
 @contextmanager
 def progress_bar(total: int, title: str, shown: bool, unit: str = "interval") -> Iterator[Progress]:
-    """A progress bar on standard error, or something as silent as it is cheap."""
+    """A progress bar on standard error, or a silent stand-in if not ``shown``."""
     if not shown:
         yield _Silent()
         return

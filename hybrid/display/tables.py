@@ -7,7 +7,7 @@ from html import escape
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = False) -> str:
-    """Columns of text; with ``numbers`` all but the first are set to the right."""
+    """Columns of text; with ``numbers`` all columns but the first are right-aligned."""
     cells = [list(headings), *map(list, rows)]
     widths = [max(len(row[column]) for row in cells) for column in range(len(headings))]
     lines = []

@@ -1,4 +1,4 @@
-"""Pictures: arcs over time, phase portraits, sections, orbits, graphs of modes, work against precision."""
+"""Plots: arcs over time, phase portraits, sections, orbits, mode graphs, work-precision diagrams."""
 
 from functools import singledispatch
 from typing import Any
@@ -29,7 +29,7 @@ __all__ = [
 
 @singledispatch
 def drawn(result: Any, **options: Any) -> Any:
-    """The picture of a result; register the function that draws a class of results, as below."""
+    """The plot of a result; register the function that draws a class of results, as below."""
     if callable(getattr(result, "plot", None)):
         return result.plot(**options)
     wanted = "be a system, an arc, a section, an orbit, a spectrum or a chart"
@@ -43,18 +43,18 @@ drawn.register(PeriodicOrbit, plot_orbit)
 
 
 def plot(result: Any, **options: Any) -> Any:
-    """Draw a system or a result by the function that fits it.
+    """Draw a system or a result with the function for its type.
 
     An arc is drawn by :func:`plot_arc`, a system by :func:`plot_graph`, a section by :func:`plot_section`,
-    a periodic orbit by :func:`plot_orbit`; a spectrum or a chart by those of ``lyapunov.plot``; anything else
-    that has a method ``plot`` by that.
+    and a periodic orbit by :func:`plot_orbit`. A spectrum or a chart is drawn by ``lyapunov.plot``, and any
+    other object by its method ``plot``.
 
     Parameters
     ----------
     result
         What to draw.
     **options
-        Those of the function that draws it, such as ``ax=``.
+        Options of the function that draws the result, such as ``ax=``.
 
     Returns
     -------
@@ -63,6 +63,6 @@ def plot(result: Any, **options: Any) -> Any:
     Raises
     ------
     ArgumentError
-        If there is no picture of such a thing.
+        If there is no plot for this type of object.
     """
     return drawn(result, **options)

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 JUMP_COLOUR = "0.35"
-# Each step of the solver is drawn in this many parts at first, which are halved as often as this while their
-# middles lie off the straight line by more than this share of the picture.
+# Each step of the solver is first drawn in FIRST_PARTS parts. A part is halved, at most MOST_HALVINGS times,
+# while its middle is off the straight line by more than the fraction SMOOTH of the arc's extent.
 FIRST_PARTS, MOST_HALVINGS, SMOOTH = 4, 8, 1e-3
 
 
@@ -33,9 +33,9 @@ def plot_arc(
     Parameters
     ----------
     arc
-        From :func:`hybrid.simulate`; between steps it is drawn from its dense output.
+        From :func:`hybrid.simulate`; its dense output, if it has one, refines the curves between the steps.
     components
-        Names or indices of the state's components, all by default.
+        Names or indices of the state's components; by default all.
     ax
         Axes to draw into, one per component; by default those of a new figure.
 
@@ -47,7 +47,7 @@ def plot_arc(
     Raises
     ------
     ArgumentError
-        If a component does not exist, or the number of axes differs from that of components.
+        If a component does not exist, or the number of axes differs from the number of components.
     """
     names = _as_arc(arc).system.state_names
     chosen = range(len(names)) if components is None else _components(names, components)
@@ -75,7 +75,7 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
     Parameters
     ----------
     arc
-        From :func:`hybrid.simulate`; between steps it is drawn from its dense output.
+        From :func:`hybrid.simulate`; its dense output, if it has one, refines the curves between the steps.
     x, y
         Names or indices of the state's components.
     ax
@@ -124,7 +124,7 @@ def _components(names: Sequence[str], components: object) -> list[int]:
 
 
 def _lines(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Times and states of each mode visited, its stays separated by a row of nan."""
+    """Times and states per visited mode; a row of nan separates the visits."""
     parts: defaultdict[int, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
     cuts = np.flatnonzero(np.diff(arc.j)) + 1
     gap = (np.array([np.nan]), np.full((1, arc.system.dimension), np.nan))
@@ -139,13 +139,13 @@ def _lines(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
 
 
 def _refined(arc: HybridArc, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same points, with more between them where the dense output bends away from the straight line."""
+    """The points, with points from the dense output added where it deviates from straight lines."""
     if arc._pieces is None or len(t) < 2:
         return t, x
     part = np.linspace(0, 1, FIRST_PARTS + 1)[:-1]
     times = np.append((t[:-1, None] + np.diff(t)[:, None] * part).ravel(), t[-1])
     states = arc(times)
-    # The dense output gives the state after a jump, and the last point is that before it.
+    # At a jump the dense output gives the state after it, but the last point is the state before it.
     states[::FIRST_PARTS] = x
     size = np.ptp(arc.x, axis=0)
     size[size == 0.0] = np.inf
@@ -167,12 +167,12 @@ def _refined(arc: HybridArc, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _with_gaps(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """``before, after, nan`` for each jump, so that one line draws them all."""
+    """``before, after, nan`` for each jump, so that one line draws all jumps."""
     return np.column_stack([before, after, np.full(len(before), np.nan)]).ravel()
 
 
 def _shade(ax: Axes, lines: dict[int, tuple[np.ndarray, np.ndarray]]) -> None:
-    """Tint the background wherever the mode is not the first."""
+    """Shade the background except in the first mode."""
     for mode, (t, _) in lines.items():
         if mode == 0:
             continue

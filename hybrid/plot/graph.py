@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.axes import Axes
 
-# Arrows of a guard's direction.
+# Arrows for the direction of a guard.
 DIRECTIONS = {-1: "↓", 0: "↕", 1: "↑"}
-# Degrees between the loops of one mode.
+# Angle between the loops of one mode, in degrees.
 FAN = 60.0
 LABEL: dict[str, Any] = {"fontsize": 10, "bbox": {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}}
 
 
 def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
-    """Draw the mode graph: modes as boxes, transitions as arrows that say how their guard crosses zero.
+    """Draw the mode graph: modes as boxes, transitions as arrows, with the directions of their guards.
 
-    An upward arrow marks a guard that rises through zero, a downward one a guard that falls; dashed edges
-    reset the state. Modes have the colours they have in the other pictures; a dot is the end of a run.
+    A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. Dashed
+    edges reset the state. Modes have the same colours as in the other plots. A dot is the end of a run.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
             continue
         bend = 0.28 + 0.3 * parallel[ends]
         parallel[ends] += 1
-        # Among many modes edges cross near their middles, so their labels stand before.
+        # With many modes the edges cross near their middles, so the labels are placed nearer the source.
         _draw_edge(
             ax,
             transition,
@@ -80,7 +80,7 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
 
 
 def _places(graph: nx.MultiDiGraph) -> dict[str, np.ndarray]:
-    """One mode or two in a row, more of them on a circle."""
+    """Places of the nodes: one or two in a row, more on a circle."""
     import networkx as nx
 
     if len(graph) <= 2:
@@ -116,7 +116,7 @@ def _draw_edge(
     along: float,
     boxes: Sequence[Any],
 ) -> None:
-    """A bent arrow between two boxes, with its label at the part ``along`` of its Bezier curve."""
+    """A bent arrow between two boxes, with its label at the fraction ``along`` of its Bezier curve."""
     start, end = places
     style = {
         **_arrow(transition),
@@ -134,13 +134,13 @@ def _draw_edge(
 
 
 def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float) -> None:
-    """A loop of fixed size, in points, that leaves and enters the box on the side of ``angle``."""
+    """A loop of fixed size, in points, that leaves and enters the box on the side at ``angle``."""
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.path import Path
     from matplotlib.transforms import Affine2D, ScaledTranslation
 
     out, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
-    # Where a ray meets the box, half as wide as the name and its margins.
+    # Distance at which a ray leaves the box, whose width follows from the name and its margins.
     foot = min((3.6 * len(transition.source) + 9) / max(abs(out[0]), 1e-9), 15 / max(abs(out[1]), 1e-9)) + 2
     far = foot + 46
     vertices = [
@@ -183,7 +183,7 @@ def _label(transition: Transition) -> str:
 
 
 def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:
-    """Limits with room for labels and loops, and nothing else to see."""
+    """Set limits with room for labels and loops, and hide the axes."""
     low, high = places.min(axis=0), places.max(axis=0)
     row = high[1] - low[1] < 1e-9
     ax.set_xlim(low[0] - 0.7, high[0] + 0.7)

@@ -26,7 +26,7 @@ def plot_section(
     section
         From :func:`hybrid.stroboscopic_section` or :func:`hybrid.poincare_section`.
     x, y
-        Names or indices of the components, by default the first two; the only component of a state is drawn
+        Names or indices of the components; by default the first two. A state with one component is drawn
         over time.
     ax
         Axes to draw into; by default those of a new figure.
@@ -70,7 +70,7 @@ def plot_orbit(
     orbit
         From :func:`hybrid.periodic_orbit`.
     x, y
-        Names or indices of the components, by default the first two.
+        Names or indices of the components; by default the first two.
     ax
         Axes to draw into; by default those of a new figure.
 
@@ -96,7 +96,7 @@ def plot_orbit(
 
 
 def _second(dimension: int, first: int) -> int | None:
-    """The component to draw over the first one; None if there is no other."""
+    """The component to draw over the component ``first``; None if there is no other."""
     if dimension == 1:
         return None
     return first + 1 if first + 1 < dimension else first - 1

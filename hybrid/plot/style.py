@@ -1,4 +1,4 @@
-"""What all pictures share: colours, axes and legends. Matplotlib is imported when one is drawn."""
+"""Shared parts of all plots: colours, axes and legends; matplotlib is imported only when needed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybrid.errors import ArgumentError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's palette, told apart with any colour vision, the faintest hues last: a colour a mode.
+# One colour per mode: the palette of Okabe and Ito, distinguishable with any colour vision, faint hues last.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 
@@ -22,7 +22,7 @@ def as_component(name: str, names: Sequence[str], component: object) -> int:
     if isinstance(component, int | np.integer) and not isinstance(component, bool):
         if not -len(names) <= component < len(names):
             raise ArgumentError(
-                f"{name}: State component {component} does not exist; the state has {len(names)}."
+                f"{name}: State component {component} does not exist; the state has {len(names)} components."
             )
         return int(component) % len(names)
     return list(names).index(
@@ -31,7 +31,7 @@ def as_component(name: str, names: Sequence[str], component: object) -> int:
 
 
 def check_axes(value: object) -> None:
-    """ArgumentError if an argument ``ax`` is neither None nor axes of matplotlib."""
+    """Raise an ArgumentError if an argument ``ax`` is neither None nor matplotlib axes."""
     if value is not None:
         _as_axes(value)
 
@@ -43,7 +43,7 @@ def _as_axes(value: object) -> Axes:
 
 
 def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) -> np.ndarray:
-    """The axes given, or a new figure's, as an array of ``count``."""
+    """The given axes, or those of a new figure, as an array of ``count``."""
     if ax is None:
         import matplotlib.pyplot as plt
 
@@ -58,17 +58,17 @@ def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) ->
 
 
 def colour_of(mode: int) -> str:
-    """The colour of the mode of that index."""
+    """The colour of the mode with this index."""
     return COLOURS[mode % len(COLOURS)]
 
 
 def plain(ax: Axes) -> None:
-    """Leave out the frame above and to the right."""
+    """Hide the frame at the top and on the right."""
     ax.spines[["top", "right"]].set_visible(False)
 
 
 def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
-    """Name the modes above the axes, if there is more than one."""
+    """Add a legend of ``modes`` above the axes, if the system has more than one."""
     if len(names) < 2:
         return
     from matplotlib.lines import Line2D
@@ -85,5 +85,5 @@ def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
 
 
 def dot_area(count: int) -> float:
-    """Area of each of so many dots in square points: a few can be seen, and many do not merge."""
+    """Area of each dot in square points: larger for few dots, smaller for many."""
     return float(np.clip(4000 / max(count, 1), 0.6, 20.0))

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MARKERS = "osD^vP*"
-# Height of a line of small text in points, to keep labels apart.
+# Height of a line of small text in points, which keeps labels apart.
 LABEL_HEIGHT = 9.0
 
 
 class Measurement(Protocol):
-    """What is drawn: times and errors of methods, as :func:`hybrid.work_precision` measures them."""
+    """The data to draw: times and errors of methods, as measured by :func:`hybrid.work_precision`."""
 
     @property
     def methods(self) -> Sequence[str]:
@@ -37,7 +37,7 @@ class Measurement(Protocol):
         ...
 
     def rows_of(self, method: str) -> np.ndarray:
-        """Which rows are those of a method, as a mask."""
+        """Mask of the rows that belong to a method."""
         ...
 
     def error_of(self, quantity: str) -> np.ndarray:
@@ -93,10 +93,10 @@ def plot_work_precision(result: Measurement, quantity: str = "state", *, ax: Axe
 
 
 def _label_ends(ax: Axes, ends: list[tuple[float, float, str, str]]) -> None:
-    """Names to the right of their points, pushed apart where one would cover another."""
+    """Write the methods' names to the right of their points, moved apart so that none overlap."""
     figure = ax.get_figure(root=True)
     assert figure is not None
-    # Limits before the layout, or it would shift what the labels were placed by.
+    # The limits must be set before the layout: it would shift the points that the labels refer to.
     low, high = ax.get_xlim()
     ax.set_xlim(low, high * (high / low) ** 0.45)
     figure.draw_without_rendering()

@@ -1,4 +1,4 @@
-"""Integration methods, one file each."""
+"""Integration methods, one per file."""
 
 from hybrid.solvers.dop853 import DOP853
 from hybrid.solvers.radau import RadauIIA

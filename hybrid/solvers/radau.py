@@ -1,4 +1,4 @@
-"""Radau IIA: implicit, of order 5, for stiff modes."""
+"""Radau IIA: implicit method of order 5 for stiff modes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _E = np.array([-13 - 7 * _ROOT, -13 + 7 * _ROOT, -1.0]) / 3
 
 
 def _with_start(rows: np.ndarray) -> np.ndarray:
-    """Weights of the three stages with that of the derivative at the start, zero, in front."""
+    """Weights of the three stages, preceded by a zero weight of the derivative at the start."""
     return np.hstack([np.zeros((len(rows), 1)), rows])
 
 
@@ -44,14 +44,14 @@ class RadauIIA(Solver):
 
         K_i = f\Bigl(t + c_i h,\; x + h \sum_j a_{ij} K_j\Bigr), \qquad x(t + h) = x + h \sum_j b_j K_j
 
-    Stable however stiff the mode (L-stable) and exact on its slow manifold to the order (stiffly accurate).
-    The state's stages are found by a simplified Newton iteration with the model's own Jacobian, those of the
-    tangent vectors by one more linear solve, exactly. The interpolant is the collocation polynomial, of order
-    3 between the steps; events are landed on with the order of the step.
+    The method is L-stable (stable however stiff the mode) and stiffly accurate (it keeps its order on the
+    slow manifold). The stages of the state come from a simplified Newton iteration with the model's Jacobian.
+    The stages of the tangent vectors come from one more linear solve, without iteration. The interpolant is
+    the collocation polynomial, of order 3 within a step; at events the state has the order of the step.
 
-    The tolerances bound the error of the interpolant too, so that no event is missed between two steps; the
-    steps' ends are far more accurate: ``rtol = 1e-7`` here is there about as good as 1e-10 of an explicit
-    pair. A fast transient is resolved, not stepped over.
+    The tolerances also bound the error of the interpolant, so that no event is missed within a step. At the
+    ends of steps the error is far smaller: there ``rtol = 1e-7`` is about as accurate as 1e-10 with an
+    explicit pair. Fast transients are resolved, not stepped over.
 
     References
     ----------

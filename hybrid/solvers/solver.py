@@ -1,4 +1,4 @@
-"""What all solvers share: tolerances, limits, and what the driver of the kernels is handed."""
+"""Base class of the solvers: tolerances, limits, and the coefficients that the kernels use."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ if TYPE_CHECKING:
 class Solver:
     """Abstract base of the solvers; use one of its subclasses.
 
-    A solver of one's own is a subclass with a ``tableau``. One that is no explicit pair names the kernel that
-    attempts its steps, too.
+    To add a solver, write a subclass with a ``tableau``. If it is not an explicit pair, it also names the
+    kernel that attempts its steps.
 
-    The error estimate of every component ``i`` of the state is kept below ``atol + rtol |x_i|`` in the root
-    mean square. Tangent vectors are under the same control, each by itself: their components are kept below
-    ``rtol (|v_i| + rms(v))``.
+    The error estimates of the state, divided by ``atol + rtol |x_i|`` for each component ``i``, are kept
+    below 1 in the root mean square. Each tangent vector is controlled separately in the same way, with the
+    scale ``rtol (|v_i| + rms(v))``.
 
     Parameters
     ----------
     rtol, atol
-        Relative and absolute tolerance a step; ``atol`` in the units of the state.
+        Relative and absolute tolerance per step; ``atol`` in the units of the state.
     max_step
         Longest step, in units of time.
     max_steps
-        Most steps a run may try before it ends with a status.
+        Most steps a run may try before it ends with the status ``MAX_STEPS``.
 
     Raises
     ------
     ArgumentError
-        If a value is not positive, ``rtol`` is below 1e-15 or above 1, or ``max_steps`` is not whole.
+        If a value is not positive, ``rtol`` is below 1e-15 or above 1, or ``max_steps`` is not an integer.
     """
 
     # Coefficients, error estimate and interpolant.
@@ -52,7 +52,7 @@ class Solver:
 
     @property
     def series_order(self) -> int:
-        """Order of Taylor series in the modes that have them; 0 if every mode goes by the tableau."""
+        """Order of Taylor series in the modes that have them; 0 if all modes use the tableau."""
         return 0
 
     def __attrs_post_init__(self) -> None:
@@ -60,7 +60,7 @@ class Solver:
         rtol = arguments.positive(f"{name}: rtol", self.rtol)
         if rtol < 1e-15:
             raise ArgumentError(
-                f"{name}: rtol = {rtol} is below what double precision can follow. Use 1e-15 or more."
+                f"{name}: rtol = {rtol} is too small for double precision. Use 1e-15 or more."
             )
         if rtol > 1:
             raise ArgumentError(f"{name}: rtol = {rtol} allows errors larger than the state. Use 1 or less.")

@@ -1,4 +1,4 @@
-"""The numbers that make a Runge-Kutta method, in the arrangement its kernel wants."""
+"""The coefficients of a Runge-Kutta method, in the layout that its kernel needs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 Row = Mapping[int, float]
 
-# Places of a step, and the weights of an integral over it, at which a series is compared with its field.
+# Places in a step where a series is compared with its field, and the weights of an integral over the step.
 SERIES_NODES = (1 - np.cos(np.pi * np.arange(6) / 5)) / 2
 SERIES_WEIGHTS = np.linalg.solve(np.vander(SERIES_NODES, increasing=True).T, 1 / np.arange(1.0, 7.0))
 
@@ -19,20 +19,20 @@ SERIES_WEIGHTS = np.linalg.solve(np.vander(SERIES_NODES, increasing=True).T, 1 /
 class Tableau:
     """Butcher tableau of a method with an error estimate and an interpolant.
 
-    With ``s`` stages for the step, ``S >= s + 1`` in all (row ``s`` is the derivative at the new point) and
-    an interpolant of degree ``d``. The step's stages are 0 to ``s - 1`` for an explicit pair; 1 to ``s`` for
-    an implicit method, whose row 0 is the derivative at the start.
+    There are ``s`` stages for the step, ``S >= s + 1`` stages in all (row ``s`` is the derivative at the new
+    point) and an interpolant of degree ``d``. The step's stages are 0 to ``s - 1`` for an explicit pair, and
+    1 to ``s`` for an implicit method, whose row 0 is the derivative at the start.
 
     Parameters
     ----------
     order
         Order of the step.
     error_order
-        Order of the error estimate: the step length follows its power ``-1 / error_order``.
+        Order of the error estimate: the step length varies as the estimate to the power ``-1 / error_order``.
     a, b, c
         ``(S, S)``, ``(s,)``, ``(S,)``.
     error, second_error
-        ``(s + 1,)`` each; the second is zero for pairs with one estimate.
+        ``(s + 1,)`` each; the second is zero for methods with one estimate.
     interpolant
         ``(d + 1, S)``: Bernstein coefficients over the step are ``y0 + h interpolant @ stages``.
     implicit
@@ -57,13 +57,13 @@ class Tableau:
 
     @property
     def nodes(self) -> np.ndarray:
-        """Places of the step, from 0 to 1, at which the method looks at a function of time alone."""
+        """Places in the step, from 0 to 1, at which the method evaluates a function of time only."""
         counts = (self.quadrature != 0) | (self.error != 0) | (self.second_error != 0)
         return np.unique([0.0, 1.0, *self.c[: len(counts)][counts]])
 
     @property
     def powers(self) -> np.ndarray:
-        """``(d + 1, S)``: the interpolant is ``y0`` and ``h`` times these on the powers of ``theta``."""
+        """``(d + 1, S)``: the interpolant is ``y0`` plus ``h`` times these with the powers of ``theta``."""
         degree = len(self.interpolant) - 1
         differences = [
             [comb(degree, k) * comb(k, j) * (-1) ** (k - j) for j in range(degree + 1)]
@@ -73,7 +73,7 @@ class Tableau:
 
 
 def dense(rows: Sequence[Row], width: int) -> np.ndarray:
-    """Rows given as ``{column: value}`` as a matrix ``(len(rows), width)``."""
+    """Matrix ``(len(rows), width)`` from rows given as ``{column: value}``."""
     matrix = np.zeros((len(rows), width))
     for i, row in enumerate(rows):
         for j, value in row.items():

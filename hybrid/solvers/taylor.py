@@ -1,4 +1,4 @@
-"""Taylor series generated from the model: exact where a mode allows it, of variable step elsewhere."""
+"""Taylor series generated from the model: exact if a mode allows it, else with variable steps."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Tableau
 
 LOWEST_SERIES_ORDER = 12
-# What a contact loses by the longer steps of higher orders is felt by its energy first.
+# Higher orders take longer steps, whose errors show first in the energy of a contact.
 HIGHEST_SERIES_ORDER = 28
-# Orders beyond those of the fewest operations per unit of time: a step has costs of its own.
+# Orders added to the order with the fewest operations per unit of time, since each step has a fixed cost.
 MORE_ORDERS = 6
 
 
 @attrs.frozen
 class Taylor(Solver):
-    r"""The default: each mode is advanced by what fits it.
+    r"""The default solver: each mode is advanced by the method that suits its field.
 
-    - A mode whose field is affine in the state, with constant coefficients and polynomial, harmonic or
-      exponential forcing, is advanced by its series to rounding, whatever the tolerances, in steps as long as
-      the series allows: **exact**. Where the solutions are polynomials a step is a whole flight.
-    - A mode whose field has half-integer powers of a guard, such as a Hertz contact, is advanced on a clock
-      of its own, ``dt = w ds`` with ``w`` the square root of the guard. Everything is smooth there, entry
-      and exit included: **desingularised**. Where the rate of the guard has ``w`` as a factor too,
-      such as the level of a tank that empties, ``h' = -sqrt(h)``, the root is smooth in time and is followed.
-    - Any other mode with an analytic field is advanced by its **Taylor series**, of an order and with steps
-      that follow from the tolerances (Jorba and Zou 2005, section 3).
-    - What is left, fields that cannot be traced or have kinks inside the mode, by the **Runge-Kutta pair**
-      DOP853.
+    - **Exact**: the field is affine in the state, with constant coefficients and polynomial, harmonic or
+      exponential forcing. Its series is summed to rounding, whatever the tolerances, in steps as long as
+      the series allows. If the solutions are polynomials, one step covers the whole time between jumps.
+    - **Desingularised**: the field has half-integer powers of a guard, as in a Hertz contact. The mode is
+      advanced in its own time ``s``, ``dt = w ds`` with ``w`` the square root of the guard, in which the
+      solution is smooth, also at entry and exit. If the rate of the guard also has the factor ``w``, as for
+      the level of a tank that empties, ``h' = -sqrt(h)``, the root is smooth in time, and is integrated.
+    - **Taylor series**: any other analytic field. Order and steps follow from the tolerances (Jorba and Zou
+      2005, section 3).
+    - **Runge-Kutta pair** DOP853: fields that cannot be traced or have kinks inside the mode.
 
-    ``print(hybrid.compile_system(system))`` says which mode got what, and why. Guards are isolated on their
-    own series; in exact modes no crossing can be missed that rounding does not hide.
+    ``print(hybrid.compile_system(system))`` shows the method of each mode, and the reason. Crossings are
+    isolated on the guards' own series; in exact modes no crossing is missed unless rounding hides it.
 
-    The recurrences follow from the traced expressions. The tolerances bound the last terms of the state as
-    those of :class:`DOP853` bound its error estimate, and a tenth of ``rtol`` those of the tangent vectors.
+    The recurrences follow from the traced expressions. The tolerances bound the last terms of the state's
+    series as those of :class:`DOP853` bound its error estimate; the bound for tangent vectors is a tenth of
+    ``rtol``.
 
     References
     ----------
@@ -52,7 +52,7 @@ class Taylor(Solver):
     def series_order(self) -> int:
         """Order of the series in nonlinear modes.
 
-        Where a step of length 1/e of the convergence radius would meet the tolerance, the series alone would
-        cost least; some orders more make it longer.
+        The series alone costs least at the order for which a step of 1/e of the convergence radius meets the
+        tolerance. A few orders more make the steps longer.
         """
         return min(HIGHEST_SERIES_ORDER, max(LOWEST_SERIES_ORDER, ceil(-log(self.rtol)) + MORE_ORDERS))

@@ -57,7 +57,7 @@ _POWERS = (
 
 @attrs.frozen
 class Tsit5(Solver):
-    """Explicit pair of order 5(4) by Tsitouras, whose last stage is the first of the next step.
+    """Explicit pair of order 5(4) by Tsitouras; the last stage is the first stage of the next step.
 
     References
     ----------

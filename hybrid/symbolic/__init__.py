@@ -1,1 +1,1 @@
-"""From a Python function to an expression, and what can be proved of expressions."""
+"""Conversion of Python functions to expressions, and properties proved from expressions."""

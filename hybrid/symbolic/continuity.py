@@ -1,7 +1,7 @@
-"""Where a field jumps: found in its expression, unless it is proved that the jump has no size.
+"""Search for jumps of a field in its expression; jumps proved to have size zero are left out.
 
-A field that jumps on a surface of the state bends its tangent vectors there as a transition does, with no
-matrix to tell how. What jumps at given times, whatever the state, bends none.
+If a field jumps on a surface in state space, tangent vectors change there as at a transition, but no
+saltation matrix is known. A jump at a fixed time, independent of the state, leaves tangent vectors unchanged.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ ROUNDING = (Floor, Ceiling, Truncate)
 REMAINDERS = (Remainder, TruncatedRemainder)
 JUMPS = (Less, LessEqual, Sign, Step, *ROUNDING, *REMAINDERS, Atan2)
 UNKNOWN = frozenset((sympy.nan, sympy.zoo, sympy.oo))
-# A constant this much smaller than the terms that it is the sum of is rounding.
+# A constant smaller than this fraction of the terms it is the sum of counts as rounding.
 SMALL = 1e-12
-# Floats are taken for multiples of this part of pi.
+# Floats are recognised as multiples of pi divided by this number.
 PARTS_OF_PI = 12
 
 
 def jumps_of(field: Iterable[sympy.Expr], states: Sequence[sympy.Symbol]) -> list[str]:
-    """Where entries of a field are not proved continuous in the states, in words, ``x[0]`` the first."""
+    """Surfaces where a field is not proved continuous in the states, in words (``x[0]`` is the first)."""
     found: dict[str, None] = {}
     with distribute(True):
         for entry in field:
@@ -78,12 +78,12 @@ def _surfaces(entry: sympy.Expr, states: Sequence[sympy.Symbol]) -> list[str]:
 
 
 def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Expr, sympy.Dummy]) -> bool:
-    """Whether the entry is the same on both sides of where an atom jumps."""
+    """Whether the entry is proved to have the same value on both sides of an atom's jump."""
     step = sympy.Dummy(integer=True)
     surface, sides = _sides(atom, step)
     if surface is None:
         return False
-    # Atoms of one surface jump together.
+    # Atoms with the same surface jump together.
     together: list[tuple[sympy.Expr, tuple[sympy.Expr, sympy.Expr]]] = []
     for other in names:
         other_surface, other_sides = _sides(other, step)
@@ -95,7 +95,7 @@ def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Exp
     ours = {each for each, _ in together}
     bare = _replaced(surface, {}, names)
     for old, new in _substitutions(bare):
-        # Some of the other atoms are known where this one jumps: q < 1 where q = 0.
+        # The values of some other atoms are known where this atom jumps: q < 1 holds where q = 0.
         known = {
             other: side
             for other in names
@@ -111,10 +111,10 @@ def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Exp
 
 
 def _substitutions(surface: sympy.Expr) -> Iterator[tuple[sympy.Expr, sympy.Expr]]:
-    """What to put for what, so that a surface vanishes."""
+    """Substitutions ``old, new`` that make a surface's expression zero."""
     variables = [each for each in symbols_of(surface) if each.name == "t" or each.name.startswith("x[")]
     for variable in sorted(variables, key=sympy.default_sort_key):
-        # A slope that depends on the state may vanish, where the surface has another sheet.
+        # A slope that depends on the state may vanish; the surface may then have another sheet.
         slope = surface.diff(variable)
         if slope != 0 and not mentions(slope, variables) and not contains(slope, sympy.Dummy):
             yield variable, sympy.expand(variable - surface / slope)
@@ -131,7 +131,7 @@ def _known_side(
     old: sympy.Expr,
     new: sympy.Expr,
 ) -> sympy.Expr | None:
-    """What an atom is with one expression put for another, if its side is known then."""
+    """The value of an atom after a substitution, or None if its side is still unknown."""
     if isinstance(atom, (*ROUNDING, *REMAINDERS, Atan2)):
         return None
     surface, sides = _sides(atom, step)
@@ -144,7 +144,7 @@ def _known_side(
 
 
 def _sides(atom: sympy.Expr, step: sympy.Symbol) -> tuple[sympy.Expr | None, tuple[sympy.Expr, sympy.Expr]]:
-    """An expression that vanishes where the atom jumps, and what the atom is below and above."""
+    """An expression that vanishes where the atom jumps, and the atom's values below and above."""
     nothing = (ZERO, ZERO)
     if isinstance(atom, Atan2):
         return atom.args[0], (-sympy.pi, sympy.pi)
@@ -159,7 +159,7 @@ def _sides(atom: sympy.Expr, step: sympy.Symbol) -> tuple[sympy.Expr | None, tup
         surface = atom.args[0] - step
         if isinstance(atom, Ceiling):
             return surface, (step, step + 1)
-        # Truncation jumps like the floor on the positive side, and like the ceiling on the negative one.
+        # Truncation jumps like the floor at positive arguments and like the ceiling at negative ones.
         return (surface, (step - 1, step)) if isinstance(atom, Floor) else (None, nothing)
     if isinstance(atom, Remainder):
         a, b = atom.args
@@ -169,7 +169,7 @@ def _sides(atom: sympy.Expr, step: sympy.Symbol) -> tuple[sympy.Expr | None, tup
 
 @once
 def _with_exact_turns(expression: sympy.Expr) -> sympy.Expr:
-    """The expression with multiples of pi for floats that stand for them in sines and cosines."""
+    """The expression with exact multiples of pi for their floats in sines, cosines and tangents."""
     if not expression.args:
         return expression
     args = [_with_exact_turns(argument) for argument in expression.args]
@@ -186,7 +186,7 @@ def _turns(number: sympy.Float) -> sympy.Expr:
 
 
 def _ratio(one: sympy.Expr, other: sympy.Expr) -> float:
-    """The constant ratio of two expressions, 0 if they have none."""
+    """The ratio of two expressions if it is constant, else 0."""
     if one == other:
         return 1.0
     ratio = sympy.cancel(one / other)
@@ -198,15 +198,15 @@ def _replaced(
     values: Mapping[sympy.Expr, sympy.Expr],
     names: Mapping[sympy.Expr, sympy.Dummy],
 ) -> sympy.Expr:
-    """The expression with values for some atoms, and for all other atoms names of unknown value."""
+    """The expression with values for some atoms, and symbols for all other atoms."""
     return replaced(expression, {**names, **values})
 
 
 @once
 def _without_choices(expression: sympy.Expr) -> sympy.Expr:
-    """Choices and connectives as polynomials in their conditions, which are 0 or 1.
+    """The expression with choices and connectives as polynomials in their conditions, which are 0 or 1.
 
-    What holds on a surface only, an equality, does not hold beside it.
+    An equality counts as false, because it holds only on a surface and not beside it.
     """
     if not expression.args:
         return expression
@@ -226,7 +226,7 @@ def _without_choices(expression: sympy.Expr) -> sympy.Expr:
 
 
 def _truth(raw: sympy.Expr, value: sympy.Expr) -> sympy.Expr:
-    """0 or 1 for a condition; a number is true but where it vanishes."""
+    """0 or 1 for a condition; a number counts as true, since it is zero only on a surface."""
     is_truth = isinstance(raw, And | Or | Not | Equal | Less | LessEqual | sympy.Dummy)
     if is_truth or value in (ZERO, ONE):
         return value
@@ -244,7 +244,7 @@ def _is_zero(expression: sympy.Expr) -> bool:
 
 
 def _coefficients(expression: sympy.Expr) -> list[sympy.Expr]:
-    """Numbers in front of the terms of a sum; a term that is no number times something has 1."""
+    """Numerical coefficients of the terms of a sum; 1 for a term without a number."""
     return [term.as_coeff_Mul()[0] for term in sympy.Add.make_args(expression) if term != 0]
 
 
@@ -260,7 +260,7 @@ def _told(atom: sympy.Expr) -> str:
     return f"{atom.args[0]} = 0"
 
 
-# What jumps among the functions that compiled code may call.
+# Functions with jumps that compiled code may call.
 JUMPING_NAMES = frozenset(
     {
         "argmax", "argmin", "bool", "ceil", "copysign", "digitize", "divmod", "fix", "floor",
@@ -268,15 +268,15 @@ JUMPING_NAMES = frozenset(
         "searchsorted", "select", "sign", "signbit", "trunc", "where",
     }
 )  # fmt: skip
-# By these a complex number tells its real part, which can be compared.
+# These turn a complex number into a real one, which can be compared.
 REAL_PARTS = frozenset({"real", "abs", "absolute", "hypot"})
 
 
 def may_jump(function: Callable[..., Any], differentiable: bool) -> bool:
-    """Whether a function that could not be traced may jump, judged by its code.
+    """Whether a function that could not be traced may jump, judged from its bytecode.
 
-    ``differentiable`` is whether it runs on complex numbers, which have no order: then it does not branch on
-    the state, unless by way of the real parts.
+    ``differentiable`` says that the function runs on complex numbers. Those have no order, so the function
+    can branch on the state only through real parts.
     """
     codes = codes_of(function)
     names = {name for code in codes for name in code.co_names}
@@ -305,7 +305,7 @@ def _decides(code: CodeType) -> bool:
 
 
 def _calls_others(function: Callable[..., Any], names: Iterable[str]) -> bool:
-    """Whether it calls functions that are neither Python's nor NumPy's, and so are not looked into."""
+    """Whether the function calls functions other than Python's and NumPy's, whose code is not examined."""
     if not isinstance(function, FunctionType):
         return True
     cells = [cell.cell_contents for cell in function.__closure__ or ()]

@@ -1,6 +1,6 @@
-"""Derivatives of expressions by the chain rule: all partial ones at once, or one along a vector.
+"""Derivatives of expressions by the chain rule: all partial derivatives, or one along a vector.
 
-SymPy's own ``diff`` walks an expression once for each variable and asks about assumptions at every node. Here
+SymPy's own ``diff`` walks an expression once per variable and queries assumptions at every node. Here
 every node is differentiated once.
 """
 
@@ -22,8 +22,8 @@ def jacobian_of(
 ) -> list[list[sympy.Expr]]:
     """Rows of the derivatives of ``expressions`` with respect to ``variables`` (states, then time).
 
-    At a kink ``np.maximum`` and ``np.minimum`` take half of either slope, ``np.abs`` none; piecewise
-    constant functions have slope zero.
+    At a kink ``np.maximum`` and ``np.minimum`` have the mean of both slopes, ``np.abs`` has slope zero.
+    Piecewise constant functions have slope zero.
     """
     with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
         rows = partial_derivatives(expressions, list(variables))
@@ -40,16 +40,16 @@ def partial_derivatives(
 
 
 def divergence(field: Sequence[sympy.Expr], variables: Sequence[sympy.Symbol]) -> sympy.Expr:
-    """Sum of the derivatives of each rate in its own variable."""
+    """Divergence of a field: the sum of the derivatives of each rate in its own variable."""
     return sympy.Add(*(row[i] for i, row in enumerate(partial_derivatives(field, variables))))
 
 
 @once
 def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distributed: bool) -> Partials:
-    """The partial derivatives that are not zero; ``distributed`` is how SymPy treats numbers times sums.
+    """The nonzero partial derivatives; ``distributed`` is SymPy's setting for numbers times sums.
 
-    Those of an expression are the same objects each time. Two that are only equal are compared branch by
-    branch, for as long as a tree of them takes.
+    The same expression always gives the same objects: SymPy compares equal expressions that are different
+    objects branch by branch, as trees, which is slow.
     """
     if expression.is_Symbol:
         return {expression: ONE} if expression in wanted else {}
@@ -83,7 +83,7 @@ def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distribut
 def directional(
     expressions: Iterable[sympy.Expr], seeds: dict[sympy.Symbol, sympy.Symbol]
 ) -> list[sympy.Expr]:
-    """Derivatives along the seeds, one for each symbol, in a form that keeps common factors together."""
+    """Derivatives along a vector, with one seed per symbol; common factors stay together."""
     found: dict[sympy.Expr, sympy.Expr] = {}
     return [interned(_along(expression, seeds, found)) for expression in expressions]
 
@@ -115,7 +115,7 @@ def _along(
 def _with_factor(
     factor: sympy.Expr, before: tuple[sympy.Expr, ...], behind: tuple[sympy.Expr, ...]
 ) -> sympy.Expr:
-    """A product with one factor put in its place."""
+    """The product of a factor with those before and behind it."""
     if factor is ONE and len(before) + len(behind) == 1:
         [other] = (*before, *behind)
         return other
@@ -123,11 +123,11 @@ def _with_factor(
 
 
 def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
-    """Derivative of the outermost function in its argument of that index."""
+    """Derivative of the outermost function with respect to the argument ``index``."""
     if expression.is_Pow:
         base, exponent = expression.args
         return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
-    # SymPy would evaluate the other function anew.
+    # fdiff would evaluate the new function again.
     if isinstance(expression, sympy.sin):
         return sympy.cos(expression.args[0], evaluate=False)
     if isinstance(expression, sympy.cos):

@@ -1,7 +1,7 @@
 """SymPy functions with the floating-point meaning of NumPy's: kinks, jumps and choices.
 
 SymPy's own Max, Piecewise, sign and Mod reason about their arguments, which is slow, and rewrite them,
-which can change how they round. These do neither: they fold plain numbers and know their derivative.
+which can change the rounding. The functions here only evaluate numbers and give their derivatives.
 """
 
 # ruff: noqa: D102 - the methods are the hooks that SymPy documents
@@ -20,7 +20,7 @@ from hybrid.symbolic.nodes import contains, interned, once
 ZERO = sympy.Integer(0)
 ONE = sympy.Integer(1)
 HALF = sympy.Rational(1, 2)
-# Numbers to remember.
+# Number of numbers kept in the cache.
 MOST_NUMBERS = 10_000
 
 
@@ -32,7 +32,7 @@ def number(value: Any) -> sympy.Expr:
     return _number(float(value))
 
 
-# The same object each time: what SymPy finds out about a number stays with it.
+# Cached so that equal numbers are one object, which keeps the assumptions that SymPy has derived.
 @lru_cache(maxsize=MOST_NUMBERS)
 def _number(value: float) -> sympy.Expr:
     if math.isfinite(value) and abs(value) < 2.0**50 and (8.0 * value).is_integer():
@@ -41,7 +41,7 @@ def _number(value: float) -> sympy.Expr:
 
 
 def product(*factors: sympy.Expr) -> sympy.Expr:
-    """SymPy's product. Of a number and a symbol or a function it is made without a question to SymPy."""
+    """SymPy's product; a number times a symbol or function is built without SymPy's evaluation."""
     if len(factors) == 2:
         a, b = factors if factors[0].is_Number else factors[::-1]
         if a.is_Number and (b.is_Symbol or b.is_Function) and a is not ZERO and a is not ONE:
@@ -50,7 +50,7 @@ def product(*factors: sympy.Expr) -> sympy.Expr:
 
 
 class RealFunction(sympy.Function):
-    """A real function that folds numbers by ``value``."""
+    """A real function that is evaluated by ``value`` if all arguments are numbers."""
 
     is_real = True
     value: ClassVar[Callable[..., float]]
@@ -63,7 +63,7 @@ class RealFunction(sympy.Function):
 
 
 class PiecewiseConstant(RealFunction):
-    """A function that only changes by jumping."""
+    """A function that is constant between its jumps."""
 
     def fdiff(self, argindex: int = 1) -> sympy.Expr:
         return ZERO
@@ -118,25 +118,25 @@ class Equal(PiecewiseConstant):
 
 
 class And(PiecewiseConstant):
-    """1 if neither is 0."""
+    """1 if neither argument is 0, else 0."""
 
     value = staticmethod(lambda a, b: float(bool(a and b)))
 
 
 class Or(PiecewiseConstant):
-    """1 unless both are 0."""
+    """0 if both arguments are 0, else 1."""
 
     value = staticmethod(lambda a, b: float(bool(a or b)))
 
 
 class Not(PiecewiseConstant):
-    """1 if ``a`` is 0."""
+    """1 if ``a`` is 0, else 0."""
 
     value = staticmethod(lambda a: float(not a))
 
 
 class Absolute(RealFunction):
-    """``|u|``, of slope 0 at 0."""
+    """``|u|``, with slope 0 at 0."""
 
     value = staticmethod(abs)
 
@@ -145,7 +145,7 @@ class Absolute(RealFunction):
 
 
 class Maximum(RealFunction):
-    """The larger of two, of slope 1/2 in each where they tie."""
+    """The larger of two, with slope 1/2 in each if they are equal."""
 
     value = staticmethod(max)
 
@@ -155,7 +155,7 @@ class Maximum(RealFunction):
 
 
 class Minimum(RealFunction):
-    """The smaller of two, of slope 1/2 in each where they tie."""
+    """The smaller of two, with slope 1/2 in each if they are equal."""
 
     value = staticmethod(min)
 
@@ -165,7 +165,7 @@ class Minimum(RealFunction):
 
 
 class Remainder(RealFunction):
-    """``a - b*floor(a/b)``, of the sign of ``b``."""
+    """``a - b*floor(a/b)``, with the sign of ``b``."""
 
     value = staticmethod(lambda a, b: a % b if b else math.nan)
 
@@ -174,7 +174,7 @@ class Remainder(RealFunction):
 
 
 class TruncatedRemainder(RealFunction):
-    """``a - b*trunc(a/b)``, of the sign of ``a``."""
+    """``a - b*trunc(a/b)``, with the sign of ``a``."""
 
     value = staticmethod(lambda a, b: math.fmod(a, b) if b else math.nan)
 
@@ -193,7 +193,7 @@ class Atan2(RealFunction):
 
 
 class CubeRoot(RealFunction):
-    """The real cube root, of the sign of ``u``."""
+    """The real cube root, with the sign of ``u``."""
 
     value = staticmethod(lambda u: math.copysign(abs(u) ** (1 / 3), u))
 
@@ -223,13 +223,13 @@ class Gate(RealFunction):
         return None
 
 
-# Functions whose derivative misses the jumps they make: a constant derivative proves nothing about them.
+# Functions whose derivative does not show their jumps: a constant derivative proves nothing about them.
 JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)
 
 
 @once
 def close_gates(expression: sympy.Expr) -> sympy.Expr:
-    """Let a factor that switches a product off win over one that is infinite where it does.
+    """Make products zero where a factor switches them off, even if another factor is infinite there.
 
     The slope of ``max(z, 0)**(1/4)`` is ``max(z, 0)**(-3/4)/4 * Step(z)``: 0 for ``z < 0``, never
     ``inf*0``.

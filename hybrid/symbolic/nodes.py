@@ -1,8 +1,8 @@
-"""Questions about expressions that look at each of their nodes once, however often it is used.
+"""Queries on expressions that visit each node once, however often the node is used.
 
 An expression is a graph: a value that a function uses twice is one node with two uses. SymPy's own ``has``,
-``atoms``, ``xreplace`` and traversals walk it as a tree, and a value that is used twice in each of forty
-rounds of a loop has 2^40 branches there.
+``atoms``, ``xreplace`` and traversals walk the graph as a tree. A value used twice in each of forty rounds of
+a loop gives 2^40 branches there.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from typing import Any, TypeVar
 import sympy
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-# A tree of more operations than this is not expanded: that takes a time that may grow with its square.
+# A tree with more operations than this is not expanded: the time may grow with the square of its size.
 MOST_EXPANDED = 2000
 
 _remembered: list[Any] = []
-# By identity: expressions that have been seen, and the one that stands for all that are equal to it.
+# _seen, by identity: expressions seen so far, each with the one object that represents all equal ones.
 _seen: dict[int, tuple[sympy.Basic, sympy.Basic]] = {}
 _standing: dict[Any, sympy.Basic] = {}
 
 
 def once(function: Function) -> Function:
-    """Remember what a function of nodes returned, until `forget`."""
+    """Cache the results of a function of nodes, until `forget`."""
     remembering: Any = lru_cache(maxsize=None)(function)
     _remembered.append(remembering)
     return remembering
 
 
 def forget() -> None:
-    """Let go of what is remembered: a model has been traced."""
+    """Clear the caches, after a model has been traced."""
     for function in _remembered:
         function.cache_clear()
     _seen.clear()
@@ -39,9 +39,9 @@ def forget() -> None:
 
 
 def interned(expression: Any) -> Any:
-    """The same expression, in which nodes that are equal are one object, also with those of earlier calls.
+    """The expression with equal nodes merged into one object, shared with earlier calls.
 
-    SymPy compares two equal expressions that are different objects branch by branch, as trees.
+    SymPy compares equal expressions that are different objects branch by branch, as trees.
     """
     found = _seen.get(id(expression))
     if found is not None:
@@ -62,7 +62,7 @@ def interned(expression: Any) -> Any:
 
 
 def nodes(*expressions: sympy.Basic) -> Iterator[sympy.Basic]:
-    """Every node of the expressions, once."""
+    """Every node of the expressions, each once."""
     seen: set[sympy.Basic] = set()
     waiting = [*expressions]
     while waiting:
@@ -74,7 +74,7 @@ def nodes(*expressions: sympy.Basic) -> Iterator[sympy.Basic]:
 
 
 def nodes_of(kinds: Any, *expressions: sympy.Basic) -> set[Any]:
-    """The nodes of a class, or of one of several."""
+    """The nodes of a class, or of any of several classes."""
     return {node for node in nodes(*expressions) if isinstance(node, kinds)}
 
 
@@ -87,19 +87,19 @@ def symbols_of(expression: sympy.Basic) -> frozenset[sympy.Symbol]:
 
 
 def mentions(expression: sympy.Basic, symbols: Iterable[sympy.Symbol]) -> bool:
-    """Whether an expression has any of some symbols."""
+    """Whether an expression contains any of the symbols."""
     return not symbols_of(expression).isdisjoint(symbols)
 
 
 @once
 def contains(expression: sympy.Basic, kinds: Any) -> bool:
-    """Whether an expression has a node of these classes."""
+    """Whether an expression contains a node of these classes."""
     return isinstance(expression, kinds) or any(contains(each, kinds) for each in expression.args)
 
 
 @once
 def degree_of(expression: sympy.Basic, variables: frozenset[sympy.Symbol]) -> int | None:
-    """Degree as a polynomial in some variables, before anything cancels; None if it is none."""
+    """Degree as a polynomial in the variables, without cancellation; None if it is not a polynomial."""
     if not mentions(expression, variables):
         return 0
     if isinstance(expression, sympy.Symbol):
@@ -115,13 +115,13 @@ def degree_of(expression: sympy.Basic, variables: frozenset[sympy.Symbol]) -> in
 
 @once
 def operations_of(expression: sympy.Basic) -> int:
-    """Operations of an expression that is written out as a tree."""
+    """Number of operations of an expression written out as a tree."""
     args = expression.args
     return max(1, len(args) - 1) + sum(map(operations_of, args)) if args else 0
 
 
 def is_larger_than(most: int, expression: sympy.Basic) -> bool:
-    """Whether an expression, written out as a tree, has more operations than that."""
+    """Whether an expression, written out as a tree, has more than ``most`` operations."""
     return operations_of(expression) > most
 
 

@@ -1,4 +1,4 @@
-"""Whether expressions are proved to have a period in time."""
+"""Proof that expressions have a given period in time."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import sympy
 from hybrid.symbolic.expressions import Remainder
 from hybrid.symbolic.nodes import mentions
 
-# A number of periods this close to a whole one is whole: it has been rounded a few times.
+# A number of periods this close to an integer (relative) counts as an integer: it has been rounded.
 WHOLE = 1e-13
 
 
 def is_periodic(expressions: Iterable[sympy.Expr], t: sympy.Symbol, period: sympy.Expr) -> bool:
     """Whether expressions are proved to have a period in ``t``, an expression of the parameters.
 
-    Each harmonic or remainder that time enters has it; what else has it is left to numbers.
+    The proof covers expressions in which time enters only through harmonics or remainders that have the
+    period. Other expressions may have the period, too: only the numerical check can tell.
     """
     return all(_proved(expression, t, period) for expression in expressions)
 

@@ -1,6 +1,6 @@
 """SymPy expressions as Python statements on floats, to be compiled.
 
-The text depends on nothing but the expressions, so that it can be the key of a cache.
+The text depends only on the expressions, so that it can serve as a cache key.
 """
 
 from __future__ import annotations
@@ -60,21 +60,21 @@ IMPORTS = (
 COMPARISONS: dict[type[sympy.Basic], str] = {sym.Less: "<", sym.LessEqual: "<=", sym.Equal: "=="}
 CONNECTIVES: dict[type[sympy.Basic], str] = {sym.And: "and", sym.Or: "or"}
 
-# How tightly a text binds, and so whether it needs brackets inside another.
+# How tightly a text binds: it needs brackets inside a text that binds more tightly.
 SUM, PRODUCT, POWER, ATOM = range(4)
 
 LARGEST_UNROLLED_POWER = 16
-# In a block of more expressions than this only whole ones are shared: the search for common parts of sums and
-# products takes a time that grows faster than the block.
+# In a block with more expressions than this, only whole expressions are shared: the time of the search for
+# common parts of sums and products grows faster than the block.
 LARGE = 400
-# So are those of expressions that have more operations than this where nothing is shared.
+# The same holds if an expression, written out as a tree, has more operations than this.
 LARGE_TREE = 20_000
 
 
 def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> list[str]:
-    """Statements that compute every expression first, and store them in their targets afterwards.
+    """Statements that first compute every expression and then store the values in their targets.
 
-    ``targets`` may then overlap with what the expressions read.
+    ``targets`` may therefore overlap with variables that the expressions read.
     """
     uses = _uses(expressions)
     if len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in expressions):
@@ -96,7 +96,7 @@ def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> li
 
 
 def _uses(expressions: Iterable[sympy.Expr]) -> dict[sympy.Expr, int]:
-    """How often each expression inside others, but symbols and numbers, is used."""
+    """Number of uses of each subexpression, except symbols and numbers."""
     uses: dict[sympy.Expr, int] = {}
     waiting = list(expressions)
     while waiting:
@@ -110,7 +110,7 @@ def _uses(expressions: Iterable[sympy.Expr]) -> dict[sympy.Expr, int]:
 
 
 def unprintable(expressions: Iterable[sympy.Expr]) -> str | None:
-    """Name of a function that has no counterpart in generated code, if there is one."""
+    """Name of a function without a counterpart in generated code, or None."""
     known = {*MATH_FUNCTIONS, *_Printer.PRINTERS}
     for node in nodes(*expressions):
         if isinstance(node, sympy.Symbol | sympy.Number | sympy.NumberSymbol):
@@ -121,9 +121,9 @@ def unprintable(expressions: Iterable[sympy.Expr]) -> str | None:
 
 
 class _Printer:
-    """Prints one block of statements; a value that a text needs several times becomes a variable.
+    """Prints one block of statements; values that are needed several times become variables.
 
-    So do the expressions in ``shared``, which several others need.
+    So do the expressions in ``shared``, which occur in several others.
     """
 
     def __init__(self, shared: Iterable[sympy.Expr] = ()) -> None:
@@ -132,24 +132,24 @@ class _Printer:
         self._shared = frozenset(shared)
 
     def assign(self, name: str, expression: sympy.Expr) -> None:
-        text = self.text(expression)  # may append lines of its own, which come first
+        text = self.text(expression)  # may append lines, which must come first
         self.lines.append(f"{name} = {text}")
 
     def text(self, expression: sympy.Expr, binding: int = SUM) -> str:
-        """The expression as code, in brackets if it binds less than ``binding``."""
+        """The expression as code, in brackets if it binds less tightly than ``binding``."""
         if expression in self._shared:
             return self.name(expression)
         text, own = self._print(expression)
         return f"({text})" if own < binding else text
 
     def name(self, expression: sympy.Expr) -> str:
-        """Code for the expression that may be repeated at no cost: a name or a number."""
+        """Code for the expression that can be repeated at no cost: a name or a number."""
         if expression.is_Symbol or expression.is_Number:
             return self.text(expression, ATOM)
         if expression not in self._variables:
             name = f"u{len(self._variables)}"
             self._variables[expression] = name
-            text, _ = self._print(expression)  # may append lines of its own, which come first
+            text, _ = self._print(expression)  # may append lines, which must come first
             self.lines.append(f"{name} = {text}")
         return self._variables[expression]
 
@@ -165,7 +165,7 @@ class _Printer:
 
     def _sum(self, expression: sympy.Expr) -> tuple[str, int]:
         parts: list[str] = []
-        # SymPy puts the number first; a - 1 reads better than -1 + a, and is the same sum
+        # SymPy puts the number first, but a - 1 reads better than -1 + a; the value is the same.
         for term in (*expression.args[1:], expression.args[0]):
             text = self.text(term, PRODUCT)
             if not parts:
@@ -237,7 +237,7 @@ class _Printer:
         condition, a, b = expression.args
         return f"({self.text(a)} if {self._condition(condition)} else {self.text(b)})", ATOM
 
-    # In the following four, a comparison with nan is false, and the last branch passes the nan on.
+    # In the next four methods a comparison with nan is false, and the last branch returns the nan.
 
     def _step(self, expression: sympy.Expr) -> tuple[str, int]:
         u = self.name(expression.args[0])
@@ -299,14 +299,14 @@ def _float_text(value: float) -> tuple[str, int]:
 
 
 def _fraction(coefficient: sympy.Number) -> tuple[str, str | None]:
-    """A positive number as a float, or as a quotient of two where its float is not exact."""
+    """A positive number as a float, or as a quotient of two floats if one float is not exact."""
     if coefficient.is_Rational and coefficient.q & (coefficient.q - 1):
         return repr(float(coefficient.p)), repr(float(coefficient.q))
     return repr(float(coefficient)), None
 
 
 def power_text(base: str, exponent: sympy.Expr, name: str) -> str:
-    """Text of a power, half-integer ones by a square root."""
+    """Text of a power; half-integer powers use a square root."""
     if not (exponent.is_Rational and exponent.q == 2):
         return f"{base}**{name}"
     product = "*".join([base] * (abs(exponent.p) // 2) + [f"sqrt({base})"])

@@ -1,4 +1,4 @@
-"""Kinks and choices of a field that are settled in its mode, since a guard keeps its sign there."""
+"""Simplification of kinks and choices that are decided within a mode, where guards keep their sign."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybrid.symbolic.nodes import MOST_EXPANDED, contains, interned, is_larger_t
 
 
 def simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
-    """The expression where everything in ``known`` is positive or zero."""
+    """The expression, simplified by the fact that everything in ``known`` is positive or zero."""
     return interned(_simplified(expression, known, {}))
 
 
@@ -27,7 +27,7 @@ def _simplified(
 
 
 def _decided(node: sympy.Expr, args: list[sympy.Expr], known: Sequence[sympy.Expr]) -> sympy.Expr:
-    """A node with new arguments, or what is left of it if its sign or its choice is known."""
+    """A node with new arguments, simplified if its sign or its choice is known."""
     if isinstance(node, Maximum | Minimum):
         a, b = args
         sign = sign_of(a - b, known) * (1 if isinstance(node, Maximum) else -1)
@@ -48,7 +48,7 @@ def _decided(node: sympy.Expr, args: list[sympy.Expr], known: Sequence[sympy.Exp
 
 
 def sign_of(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> int:
-    """1 or -1 if an expression is one of those known, or its negative; else 0."""
+    """1 if an expression is in ``known``, -1 if its negative is, else 0."""
     if is_larger_than(MOST_EXPANDED, expression):
         return 0
     for positive in known:

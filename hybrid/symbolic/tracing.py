@@ -17,7 +17,7 @@ from hybrid.symbolic.values import Traced as Traced
 from hybrid.symbolic.values import TraceError as TraceError
 from hybrid.symbolic.values import values_of
 
-# Operations of an expression that is shown to people.
+# Largest number of operations of an expression shown in an error text.
 SHOWN = 100
 
 
@@ -29,7 +29,7 @@ class SymbolicAlgebra:
         return number(value)
 
     def combined(self, name: str, contents: tuple[sympy.Expr, ...]) -> sympy.Expr:
-        """What the rule of that name makes of expressions."""
+        """The result of the rule ``name`` for these expressions."""
         return _combined(name, contents)
 
     def expression(self, content: sympy.Expr) -> sympy.Expr:
@@ -47,7 +47,7 @@ SYMBOLIC = SymbolicAlgebra()
 
 @attrs.frozen
 class Symbols:
-    """The symbols of a traced function, named as generated code reads them."""
+    """The symbols of a traced function, with the names they have in generated code."""
 
     t: sympy.Symbol
     x: tuple[sympy.Symbol, ...]
@@ -83,12 +83,13 @@ def trace(
     Returns
     -------
     list of sympy.Expr
-        The values, in one row: one for a scalar, row by row for a matrix.
+        The values as a flat list: one for a scalar, row by row for a matrix.
 
     Raises
     ------
     TraceError
-        If the function decides, indexes or computes by the value of an argument outside of NumPy.
+        If the function branches on the value of an argument, uses it as an index, or computes with it
+        outside of NumPy.
     """
     names = tuple(parameters)
     symbols = model_symbols(state if isinstance(state, int) else len(state), len(names))

@@ -1,4 +1,4 @@
-"""What NumPy's universal functions do to SymPy expressions."""
+"""Rules that apply NumPy's universal functions to SymPy expressions."""
 
 from __future__ import annotations
 
@@ -46,18 +46,18 @@ def _heaviside(a: sympy.Expr, at_zero: sympy.Expr) -> sympy.Expr:
 
 
 def _as_it_stands(function: Any) -> Callable[[sympy.Expr], sympy.Expr]:
-    """A function of SymPy's that it only evaluates of numbers: to look for more takes it 20 ms for a sum."""
+    """A SymPy function that is evaluated for numbers only: further evaluation takes 20 ms for a sum."""
     return lambda a: function(a) if a.is_Number else function(a, evaluate=False)
 
 
 def _of_parity(parity: int, function: Any) -> Callable[[sympy.Expr], sympy.Expr]:
-    """An even or odd function of SymPy's, with the sign of ``-a - b`` taken out."""
+    """An even or odd SymPy function; the sign of an argument such as ``-a - b`` is taken out."""
     plain = _as_it_stands(function)
 
     def rule(a: sympy.Expr) -> sympy.Expr:
         if a.is_Number or not a.could_extract_minus_sign():
             return plain(a)
-        # A sum term by term: SymPy would distribute -1 over it, and is told not to.
+        # A sum is negated term by term, because tracing turns SymPy's distribution of -1 off.
         opposite = sympy.Add(*(-term for term in a.args)) if a.is_Add else -a
         return parity * plain(opposite)
 
@@ -66,7 +66,7 @@ def _of_parity(parity: int, function: Any) -> Callable[[sympy.Expr], sympy.Expr]
 
 DEGREE = number(np.pi / 180.0)
 
-# By the name of the ufunc, which its aliases share.
+# Keyed by the ufunc's name, which its aliases share.
 RULES: dict[str, Callable[..., sympy.Expr]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
@@ -129,7 +129,7 @@ RULES: dict[str, Callable[..., sympy.Expr]] = {
     "logical_and": And,
     "logical_or": Or,
     "logical_not": Not,
-    # Python's &, | and ~ on truth values
+    # Python's &, | and ~ on booleans
     "bitwise_and": And,
     "bitwise_or": Or,
     "invert": Not,

@@ -1,10 +1,9 @@
-"""Numbers that are not known yet: Python's operators and NumPy's functions on them are written down.
+"""Placeholders for numbers, which record the Python operators and NumPy functions applied to them.
 
-A traced number stands in for a number, wrapped so that operators and functions build something where they
-would compute (NEP 13 and NEP 18). What they build is up to an algebra: SymPy expressions in
-``hybrid.symbolic.tracing``, a bare list of the operations in ``hybrid.compiler.operations``, which need not
-wait for SymPy. A model function cannot tell one from the other. What neither can follow is a decision taken
-in Python, which depends on a value that is not there yet.
+Operators and functions on a traced number build a record instead of computing (NEP 13 and NEP 18). An algebra
+determines the record: SymPy expressions in ``hybrid.symbolic.tracing``, or a plain list of operations in
+``hybrid.compiler.operations``, which does not need SymPy. Model functions behave the same with both. Neither
+algebra can follow a branch taken in Python, because the value it depends on is unknown.
 """
 
 from __future__ import annotations
@@ -32,36 +31,36 @@ UFUNCS = frozenset(
         "logical_or", "logical_not", "bitwise_and", "bitwise_or", "invert",
     }
 )  # fmt: skip
-# What np.where is called in an algebra.
+# Name of np.where in an algebra.
 WHERE = "where"
-# These contract arrays by sums of products, which object arrays do through the scalars' operators.
+# These form sums of products, which NumPy does on object arrays with the operators of the scalars.
 CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")
 
 
 class Algebra(Protocol):
-    """What operations on traced numbers make."""
+    """The results of operations on traced numbers."""
 
     def number(self, value: Any) -> Any:
-        """Content of a traced number with a known value; TypeError or ValueError if it is none."""
+        """Content of a traced number with a known value; TypeError or ValueError if it is not a number."""
         ...
 
     def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
-        """Content of the result of a function of ``UFUNCS``, or of ``WHERE``."""
+        """Content of the result of a function in ``UFUNCS``, or of ``WHERE``."""
         ...
 
     def expression(self, content: Any) -> Any:
-        """What is shown of a content to functions that ask for it."""
+        """The expression of a content, for callers that ask for it."""
         ...
 
 
 _ALGEBRA: ContextVar[Algebra] = ContextVar("_ALGEBRA")
-# What could not be followed since the function was called, in order.
+# Operations that could not be followed since the function was called, in order.
 _REFUSALS: ContextVar[list[TraceError]] = ContextVar("_REFUSALS")
 
 
 @contextmanager
 def in_terms_of(algebra: Algebra) -> Iterator[None]:
-    """Let traced numbers follow an algebra within this block."""
+    """Make traced numbers use an algebra within this block."""
     token = _ALGEBRA.set(algebra)
     try:
         yield
@@ -70,11 +69,11 @@ def in_terms_of(algebra: Algebra) -> Iterator[None]:
 
 
 class TraceError(ModelError):
-    """Tracing cannot follow a model function; the text says what stopped it and what to write instead."""
+    """Tracing cannot follow a model function; the text names the cause and what to write instead."""
 
 
 def refusal(text: str) -> TraceError:
-    """A TraceError that is also noted down, since the model function may catch it and go on another way."""
+    """A TraceError that is also recorded, since the model function may catch it and continue."""
     error = TraceError(text)
     _REFUSALS.get([]).append(error)
     return error
@@ -86,25 +85,25 @@ NEEDS_NUMBER = (
 )
 NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
 NEEDS_DECISION = (
-    "a branch cannot be traced: make its sides modes joined by a guard, or write np.maximum, np.clip or "
-    "np.where (in place of if, and, max) where the value does not jump at the switch"
+    "a branch cannot be traced: make its sides modes joined by a guard, or, if the value does not jump at "
+    "the switch, use np.maximum, np.clip or np.where in place of if, and, max"
 )
 
 
 class Traced(NDArrayOperatorsMixin):
-    """A number that is not known yet, which behaves as a NumPy scalar."""
+    """A placeholder for a number, which behaves like a NumPy scalar."""
 
     __slots__ = ("content",)
 
     def __init__(self, content: Any) -> None:
         self.content = content
 
-    # Python hands out np.float64, and so a question after the type gets the same answer here.
+    # Untraced calls get np.float64, so isinstance must give the same answer here.
     __class__ = property(lambda self: np.float64)
 
     @property
     def expression(self) -> Any:
-        """The SymPy expression that it stands for."""
+        """The expression of this number."""
         return _ALGEBRA.get().expression(self.content)
 
     @property
@@ -130,7 +129,7 @@ class Traced(NDArrayOperatorsMixin):
         return _apply_function(function, args, kwargs)
 
     def __getattr__(self, name: str) -> Any:
-        # np.cos of an object array, np.array([x.q, x.v]) say, calls the method cos of each element.
+        # np.cos of an object array, such as np.array([x.q, x.v]), calls the method cos of each element.
         if name in UFUNCS:
             return lambda *others: _lifted(name)(self, *others)
         text = f"a traced number has no attribute {name!r}"
@@ -166,7 +165,7 @@ class Traced(NDArrayOperatorsMixin):
         raise refusal(NEEDS_NUMBER)
 
     def __hash__(self) -> int:
-        raise refusal("a number is needed as a key: a table that is looked up by the state cannot be traced")
+        raise refusal("a number is needed as a key: a lookup in a table by the state cannot be traced")
 
     def __format__(self, specification: str) -> str:
         if specification:
@@ -191,7 +190,7 @@ class TracedArray(np.ndarray):
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
         if function in FUNCTIONS:
             return _apply_function(function, args, kwargs)
-        # NumPy does the rest on object arrays, and mixes in single numbers if told they belong there
+        # NumPy does the other functions on object arrays; single traced numbers count as such arrays.
         try:
             return _wrapped(super().__array_function__(function, (TracedArray,), args, kwargs))
         except TraceError:
@@ -231,7 +230,7 @@ def _content(value: Any) -> Any:
 
 
 def _plain(value: Any) -> np.ndarray:
-    """``value`` as an object array that NumPy handles by itself, without asking us again."""
+    """``value`` as an object array of the base class, so that NumPy does not call back here."""
     if isinstance(value, Traced):
         array = np.empty((), dtype=object)
         array[()] = value
@@ -285,7 +284,7 @@ def _piecewise(x: Any, conditions: Any, functions: Any, *args: Any, **kwargs: An
     if extra not in (0, 1):
         raise refusal("np.piecewise needs one function per condition, and at most one more")
     values = [each(x, *args, **kwargs) if callable(each) else each for each in functions]
-    # The last condition that holds decides, as where NumPy fills an array.
+    # The last condition that holds decides, as in NumPy.
     value = values[-1] if extra else 0
     for condition, other in zip(conditions, values, strict=False):
         value = _where(condition, other, value)
@@ -303,7 +302,7 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
 def _apply_function(function: Any, args: Any, kwargs: Any) -> Any:
     if function in FUNCTIONS:
         return FUNCTIONS[function](*args, **kwargs)
-    # Anything else, np.sum((a, b)) say, NumPy can do on object arrays, if it can do it at all.
+    # NumPy can do other functions, such as np.sum((a, b)), only on object arrays.
     plain = (_plain(argument) if _holds_traced(argument) else argument for argument in args)
     try:
         return _wrapped(function(*plain, **kwargs))
@@ -326,13 +325,13 @@ def values_of(
     algebra: Algebra,
     symbols: tuple[Any, Iterable[Any], Iterable[Any]],
 ) -> list[Any]:
-    """Contents of a model function's values, in one row, for ``t``, ``x`` and ``p`` with given contents.
+    """Contents of a model function's values, as a flat list, for given contents of ``t``, ``x`` and ``p``.
 
     Raises
     ------
     TraceError
-        If the function cannot be followed, or goes on where it could not be: then it has caught the error,
-        and what it returns is not what it returns on numbers.
+        If the function cannot be followed. The error is raised even if the function caught it and continued,
+        because the values it returns are then not those it returns for numbers.
     """
     t, states, values = symbols
     x: Any = np.array([Traced(content) for content in states], dtype=object).view(TracedArray)

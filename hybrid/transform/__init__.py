@@ -1,1 +1,1 @@
-"""Systems made from systems."""
+"""Constructions of hybrid systems from simpler descriptions."""

@@ -1,4 +1,4 @@
-"""Two fields on either side of a surface, as a hybrid system: crossing, sliding, and what lies between."""
+"""Hybrid system from two fields on either side of a surface: crossing, sliding and their borderline cases."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import as_parameters, as_state
 
-# A start in the sliding mode that is further from the surface than this share of the state does not slide.
-# What the integration lets the state drift while it slides is far less, so that a run can be taken up again.
+# A start in the sliding mode does not slide if it is further from the surface than this fraction of the
+# state. The drift during sliding is far smaller, so a run can be continued from any of its states.
 SLIDING_BAND = 1e-6
-# Two fields that both move through the surface slower than this share of their speeds are tangent to it.
+# The two fields count as tangent to the surface if both cross it slower than this fraction of their speeds.
 TANGENT = 1e-9
-# An orbit that comes to the surface slower than this share of its speed, and turns back, only touches it.
+# An orbit that reaches the surface slower than this fraction of its speed and turns back only touches it.
 TOUCH = 3e-8
 
 
@@ -34,21 +34,22 @@ def filippov(
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
 
-    With the speeds ``L_b = D_t h + D_x h f_b`` and ``L_a = D_t h + D_x h f_a`` at which the two fields move
-    through the surface ``h = 0``, an orbit that comes from below crosses where ``L_a > 0`` and stays in
-    the surface where ``L_a <= 0``. There it follows the equivalent field
+    The two fields move through the surface ``h = 0`` with the speeds ``L_b = D_t h + D_x h f_b`` and
+    ``L_a = D_t h + D_x h f_a``. An orbit from below crosses the surface if ``L_a > 0`` and stays on it if
+    ``L_a <= 0``. On the surface it follows the equivalent field
 
         ``f_s = f_b + alpha (f_a - f_b)``,  ``alpha = L_b / (L_b - L_a)``,
 
-    which keeps ``h`` as it is, until one of the fields becomes tangent to the surface: ``alpha = 1`` leads
-    above, ``alpha = 0`` below. A crossing is one jump with the saltation ``I + (f_a - f_b) D_x h / L_b``, the
-    entry into sliding is one with ``I + (f_s - f_b) D_x h / L_b``, which has lost a rank.
+    along which ``h`` is constant, until one of the fields becomes tangent to the surface: the orbit leaves
+    above at ``alpha = 1`` and below at ``alpha = 0``. From below, a crossing has the saltation matrix
+    ``I + (f_a - f_b) D_x h / L_b``. The entry into sliding has ``I + (f_s - f_b) D_x h / L_b``, of rank
+    ``n - 1``.
 
-    Modes are ``below``, ``above`` and ``sliding``; where ``L_b`` and ``L_a`` are the same everywhere nothing
-    slides and there are only two. A start in the surface finds its mode by itself, unless both fields point
-    away from it: then it may go either way, and ``below`` or ``above`` must be named. For the same reason a
-    run ends (status TERMINAL, with the jump ``two-fold`` last) where an orbit slides to a point at which both
-    fields are tangent to the surface.
+    The modes are ``below``, ``above`` and ``sliding``; if ``L_b`` and ``L_a`` are equal everywhere, there is
+    no sliding mode. A run that starts on the surface finds its mode by itself, unless both fields point away
+    from the surface: the orbit may then leave on either side, and the call must name ``below`` or ``above``.
+    For the same reason a run ends (status TERMINAL, last jump ``two-fold``) where an orbit slides to a point
+    at which both fields are tangent to the surface.
 
     Parameters
     ----------
@@ -56,21 +57,21 @@ def filippov(
         As for `HybridSystem`.
     below, above
         Fields ``f(t, x, p)`` where the switching function is negative and where it is positive. Each must be
-        smooth a little beyond the surface, and one that tracing can follow.
+        smooth slightly beyond the surface, and must be traceable.
     switching
-        Scalar function ``h(t, x, p)``, traced likewise; its gradient must not vanish where it is zero. The
-        sliding mode needs it twice differentiable.
+        Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
+        The sliding mode needs ``h`` to be twice differentiable.
     period, name
         As for `HybridSystem`.
 
     Returns
     -------
     HybridSystem
-        Its transitions are named ``source->target``. The others are ``two-fold``, which ends the run,
-        ``two-fold at start``, which ends a run that starts where the surface repels, and
-        ``below too high``, ``above too low``, ``sliding too high`` and ``sliding too low``: a start takes one
-        of them if it lies off the surface where its mode does not belong, by more than rounding, or, in the
-        sliding mode, by more than 1e-6 of the state's largest component.
+        Its transitions are named ``source->target``, with these exceptions. ``two-fold`` ends the run;
+        ``two-fold at start`` ends a run that starts where the surface repels. ``below too high``,
+        ``above too low``, ``sliding too high`` and ``sliding too low`` correct the mode of a start that lies
+        off the surface on the wrong side for its mode: by more than rounding or, in the sliding mode, by more
+        than 1e-6 of the state's largest component.
 
     Raises
     ------
@@ -79,8 +80,9 @@ def filippov(
 
     Notes
     -----
-    Sliding is not stabilised: ``h`` is an invariant of ``f_s``, kept to rounding if it is affine in the state
-    and to the tolerance of the solver if not. Leaving projects the state onto the surface.
+    Sliding is not stabilised: ``h`` is an invariant of ``f_s``. It is kept to rounding if ``h`` is affine in
+    the state, and to the solver's tolerance otherwise. The transitions out of the sliding mode project the
+    state onto the surface.
 
     References
     ----------
@@ -90,7 +92,7 @@ def filippov(
 
     Examples
     --------
-    A block on a belt, with dry friction; it is carried along until the spring breaks it loose.
+    A block on a belt, with dry friction. The belt carries the block along until the spring pulls it loose.
 
     >>> block = filippov(
     ...     state=("x", "v"),
@@ -164,7 +166,7 @@ def _surface(
 
 @attrs.frozen(eq=False)
 class _Surface:
-    """The model functions that follow from two fields and a switching function."""
+    """The model functions derived from two fields and a switching function."""
 
     below: Function
     above: Function
@@ -172,11 +174,11 @@ class _Surface:
     gradient: Function  # (D_x h, D_t h)
     speed_below: Function  # L_b and L_a, the rates of h along the fields
     speed_above: Function
-    turn_below: Function  # the rate of L_b along the field below, of L_a along that above
+    turn_below: Function  # rate of L_b along the field below, and of L_a along the field above
     turn_above: Function
 
     def may_attract(self, state: tuple[str, ...] | int, parameters: tuple[str, ...]) -> bool:
-        """Whether the two speeds are not proved to be the same everywhere."""
+        """Whether sliding is possible: False if the two speeds are proved equal everywhere."""
         from hybrid.symbolic.tracing import trace
 
         L_b, L_a = trace(self.speeds, state, parameters)
@@ -209,11 +211,12 @@ class _Surface:
         return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) < 0.0)
 
     def _goes_on(self, t: Any, x: Any, p: Any, side: float) -> Any:
-        """Whether an orbit that reaches the surface rising (side +1) or falling (-1) does more than touch it.
+        """Whether an orbit that reaches the surface rising (side +1) or falling (-1) does not just touch it.
 
-        One that leaves the sliding mode at a fold starts on the surface, with a speed that is zero up to
-        rounding and an acceleration back to where it belongs: it has arrived nowhere. The speed is compared
-        with those of both fields: the one at the fold may be at rest, as a mass that is about to slip.
+        An orbit that leaves the sliding mode at a fold starts on the surface with a speed through it that is
+        zero up to rounding, and accelerates back into its own side. That is not an arrival. The speed is
+        compared with those of both fields, because the field at the fold may be at rest, as for a mass that
+        is about to slip.
         """
         if side > 0:
             speed, turn = self.speed_below(t, x, p), self.turn_below(t, x, p)
@@ -226,19 +229,19 @@ class _Surface:
         return L_b - L_a - self._hardly_moving(t, x, p)
 
     def _hardly_moving(self, t: Any, x: Any, p: Any) -> Any:
-        """A speed through the surface that is next to none.
+        """A speed through the surface that counts as zero.
 
-        It is as smooth as the fields, so that the sliding mode has a Taylor series where they do.
+        It is as smooth as the fields, so the sliding mode has a Taylor series if they do.
         """
         return TANGENT * self._steepest(t, x, p)
 
     def _steepest(self, t: Any, x: Any, p: Any) -> Any:
-        """The rate of ``h`` if all of the velocities of both fields were normal to the surface."""
+        """The rate of ``h`` if all velocities of both fields were normal to the surface."""
         slope, speed = self.gradient(t, x, p)[:-1], [*self.below(t, x, p), *self.above(t, x, p)]
         return np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
 
     def is_off(self, t: Any, x: Any, p: Any) -> Any:
-        """Whether a state is too far from the surface to slide, measured by its own size."""
+        """Whether a state is too far from the surface to slide, relative to its largest component."""
         largest = np.abs(x[0])
         for value in x[1:]:
             largest = np.maximum(largest, np.abs(value))
@@ -264,19 +267,19 @@ def _check_traceable(
             values = trace(function, state, parameters)
         except TraceError as error:
             raise ModelError(
-                f"filippov: {what} cannot be traced, and the sliding mode is derived from it: {error}."
+                f"filippov: {what} cannot be traced, but the sliding mode is derived from it: {error}."
             ) from error
         except ModelError as error:
             raise ModelError(f"filippov: {what}: {error}") from error
         if len(values) != size:
-            raise ModelError(f"filippov: {what} must return {size} values; it returns {len(values)}.")
+            raise ModelError(f"filippov: {what} must return {size} values; got {len(values)}.")
 
 
 def _derived_gradient(
     function: Function, state: tuple[str, ...] | int, parameters: tuple[str, ...]
 ) -> Function:
-    """``(D_x, D_t)`` of a scalar function as a model function, which can be traced in turn."""
-    # SymPy is slow to import, and importing the library must not wait for it.
+    """``(D_x, D_t)`` of a scalar function as a model function, which can itself be traced."""
+    # SymPy is slow to import, so it is not imported with the library.
     from sympy.core.parameters import distribute
 
     from hybrid.symbolic.derivatives import jacobian_of
@@ -314,14 +317,14 @@ def _rate(gradient: Function, field: Function) -> Function:
 
 
 def _entered(source: str, target: str, switching: Function, when: Function | None = None) -> Transition:
-    """Where a start off the surface goes that names a mode which does not belong there."""
+    """The transition of a start off the surface from a mode that is wrong there to the right one."""
     direction, place = (+1, "high") if target == "above" else (-1, "low")
     guard = Guard(switching, direction, at_start=True, when=when)
     return Transition(source, target, guard, name=f"{source} too {place}")
 
 
 def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:
-    """``total`` and the sum of the products whose first factor is not zero."""
+    """``total`` plus the dot product; terms whose first factor is zero are skipped."""
     for factor, other in zip(a, b, strict=True):
         if not _is_zero(factor):
             total = total + factor * other
@@ -329,5 +332,5 @@ def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:
 
 
 def _is_zero(value: Any) -> bool:
-    """Whether a number is zero, or is proved to be while it is traced."""
+    """Whether a number is zero; a traced number counts as zero if its expression is."""
     return bool(getattr(value, "expression", value) == 0)
