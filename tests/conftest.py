@@ -1,4 +1,4 @@
-"""What every test runs under: the same examples each time, no clock, no display."""
+"""Settings of all tests: the same examples each time, no deadlines, no display."""
 
 import os
 
@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# A first example may compile a kernel, so neither deadlines nor slowness say anything about a test.
+# A first example may compile a kernel, so deadlines and slowness checks are switched off.
 settings.register_profile(
     "ci",
     derandomize=True,

@@ -1,4 +1,4 @@
-"""The reference systems as hybrid systems, each in its most natural modelling."""
+"""The reference systems as hybrid systems, each modelled in its most natural form."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def switched_linear() -> HybridSystem:
 
 
 def stick_slip() -> HybridSystem:
-    """``models.stick_slip`` with its stick written by hand; the block never outruns the belt.
+    """``models.stick_slip`` with a hand-written stick mode; the block is never faster than the belt.
 
     The release is a fold: at ``x = Fs`` the slip begins with ``v = belt`` and no acceleration, on the guard
     of the next sticking, which it leaves with ``v'' = -belt``.
@@ -59,7 +59,7 @@ def constant_fields() -> HybridSystem:
 
 
 def incline() -> HybridSystem:
-    """A ball that falls on a frictionless incline ``x sin(a) + y cos(a) = 0`` and slides on."""
+    """A ball that falls on a frictionless incline ``x sin(a) + y cos(a) = 0`` and then slides."""
 
     def project(t, x, p):
         along = np.cos(p.a) * x.vx - np.sin(p.a) * x.vy

@@ -41,7 +41,7 @@ class TestSwitchedLinear:
 
 @pytest.fixture(scope="module")
 def rides():
-    """The block on the belt over two periods and more."""
+    """The block on the belt over more than two periods."""
     span = (0.0, 2.4 * FRICTION["period"])
     return hybrid.simulate(systems.stick_slip(), TestStickSlip.START, span, mode="stick", solver=TIGHT)
 
@@ -50,7 +50,7 @@ class TestStickSlip:
     START = (0.5, 0.2)
 
     def test_release_does_not_stick_again_at_once(self, rides):
-        """The slip starts on the guard of sticking, at no speed."""
+        """The slip starts on the guard of sticking with zero relative speed."""
         release, catch, again = rides.jumps[:3]
         assert release.t == pytest.approx(2.5, rel=1e-10)
         assert catch.t - release.t == pytest.approx(FRICTION["slip"], rel=1e-8)

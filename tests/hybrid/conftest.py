@@ -1,4 +1,4 @@
-"""Compiled once for all files of this folder."""
+"""Fixtures that are compiled once for all files of this folder."""
 
 import pytest
 

@@ -1,8 +1,8 @@
-"""A plain, slow reference for what fires at one instant, with constant fields and exact fractions.
+"""A slow reference for the transitions at one instant, with constant fields and exact fractions.
 
 A transition is ``(source, target, guard, direction, reset, when)`` with ``guard = (component, place, name)``
-for the guard ``x[component] - place``, the same one for all with that name, and functions ``reset(x)`` and
-``when(x)``.
+for the guard ``x[component] - place``; guards with one name are the same. ``reset(x)`` and ``when(x)`` are
+functions.
 """
 
 from fractions import Fraction
@@ -11,7 +11,7 @@ MOST_AT_ONCE = 2000
 
 
 class Stuck(Exception):
-    """Transitions go round without end."""
+    """The transitions repeat endlessly."""
 
 
 class Reference:
@@ -59,7 +59,7 @@ class Reference:
         return self.velocities[self.mode][self.transitions[i][2][0]]
 
     def now(self, i):
-        """Side of the guard from here on."""
+        """Side of the guard from now on."""
         value = self.value(i) or self.speed(i)
         return 1 if value > 0 else -1
 
@@ -118,7 +118,7 @@ class Reference:
         return self.transitions[k][0] == source and self.transitions[k][2] == self.transitions[j][2]
 
     def look(self, j, own):
-        """What a reset has done to the guard of a transition."""
+        """Update the guard of a transition after a reset."""
         direction = self.transitions[j][3]
         before, now, on, was_on = self.side[j], self.now(j), self.value(j) == 0, j in self.zero
         due = j in self.due

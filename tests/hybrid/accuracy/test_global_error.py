@@ -1,4 +1,4 @@
-"""Estimated global errors against true ones, from closed forms at forty digits."""
+"""Estimated global errors compared with true errors from closed forms with forty digits."""
 
 import functools
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ from tests.reference.impacts import ImpactOscillator
 
 
 def bouncing_ball(rng):
-    """Bounces up to somewhere between 30 and 80 % of the time at which they accumulate."""
+    """Bounces up to a random share, 30 to 80 %, of the time at which they accumulate."""
     h, g, e = rng.uniform(0.5, 2), rng.uniform(5, 10), rng.uniform(0.5, 0.9)
     end = float(np.sqrt(2 * h / g) * (1 + e) / (1 - e) * rng.uniform(0.3, 0.8))
     with mp.workdps(40):
@@ -73,7 +73,7 @@ def shares(case, solver, count):
         found = global_error(system, solver=solver, **run)
         assert found.status.ok
         assert len(found.jumps) == len(times)
-        # The difference is taken at forty digits: a time rounded to a double is not the exact one.
+        # Subtract with forty digits, because a time rounded to a double is not exact.
         errors += [float(abs(mp.mpf(jump.t) - t)) for jump, t in zip(found.arc.jumps, times, strict=True)]
         errors += [float(abs(mp.mpf(value) - t)) for value, t in zip(found.arc.x[-1], x, strict=True)]
         estimates += [*found.jumps, *found.x]
@@ -85,7 +85,7 @@ def shares(case, solver, count):
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8, 1e-10])
 @pytest.mark.parametrize("case", [solvable_oscillator, impact_oscillator])
 def test_estimates_hold_the_error(case, rtol, method):
-    """Nearly always, and not by being wide."""
+    """Estimates nearly always cover the error and are not too wide."""
     covered, ratio = shares(case, method(rtol=rtol, atol=rtol / 100), 12)
     assert covered >= 0.97
     assert 1.0 < ratio < 5.0
@@ -94,14 +94,14 @@ def test_estimates_hold_the_error(case, rtol, method):
 @pytest.mark.parametrize("method", [DOP853, Tsit5])
 @pytest.mark.parametrize("rtol", [1e-5, 1e-10, 1e-13])
 def test_estimates_hold_the_rounding_of_polynomial_flight(rtol, method):
-    """A method makes no error here: what there is, rounding has made and the bounces have magnified."""
+    """The method is exact here: the error is rounding, magnified by the bounces."""
     covered, ratio = shares(bouncing_ball, method(rtol=rtol, atol=rtol / 100), 100)
     assert covered >= 0.8
     assert ratio < 50.0
 
 
 def test_the_absolute_tolerance_is_tightened_too():
-    """Where it rules, runs at tighter relative tolerances alone would all make the same error."""
+    """Where ``atol`` dominates, tightening ``rtol`` alone would leave the error the same."""
     swing = hybrid.HybridSystem(state=("q", "v"), modes=[hybrid.Mode("swing", lambda t, x, p: (x.v, -x.q))])
     found = global_error(swing, (1.0, 0.0), (0.0, 20.0), solver=DOP853(rtol=1e-11, atol=1e-4))
     errors = np.abs(found.arc.x[-1] - (np.cos(20.0), -np.sin(20.0)))
@@ -130,18 +130,18 @@ def test_tighter_runs_start_aside_by_the_rounding_of_a_run(monkeypatch):
 
 
 def test_a_chaotic_run_beyond_its_digits_says_so():
-    """After 80 units of time an error has grown by e^40."""
+    """In 80 units of time an error grows by a factor of e^40."""
     found = global_error(models.solvable_oscillator(), (0.3, 0.0), (0.0, 80.25), mode="plus")
     assert found.status.code == StatusCode.NOT_CONVERGED
     assert "Runs at tighter tolerances agree on the first" in str(found.status)
     assert found.jumps[0] < 1e-9
-    # Jumps lie on a lattice of half units: one by one those of different orbits may coincide.
+    # Jumps lie on a lattice of half units, so single jumps of different orbits may coincide.
     assert np.median(found.jumps[-10:]) > 0.1
     assert found.x.max() > 0.1
 
 
 def test_a_start_on_a_guard_is_not_pushed_over_it():
-    """The block starts to stick: displaced upwards, it would be faster than the belt."""
+    """The block starts in stick; displaced upwards it would be faster than the belt."""
     system, stuck = systems.stick_slip(), (0.0, 0.2)
     found = global_error(system, stuck, (0.0, 13.0), mode="stick")
     assert found.status.ok
@@ -156,7 +156,7 @@ def test_a_run_that_breaks_off_keeps_its_status():
 
 
 def test_runs_that_end_in_different_modes_have_no_error_bar():
-    """Between the event of a loose run and that of a tight one, at pi/2, only one of them has jumped."""
+    """Near pi/2, between the events of the loose and the tight run, only one run has jumped."""
     system = hybrid.HybridSystem(
         state=("q", "v"),
         modes=[hybrid.Mode(side, lambda t, x, p: (x.v, -x.q)) for side in ("right", "left")],

@@ -1,6 +1,6 @@
 """The global error across twenty impacts falls with the order of the solver, down to 1e-12.
 
-An event found, or a reset made, to less than that order would put a floor under the error.
+An event or a reset of lower accuracy would limit the error from below.
 """
 
 import math
@@ -49,7 +49,7 @@ def error_of_the_heated_ball(method):
     half = math.sqrt(2 * height)
     times = half * (1 + 2 * np.arange(len(arc.jumps)))
     assert len(arc.jumps) == 20
-    # Rounding of the speed lasts, so that times drift in proportion to the run's length.
+    # A rounding error of the speed persists, so times drift in proportion to the run's length.
     return max(
         np.abs(arc.jumps.t / times - 1).max(),
         np.abs(arc.jumps.x_minus[:, 1] + half).max(),
@@ -79,7 +79,7 @@ CASES = [
 def test_order_across_impacts(error_of, solver, steps):
     errors = [error_of(solver(rtol=1.0, atol=1.0, max_step=step)) for step in steps]
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    # More where errors of fall and rise cancel: the ball's flight is symmetric in time.
+    # The order is higher where errors of fall and rise cancel: the flight is symmetric in time.
     assert solver.tableau.order - 0.3 < slope < solver.tableau.order + 3.0, errors
     assert errors[-1] < 1e-7
 

@@ -1,4 +1,4 @@
-"""Errors that are known beforehand come out; a clock that is turned by hand shows how times are taken."""
+"""Known errors are measured correctly; a controlled clock shows how times are measured."""
 
 import itertools
 import math
@@ -26,7 +26,7 @@ from tests.reference.load import reference
 
 E = 0.5
 FIRST = math.sqrt(2 / 9.81)
-# Dropped from 1 m, seen at t = 1: the second bounce would come at 2 FIRST (0.5 + E).
+# Dropped from 1 m and observed at t = 1; the second bounce is at 2 FIRST (0.5 + E).
 FALL = (models.bouncing_ball(), (1.0, 0.0), (0.0, 0.8))
 SPEED = 9.81 * FIRST
 SINCE = 0.8 - FIRST
@@ -39,7 +39,7 @@ def decay():
 
 
 class Clock:
-    """Stands still but for what a method turns it by."""
+    """A clock that advances only when a method advances it."""
 
     def __init__(self):
         self.now = 0.0
@@ -147,7 +147,7 @@ def test_the_founding_system_against_fifty_digits(gap):
         repeats=1,
     )
     assert np.all(found.error["state"] < found.tolerance)
-    # In a contact a tangent vector grows some thousandfold and shrinks again, and so does its error.
+    # In a contact a tangent vector and its error grow about a thousandfold and shrink again.
     assert np.all(found.error["fundamental"] < 50 * found.tolerance)
     assert found.error["times"][-1] < 1e-11
     assert found.events.tolist() == [len(facts["times10"])] * 5

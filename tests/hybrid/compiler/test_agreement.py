@@ -43,7 +43,7 @@ def refused(field, text, **options):
 
 
 class TestTypes:
-    """Tracing sees no numbers, and must not be taken for another argument."""
+    """Tracing uses symbols, and a symbol must not be mistaken for another argument."""
 
     def test_an_instance_of_float_is_one(self):
         def field(t, x, p):
@@ -206,7 +206,7 @@ class TestWholeNumbers:
 
 
 class TestTheCompilersErrors:
-    """Whatever it does not know becomes a ModelError that names the function and what to write."""
+    """Unknown code raises a ModelError that names the function and the next step."""
 
     @pytest.mark.parametrize(
         ("field", "state"),
@@ -241,7 +241,7 @@ class TestTheCompilersErrors:
         )
 
     def test_a_linear_system_to_solve(self):
-        """The compiler may know how to solve it, or not: then it says so in words."""
+        """The compiler either solves the system or raises an error that explains the limit."""
 
         def field(t, x, p):
             return np.linalg.solve(np.array([[2.0, x[0]], [x[1], 3.0]]), x) * np.linalg.det(np.eye(2))
@@ -268,7 +268,7 @@ class TestTheCompilersErrors:
 
 
 def test_rounding_is_no_difference():
-    """A difference of large terms may come out otherwise in another order; then the terms measure it."""
+    """Large terms that cancel may differ with the order; the terms then set the tolerance."""
 
     def field(t, x, p):
         return x.v, (1e10 + x.q) - 1e10 - x.v * 3 + (x.q - x.v) * 1e8 - x.q * 1e8 + x.v * 1e8
@@ -301,7 +301,7 @@ def made_up(seed):
 
 
 def runs_as_written(seeds):
-    """How many of the functions made up from these seeds run; all others are refused."""
+    """Number of random functions from these seeds that run; all others are refused."""
     ran = 0
     for seed in seeds:
         text, function = made_up(seed)
@@ -324,7 +324,7 @@ def runs_as_written(seeds):
             if wanted is None:
                 continue
             found = compiled.value(function, 0, t, x, values)
-            # nan, which no condition is true of, is no number that comes back wrong.
+            # nan satisfies no condition, and does not count as a wrong number.
             band = 1e-7 * np.abs(wanted) + rounding_band(decay, function, t, x, values, wanted)
             assert np.isnan(found) or abs(found - wanted) <= band, (text, t, x, values, found, wanted)
     return ran

@@ -37,7 +37,7 @@ def load(emitted, *, compiled):
 
 
 def in_python(own):
-    """What generated text calls, without a compiler: all numbers of a function in one row."""
+    """The functions that generated text calls, in plain Python: all numbers of a function in one row."""
 
     def values(t, x, p):
         parameters = named_values(PARAMETERS, own.parameters, p)
@@ -338,7 +338,7 @@ def test_a_guard_asks_for_its_gradient():
 
 
 class TestPlainFunctions:
-    """What cannot be traced is compiled as it is, which takes a plain function."""
+    """A function that cannot be traced is compiled directly, which requires a plain function."""
 
     class Field:
         factor = 2.0
@@ -372,7 +372,7 @@ class TestPlainFunctions:
 
 
 def test_a_guard_of_the_start_is_no_column_of_the_series():
-    """It comes between two that are, and takes nobody's place."""
+    """It is listed between two guards of the series and does not shift their columns."""
     crossed = {
         name: Transition("run", "run", Guard(value, +1), name=name)
         for name, value in (("sine", lambda t, x, p: np.sin(x.q) - 0.3), ("line", lambda t, x, p: x.q - 1))

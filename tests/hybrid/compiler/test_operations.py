@@ -1,4 +1,4 @@
-"""What tracing found out, kept on disk: the same answer for the same model, and never another's."""
+"""Results of tracing are kept on disk: a model gets its own result, never that of another model."""
 
 import importlib.util
 import json

@@ -42,7 +42,7 @@ def test_the_estimate_vanishes_on_quadratics_and_its_filter_has_the_real_eigenva
 
 
 def test_interpolant_is_the_collocation_polynomial():
-    """Exact for derivatives that are quadratic, through both ends, blind to the derivative at the start."""
+    """Exact for quadratic derivatives, passes through both ends, independent of the slope at the start."""
     theta = np.linspace(0, 1, 7)
     basis = np.array([(1 - theta) ** 3, 3 * theta * (1 - theta) ** 2, 3 * theta**2 * (1 - theta), theta**3])
     weights = basis.T @ TABLEAU.interpolant
@@ -160,14 +160,14 @@ def damped_oscillator():
 
 
 def rates_of(k, c):
-    """The two real exponents, the small one without cancellation."""
+    """The two real exponents; the small one is computed without cancellation."""
     fast = -(c + math.sqrt(c**2 - 4 * k)) / 2
     return np.array([k / fast, fast])
 
 
 @pytest.mark.parametrize("c", [1e2, 1e4, 1e6, 1e8])
 def test_exponents_however_negative(c):
-    """Intervals as short as the fast decay tell the two directions apart."""
+    """Intervals as short as the fast decay separate the two directions."""
     result = lyapunov.lyapunov_spectrum(
         damped_oscillator(),
         (0.0, 0.0),
@@ -183,7 +183,7 @@ def test_exponents_however_negative(c):
 
 @pytest.mark.parametrize("c", [1e2, 1e4, 1e6])
 def test_slow_exponent_over_periods_of_the_forcing(c):
-    """The fast direction is gone long before an interval ends; the sum rule still has it."""
+    """The fast direction vanishes before an interval ends, but the sum rule still includes it."""
     result = lyapunov.lyapunov_spectrum(
         damped_oscillator(),
         (0.0, 0.0),
@@ -271,7 +271,7 @@ def exact_jumps(k, c, t_end):
 
 @pytest.mark.parametrize("c", [1e2, 1e4, 1e6])
 def test_contact_with_huge_damping(c):
-    """The mass sinks in by about 1/c only, and where it is released depends on that; so must ``atol``."""
+    """The mass sinks in by about 1/c, which sets where it is released; ``atol`` must be chosen for that."""
     k = 10 * c
     exact = exact_jumps(k, c, 20.0)
     solver = RadauIIA(rtol=1e-8, atol=1e-8 / c)
@@ -288,7 +288,7 @@ FLIGHT = reference("impact_oscillator")["flight"]
 
 
 def test_order_across_impacts():
-    """Steps are as the tolerance to the power 1/4, errors as the fifth power of the steps."""
+    """Steps scale with the tolerance to the power 1/4, errors with the fifth power of the steps."""
     tolerances, errors = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), []
     for value in tolerances:
         arc = hybrid.simulate(

@@ -206,7 +206,7 @@ def test_order_of_the_step(fixed_steps, solver):
 
 @every_solver
 def test_order_of_the_interpolant(fixed_steps, solver):
-    """Its error over one step is of one order more, as is the global error of a step of that order."""
+    """The error over one step is one order higher, like the local error of a method of that order."""
     t = np.linspace(0.0, 4.0, 1001)
     errors, steps = [], []
     for (kind, step), arc in fixed_steps.items():

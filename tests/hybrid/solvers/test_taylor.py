@@ -1,4 +1,4 @@
-"""The default solver: exact where it says so, and of full accuracy through contacts."""
+"""The default solver: exact where documented, and fully accurate through contacts."""
 
 import mpmath as mp
 import numpy as np
@@ -21,7 +21,7 @@ def test_order_follows_the_tolerance():
 
 
 def test_bounces_within_units_in_the_last_place():
-    """Times of the bounces in closed form, for the very numbers that the machine is given."""
+    """Bounce times in closed form, for exactly the doubles that the solver receives."""
     ball = models.bouncing_ball()
     for e, h in ((0.8, 1.0), (0.5, 3.7), (0.95, 0.123)):
         arc = simulate(ball, (h, 0.0), (0.0, 100.0), parameters={"e": e})
@@ -35,7 +35,7 @@ def test_bounces_within_units_in_the_last_place():
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-12])
 def test_an_exact_mode_does_not_depend_on_the_tolerance(tolerance):
-    """A driven oscillator with a resting start: closed form to rounding."""
+    """A driven oscillator from rest matches its closed form to rounding."""
     system = HybridSystem(
         state=("x", "v"),
         parameters={"c": 0.1, "k": 4.0, "A": 1.3, "w": 1.7},
@@ -58,7 +58,7 @@ def test_an_exact_mode_does_not_depend_on_the_tolerance(tolerance):
 
 @pytest.mark.parametrize("gap", [0.05, 0.0])
 def test_contacts_lose_no_order(gap):
-    """The error of state and tangents stays in proportion to the tolerance down to rounding."""
+    """The error of state and tangents is proportional to the tolerance down to rounding."""
     case = FOUNDING[f"D={gap:g}"]
     system = models.vibroimpact()
     span = case["periods"] * 2 * np.pi / 7.4
@@ -85,7 +85,7 @@ def test_contacts_lose_no_order(gap):
 @pytest.mark.parametrize("speed", [1e-3, 1.0])
 @pytest.mark.parametrize("wall", [0.0, 1.0, 1e3, 1e6])
 def test_a_contact_far_from_the_origin_gives_the_speed_back(wall, speed):
-    """The penetration is a difference of large numbers; a force that felt its rounding would lose 1e-7."""
+    """The penetration is a difference of large numbers; its rounding in the force would cost 1e-7."""
 
     def penetration(t, x, p):
         return x.q - p.D
@@ -107,12 +107,12 @@ def test_a_contact_far_from_the_origin_gives_the_speed_back(wall, speed):
     arc = simulate(system, start, (0.0, 4.0), mode="free", solver=solver, tangent=True)
     assert [jump.target for jump in arc.jumps] == ["contact", "free"]
     assert arc.x[-1, 1] == pytest.approx(-speed, rel=1e-14)
-    # Area is kept.
+    # Areas are preserved.
     assert np.linalg.det(arc.fundamental) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_dense_output_inside_a_contact():
-    """The clock of a contact is not time; the dense output is a function of time all the same."""
+    """The clock of a contact is not time, but the dense output is a function of time."""
     system, case = models.vibroimpact(), FOUNDING["D=0.05"]
     arc = simulate(system, case["x0"], (0.0, 1.0))
     other = simulate(system, case["x0"], (0.0, 1.0), solver=DOP853(rtol=1e-13, atol=1e-15))
@@ -134,7 +134,7 @@ def test_a_run_may_end_and_resume_inside_a_contact():
 
 
 def test_a_contact_entered_at_rest():
-    """Pressed on a Hertz contact from zero depth and speed: the static push doubles the depth at rest."""
+    """A constant push from zero depth and speed doubles the static depth of a Hertz contact."""
     system = HybridSystem(
         state=("z", "v"),
         parameters={"K": 1.0, "F": 1.0},
@@ -190,7 +190,7 @@ def test_an_arc_says_how_it_was_computed():
 
 
 def test_a_flight_without_end_is_followed_in_steps():
-    """A section that is met again only after a very long polynomial flight."""
+    """The section is crossed again only after a very long polynomial flight."""
     system = HybridSystem(state=("x",), modes=[Mode("go", lambda t, x, p: (1.0,))])
     section = hybrid.poincare_section(system, (0.0,), Guard(lambda t, x, p: x.x - 1e7, +1), points=1)
     assert section.t[0] == pytest.approx(1e7, rel=1e-14)
@@ -198,7 +198,7 @@ def test_a_flight_without_end_is_followed_in_steps():
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_a_contact_is_left_once(tolerance):
-    """What the root of a guard loses to the tolerance must not make the guard fire again."""
+    """The error of a root within the tolerance must not make the guard fire again."""
     arc = simulate(
         models.vibroimpact(),
         (0.0, 0.001, 0.0, 0.0),

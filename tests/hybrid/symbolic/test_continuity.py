@@ -1,4 +1,4 @@
-"""A field jumps in the state unless it is proved that it does not."""
+"""A field counts as discontinuous in the state unless its continuity is proved."""
 
 import math
 from itertools import pairwise

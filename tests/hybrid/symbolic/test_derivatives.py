@@ -1,4 +1,4 @@
-"""Derivatives by the chain rule, beside SymPy's own and beside differences."""
+"""Derivatives by the chain rule, compared with SymPy and with finite differences."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_large_blocks_share_what_they_use_twice(monkeypatch):
 
 
 def test_matrices_of_zeros():
-    """The zeros of large derivatives are written by a loop, in the places where they belong."""
+    """A loop writes the zeros of large derivatives to the right places."""
     n = 12
     system = HybridSystem(
         state=n,

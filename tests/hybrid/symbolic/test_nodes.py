@@ -1,4 +1,4 @@
-"""Expressions are graphs: questions about them take as long as they have nodes, not branches."""
+"""Expressions are graphs: the cost of a query grows with the nodes, not with the branches."""
 
 import numpy as np
 import pytest
@@ -93,7 +93,7 @@ def test_forty_rounds_are_two_hundred_nodes():
     assert not mentions(expression, (Y,))
     with distribute(False):
         moved = replaced(replaced(expression, {X: Y}), {Y: X})
-    # To show the two would take for ever.
+    # Printing the two would take forever.
     is_the_same = moved is expression
     assert is_the_same
 
@@ -106,7 +106,7 @@ def rounds(value):
 
 @pytest.mark.parametrize("where", ["field", "guard", "reset", "condition"])
 def test_a_model_whose_function_uses_its_result_twice_forty_times(where):
-    """It is traced, and computes what Python computes."""
+    """The function is traced and computes the same as Python."""
     deep = {where: rounds}
 
     def of(name, value, plain):

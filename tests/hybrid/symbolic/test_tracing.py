@@ -12,7 +12,7 @@ NAMES = ("a", "b")
 
 
 def evaluate(expressions, t, x, p):
-    """Values of traced expressions by way of the code that would be compiled."""
+    """Values of traced expressions, from the code that would be compiled."""
     out = np.zeros(len(expressions))
     lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions)
     scope = {"t": t, "x": x, "p": p, "out": out, "np": np, **vars(math)}
@@ -145,7 +145,7 @@ PARITY = [np.sin, np.cos, np.tan, np.arcsin, np.arctan, np.sinh, np.cosh, np.tan
 
 @pytest.mark.parametrize("ufunc", PARITY, ids=lambda ufunc: ufunc.__name__)
 def test_a_sum_of_negative_terms(ufunc):
-    """SymPy takes the sign out of it; that keeps every digit, those of a difference within it too."""
+    """SymPy factors out the sign, which must keep every digit, also within a difference."""
     x = np.array([0.25, 0.125])
     found = evaluate(traced_scalar(lambda a, b: ufunc(-a - b)), 0.0, x, [])
     np.testing.assert_allclose(found, [ufunc(-0.375)], rtol=4e-16)

@@ -1,4 +1,4 @@
-"""Models as graphs: what is checked when one is made, and by what words."""
+"""Models as graphs: the checks when a model is made, and their messages."""
 
 import re
 

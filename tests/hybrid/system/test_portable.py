@@ -31,7 +31,7 @@ def stored(value):
 
 
 def same(one, other):
-    """Whether two values hold the same, arrays to the last bit."""
+    """Whether two values are equal, arrays to the last bit."""
     if isinstance(one, np.ndarray) and one.dtype != object:
         return isinstance(other, np.ndarray) and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc")
     if isinstance(one, tuple | list) or (isinstance(one, np.ndarray) and one.dtype == object):
@@ -136,7 +136,7 @@ def test_saltation_matrices_are_still_made_when_asked_for():
     ],
 )
 def test_functions_without_a_name(system, text):
-    """Those can be stored by value only."""
+    """Functions without an importable name can only be stored by value."""
     cloudpickle = pytest.importorskip("cloudpickle")
     for each in (system, hybrid.simulate(system, START, (0.0, 1.0))):
         with pytest.raises(hybrid.ModelError, match=text) as caught:

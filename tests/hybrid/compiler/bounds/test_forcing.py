@@ -1,4 +1,4 @@
-"""Pulses far narrower than a step: none is stepped over, at any place, of any shape, by any solver."""
+"""Pulses far narrower than a step: no solver steps over a pulse, whatever its place and shape."""
 
 from functools import cache
 
@@ -42,7 +42,7 @@ END = 1000.0
 
 
 class P:
-    """Parameters for a pulse outside of a model."""
+    """Parameters of a pulse for use outside a model."""
 
     def __init__(self, **values):
         vars(self).update(values)
@@ -69,7 +69,7 @@ def lag(shape):
 
 
 def integral(function, start, stop, place, width):
-    """Gauss's rule on pieces that double from the pulse outwards; kinks and jumps lie on their ends."""
+    """Gauss quadrature on pieces that double outwards from the pulse; kinks and jumps are at their ends."""
     reach = width * 2.0 ** np.arange(-6, 60)
     edges = np.concatenate([place - reach, [place, start, stop], place + reach])
     edges = np.unique(np.clip(np.concatenate([edges, np.arange(start, stop, 0.5)]), start, stop))
@@ -81,7 +81,7 @@ def integral(function, start, stop, place, width):
 
 
 def exact_oscillator(shape, end, parameters):
-    """The oscillator from rest: its response to an impulse, folded with the pulse."""
+    """The oscillator from rest: its impulse response convolved with the pulse."""
     p, rate = P(**parameters), DAMPING / 2
     frequency = np.sqrt(1 - rate**2)
 
@@ -110,7 +110,7 @@ heights = st.floats(-2.0, 0.0).map(lambda exponent: 10.0**exponent)
 
 
 def allowed_error(shape, solver, height, width):
-    """A share of the response and some absolute tolerances. Edges are found by the error control alone."""
+    """A share of the response plus some absolute tolerances; edges are found by the error control only."""
     has_edges = shape in ("window", "kinked") or isinstance(solver, Tsit5)
     share = 1e-3 if has_edges else 1e-6
     return share * height * min(width, 1.0) + 100 * solver.atol
@@ -158,7 +158,7 @@ def test_a_window_has_a_closed_form(solver, place, width):
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("shape", [shape for shape in SHAPES if shape != "lorentz"])
 def test_the_steps_are_those_that_the_pulse_needs(shape, solver):
-    """A thousand times narrower, and a hundred times farther away: hardly more steps."""
+    """A pulse a thousand times narrower and a hundred times farther away needs hardly more steps."""
     most = {Taylor: 300, DOP853: 300, RadauIIA: 1200, Tsit5: 400}[type(solver)]
     for place, width in ((50.0, 1e-4), (50.0, 1e-2), (5000.0, 1e-4), (5000.0, 1e-2)):
         arc = simulate(
@@ -183,7 +183,7 @@ def test_a_pulse_of_no_size_needs_no_small_steps(solver, height):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_tangent_vectors_see_a_pulse_that_multiplies_the_state(solver):
-    """``x' = (-1 + g(t)) x``, also at ``x = 0``, where the state sees nothing of it."""
+    """``x' = (-1 + g(t)) x``, also at ``x = 0``, where the state does not change."""
     system = HybridSystem(
         state=("x",),
         parameters={"A": 200.0, "a": 30.0, "w": 0.01},
@@ -239,7 +239,7 @@ def test_a_train_of_pulses_of_the_declared_period(train, place, width, solver):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_difference_of_two_switches_is_a_pulse(solver):
-    """Each of them is explained by the ends of any step."""
+    """Each switch alone is consistent with the values at the ends of a step."""
     system = HybridSystem(
         state=("x",),
         parameters={"a": 500.0, "w": 1e-3},
@@ -271,7 +271,7 @@ def test_a_high_power_of_a_cosine_is_a_pulse(solver):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_pulse_in_one_mode_of_two(solver):
-    """A ball that waits on a spring is kicked over a guard, and its crossing is where the pulse puts it."""
+    """A pulse kicks a ball on a spring across a guard; the crossing must be at the exact time."""
     system = HybridSystem(
         state=("x", "v"),
         parameters={"a": 400.0, "w": 0.01},
@@ -291,7 +291,7 @@ def test_a_pulse_in_one_mode_of_two(solver):
 
 
 def test_a_pulse_during_a_contact():
-    """On a clock of its own a mode resolves the pulses of time, too."""
+    """A mode on its own clock also resolves pulses in time."""
     system = HybridSystem(
         state=("x", "v"),
         parameters={"a": 60.0, "w": 1e-3, "K": 1e4},
@@ -377,7 +377,7 @@ def test_what_the_compiled_system_says():
 
 
 def test_a_product_of_many_harmonics_is_no_harmless_forcing():
-    """A sum of as many is."""
+    """A sum of as many harmonics is harmless."""
     t = sympy.Symbol("t", real=True)
     many = [sympy.cos(k * t) for k in range(1, MOST_HARMONICS + 2)]
     assert is_harmless(sympy.Add(*many), t)

@@ -1,4 +1,4 @@
-"""Terms that cancel to their rounding: which are found, and how a block lets go at that instant."""
+"""Terms that cancel to rounding: which terms are found, and how a block is released at that instant."""
 
 import numpy as np
 import pytest
@@ -55,9 +55,9 @@ BLOCK = block()
     size=st.one_of(st.none(), st.floats(-18.0, 0.0)),
 )
 def test_a_block_lets_go_once(solver, w, f, before, size):
-    """However close to the start of time, and to the origin, the forces are equal."""
+    """The block is released once, however close to time zero and to the origin the forces are equal."""
     x0 = (0.0 if size is None else 10.0**size, 0.0)
-    # It lets go where the force is f beyond the spring's, ``10**before`` of a period after the start.
+    # Release: the force exceeds the spring's by f, ``10**before`` of a period after the start.
     phi = -np.arccos(min(f + x0[0], 1.0)) - 10.0**before
 
     def run(phi):

@@ -1,4 +1,4 @@
-"""Compiled code kept between processes, and what is said while it is made."""
+"""Compiled code kept between processes, and the messages during compilation."""
 
 import errno
 import os
@@ -85,7 +85,7 @@ def test_short_work_is_not(capsys):
 
 @pytest.fixture
 def shared_kernels(tmp_path):
-    """A cache folder with the kernels of this process, which take long to compile, and no models."""
+    """A cache folder with the compiled kernels of this process and without models."""
     load_kernels()
     load_kernels("hybrid.kernels.events.sections")
     for kernels in cache_directory().glob("kernels-*"):
@@ -125,7 +125,7 @@ def test_linear_algebra_is_loaded_when_a_compiled_function_needs_it(shared_kerne
 
 @pytest.fixture
 def new_process(monkeypatch, tmp_path):
-    """Nothing is known of any folder yet, and the private one lies in a folder of this test."""
+    """The state of a new process, with the private cache in a folder of this test."""
     monkeypatch.setattr(folder, "_SAID", set())
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
@@ -313,7 +313,7 @@ def test_damaged_kernels_are_compiled_again(tmp_path):
 
 
 def test_kernels_are_kept_by_the_loader_alone(tmp_path):
-    """Beside its own file a kernel would outlive an edit of the others that are part of it."""
+    """A kernel cached beside its own file would survive an edit of other files that it uses."""
     load_kernels()
     from hybrid.kernels.types.layout import ENTRY, KERNEL, PART
 
@@ -324,7 +324,7 @@ def test_kernels_are_kept_by_the_loader_alone(tmp_path):
         assert dict(**PART)["cache"]
         assert not (ENTRY | {"cache": False})["cache"]
     assert not dict(**PART)["cache"]
-    # The loader comes too late for what has been imported past it.
+    # The loader cannot handle modules that were imported without it.
     kernel = numba.njit(numba.float64(numba.float64), **ENTRY)(lambda u: u + 1.0)
     assert kernel(1.0) == 2.0
     assert kernel._cache.cache_path is None

@@ -1,4 +1,4 @@
-"""Kernels compiled by a second process meanwhile."""
+"""Kernels that a second process compiles at the same time."""
 
 import subprocess
 

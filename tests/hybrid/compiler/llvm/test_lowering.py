@@ -1,4 +1,4 @@
-"""Generated text computes as machine code what it computes as Python, to the last bit."""
+"""Generated text gives the same bits as machine code and as Python."""
 
 import math
 
@@ -20,7 +20,7 @@ P = np.array([0.3])
 
 
 def results(lines, x=X, kind=VECTOR_SIGNATURE, index=0, size=4):
-    """What both leave in ``out``."""
+    """The contents of ``out`` after Python and after machine code."""
     found = []
     for run in both(lines, kind):
         out = np.full(size if kind is VECTOR_SIGNATURE else (size, size), 7.0)
@@ -87,7 +87,7 @@ def test_a_comparison_with_nan_is_false():
 
 
 def test_nothing_is_fused_where_it_is_not_allowed():
-    """``a*b - a*b`` is zero, not what rounding took from the product."""
+    """``a*b - a*b`` is zero, not the rounding error of the product."""
     found = results(["a = x[0]*x[1]", "out[0] = x[0]*x[1] - a"])
     assert found[0][0] == found[1][0] == 0.0
 
@@ -114,14 +114,14 @@ def test_matrices():
 
 @pytest.mark.parametrize("index", [0, 1, -1])
 def test_branches(index):
-    """A variable of one branch has nothing to do with that of another."""
+    """A variable of one branch is independent of the same variable of another branch."""
     lines = ["if index == 0:", "    y = x[0]", "    out[0] = y", "elif index == 1:", "    y = len(x)"]
     lines += ["    out[0] = y", "else:", "    out[0] = 5.0"]
     np.testing.assert_array_equal(*results(lines, index=index))
 
 
 def test_as_many_branches_as_a_model_has_transitions():
-    """A chain of choices is no nest: it may be longer than Python goes down."""
+    """A chain of branches is not nested: it may be longer than Python's recursion limit."""
     lines = [f"{'if' if i == 0 else 'elif'} index == {i}:\n        out[0] = {i}.0" for i in range(300)]
     _, run = both(lines, VECTOR_SIGNATURE)
     for index in (0, 150, 299):
@@ -159,7 +159,7 @@ def test_a_variable_keeps_its_type():
 
 
 def grown(rng, depth):
-    """A random expression of all that the printer writes of sums, products, choices and jumps."""
+    """A random expression of the sums, products, choices and jumps that the printer supports."""
     if depth == 0 or rng.random() < 0.1:
         leaves = [*sympy.symbols("x[0] x[1] x[3] p[0] t", real=True), sym.number(rng.uniform(-3.0, 3.0))]
         return leaves[rng.integers(len(leaves))]
@@ -189,7 +189,7 @@ def grown(rng, depth):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_any_expression(seed):
-    """No bit differs but that of a sine, and where Python raises IEEE has an answer."""
+    """Only sines may differ in a bit; where Python raises an error, IEEE gives a value."""
     rng = np.random.default_rng(seed)
     written = [assignments(["out[0]"], [grown(rng, 4)]) for _ in range(40)]
     lines = []
@@ -233,7 +233,7 @@ def test_types_that_do_not_fit_are_refused():
 
 
 def test_lines_are_read_by_llvm():
-    """Addresses, aligned stores and flags among them."""
+    """LLVM reads the lines, including addresses, aligned stores and flags."""
     module = ir.Module()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [NUMBER.as_pointer(), WHOLE]), "f")
     address, index = function.args

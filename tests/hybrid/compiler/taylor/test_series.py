@@ -56,9 +56,9 @@ FUNCTIONS = {
 
 
 def series_of(system, x, *, t=0.0, mode=0, tangents=0, vectors=None, parameters=()):
-    """The function ``series`` of a system: of the state and what follows it, and of each tangent vector.
+    """The function ``series`` of a system: coefficients of the state and of each tangent vector.
 
-    Matrices ``(ORDER + 1, columns)``, and ``(ORDER + 1, n)`` a vector.
+    Matrices ``(ORDER + 1, columns)``, and ``(ORDER + 1, n)`` per vector.
     """
     scope = {}
     emitted = emit(system)
@@ -84,17 +84,17 @@ def kinds(system):
     return [each.kind for each in emit(system).propagators]
 
 
-# Powers of what is no guard, which may reach zero.
+# Powers of expressions that are not a guard and may reach zero.
 FRACTIONAL = ("sqrt", "power", "variable power")
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_functions_of_the_state(name):
-    """With ``x' = 1, y' = F(x)`` the coefficients of y are those of the integral of F."""
+    """With ``x' = 1, y' = F(x)`` the series of y is the integral of the series of F."""
     function, exact = FUNCTIONS[name]
     system = system_of(lambda t, x, p: (1.0, function(x.x)))
     if name in FRACTIONAL:
-        # Its series would go on through the zero of the base.
+        # The series would continue through the zero of the base.
         assert kinds(system) == [RUNGE_KUTTA]
         return
     out, [vector] = series_of(system, [A, 0.0], tangents=1)
@@ -175,7 +175,7 @@ def test_degree_of_polynomial_solutions(field, degree):
     [
         (lambda x: x.x + 1, 2),
         (lambda x: x.x * x.y - 1, 4),
-        # Written out its flat roots would drown in rounding.
+        # Expanded, the polynomial would lose its flat roots to rounding.
         (lambda x: x.x * x.y**2 - 1, 2),
         (lambda x: np.exp(x.x), 2),
     ],
@@ -273,7 +273,7 @@ def test_series_on_the_clock_of_a_contact(power):
 
 @pytest.mark.parametrize("count", [1, 3, 4, 5, 9])
 def test_any_number_of_tangent_vectors(count):
-    """Four at a time, the last of them filled up with zeros: each is as if it were alone."""
+    """Vectors are computed in groups of four, padded with zeros; each gives the same result as alone."""
     system = system_of(lambda t, x, p: (x.y * x.x, np.sin(x.y) / x.x + np.cos(t)))
     vectors = np.random.default_rng(count).normal(size=(count, 2))
     _, together = series_of(system, [A, 0.5], vectors=vectors)
@@ -299,7 +299,7 @@ def test_a_linear_mode_has_a_table_and_what_only_looks_linear_has_none():
 
 
 def test_a_table_is_right_to_the_last_digit():
-    """The coefficients from unit vectors are ``M^o / o!``, of which recurrences would lose some digits."""
+    """The coefficients from unit vectors are ``M^o / o!``, while recurrences lose some digits."""
     rates = [[0.1, 3.7, -2.3], [-11.3, 0.7, 1 / 3], [5.1, -0.9, -6.7]]
 
     def field(t, x, p):
@@ -320,7 +320,7 @@ def test_a_table_is_right_to_the_last_digit():
 
 
 def test_a_table_and_recurrences_agree():
-    """A guard that is affine in time is no linear form of the state, and takes the mode's table away."""
+    """A guard that is affine in time is not linear in the state, so the mode has no table."""
 
     def field(t, x, p):
         return x.y, np.cos(3 * t + 1) * 2 - np.exp(-t / 2) - 4 * x.x - x.y / 5 + 1
@@ -338,19 +338,19 @@ def test_a_table_and_recurrences_agree():
 
 
 class TestSums:
-    """Texts of sums, by when their terms are known."""
+    """Texts of sums, ordered by when their terms are known."""
 
     @pytest.mark.parametrize(
         ("terms", "text"),
         [
             ([Term((3, 0), "a", False)], "a"),
             ([Term((3, 0), "late", False), Term((1, 0), "early", False)], "early + late"),
-            # Three that are there wait for no one; what comes last is added last.
+            # Terms that are known first are added first; the last known term is added last.
             (
                 [Term((9, 0), "k*z", True), *(Term((1, i), each, False) for i, each in enumerate("abc"))],
                 "(c + (a + b)) + k*z",
             ),
-            # A product takes an operation before it can be the first of a sum.
+            # A product needs an operation before it can be the first term of a sum.
             ([Term((1, 0), "k*x", True), Term((1, 1), "y", False)], "k*x + y"),
         ],
     )

@@ -1,4 +1,4 @@
-"""Root isolation against polynomials whose roots are known, in exact arithmetic until the last rounding."""
+"""Root isolation on polynomials with known roots, in exact arithmetic up to the last rounding."""
 
 from fractions import Fraction
 from itertools import pairwise
@@ -88,7 +88,7 @@ def exact_crossing(roots, pairs, direction):
     return signs[0], NONE, signs[-1]
 
 
-# Multiples of 1/64 apart, so that the rounding of the coefficients moves no root much.
+# Multiples of 1/64 apart, so that rounding of the coefficients hardly moves a root.
 apart = st.lists(st.integers(-40, 120), min_size=1, max_size=5, unique=True).map(
     lambda numerators: [n / 64 + 1 / 256 for n in numerators]
 )
@@ -112,7 +112,7 @@ def test_scale_does_not_matter(roots, pairs, direction, scale):
     side = exact_crossing(roots, pairs, direction)[0]
     coefficients = bernstein(powers(roots, pairs), 7)
     whole = crossing(coefficients, side, direction)
-    # A power of two leaves every digit as it is.
+    # A power of two does not change the digits.
     scaled = crossing(coefficients * 2.0 ** round(np.log2(scale)), side, direction)
     assert scaled == whole
     mirrored = crossing(-coefficients, -side, -direction)
@@ -121,7 +121,7 @@ def test_scale_does_not_matter(roots, pairs, direction, scale):
 
 @given(st.lists(st.floats(-1, 1), min_size=9, max_size=9), directions)
 def test_against_sampling(values, direction):
-    """Whatever sampling sees is not missed, and what is found is a zero."""
+    """Every crossing that sampling sees is found, and every crossing found is a zero."""
     coefficients = np.array(values)
     if not abs(coefficients[0]) > 1e-3:
         return
@@ -154,7 +154,7 @@ def test_against_sampling(values, direction):
     ],
 )
 def test_roots_where_intervals_are_cut(roots, side, direction, expected):
-    """Roots at the ends and the middles of intervals are no place for a proof by signs."""
+    """Signs alone prove nothing for roots at the ends and middles of intervals."""
     assert crossing(bernstein(powers(roots), 7), side, direction)[0] == pytest.approx(expected, abs=1e-15)
 
 
@@ -169,7 +169,7 @@ def test_a_close_pair_is_two_crossings(gap, place, direction):
         coefficients = np.array([place * (place + gap), -place + place * place, (1 - place) ** 2])
     theta, _ = crossing(coefficients, 1, direction)
     if gap == 1e-9:
-        # The coefficients cannot hold it; found or not, it must be in the right place.
+        # The coefficients cannot resolve the pair; a crossing that is found must be in the right place.
         assert theta == NONE or abs(theta - place) < 1e-7
     else:
         assert theta == pytest.approx(place + (gap if direction == 1 else 0.0), abs=1e-15 / gap + 1e-15)
@@ -177,7 +177,7 @@ def test_a_close_pair_is_two_crossings(gap, place, direction):
 
 @pytest.mark.parametrize("gap", [1e-9, 1e-12])
 def test_a_close_pair_near_the_start_is_two_crossings(gap):
-    """Near zero coefficients are as small as the roots, and nothing is lost."""
+    """Near zero the coefficients are as small as the roots, so no digits are lost."""
     coefficients = bernstein(powers((gap, 2 * gap, 0.7)), 7)
     assert crossing(coefficients, -1, +1)[0] == pytest.approx(gap, rel=1e-3)
     assert crossing(coefficients, -1, -1)[0] == pytest.approx(2 * gap, rel=1e-3)
@@ -231,7 +231,7 @@ def test_deflation_takes_out_exactly_the_root_at_zero(roots):
 
 
 def test_a_second_root_next_to_the_known_one_is_found():
-    """As after a bounce that is nearly over: on the guard now, and again after 1e-12 of the step."""
+    """As after a very short bounce: the guard is zero now and again after 1e-12 of the step."""
     coefficients = bernstein(powers((0, 1e-12)), 7)
     degree = deflated(coefficients, 1)
     theta, side = first_crossing(-coefficients[: degree + 1], degree, 1, -1)

@@ -1,4 +1,4 @@
-"""What does not depend on time is as good late as early: a shift of time changes nothing."""
+"""An autonomous run does not depend on its start time."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ SOLVERS = [hybrid.Taylor(), hybrid.DOP853(), hybrid.RadauIIA()]
 
 
 def neuron(peak):
-    """Exponential integrate-and-fire neuron with adaptation: its spikes contain steps of 1e-12 ms."""
+    """Exponential integrate-and-fire neuron with adaptation: its spikes need steps of 1e-12 ms."""
     return HybridSystem(
         name="neuron",
         state=("v", "w"),
@@ -74,14 +74,14 @@ def test_spikes_go_on_as_they_began():
     assert arc.status.ok
     intervals = np.diff(arc.jumps.t)
     assert len(intervals) > 10_000
-    # Each time is rounded when it is told, but no rounding is carried on.
+    # Each reported time is rounded, but the rounding does not accumulate.
     np.testing.assert_allclose(intervals[-100:], intervals[500], atol=6e-11)
     late = arc.jumps.t[500:]
     np.testing.assert_allclose(late - late[0], np.arange(len(late)) * np.mean(intervals[500:]), atol=1e-9)
 
 
 def test_forcing_without_a_period_is_limited_by_the_rounding_of_time():
-    """The steps of 1e-12 that the neuron needs cannot be told apart in its forcing at a late time."""
+    """At a late time the forcing cannot resolve the steps of 1e-12 that the neuron needs."""
 
     def field(t, x, p):
         rate, slope = NEURON.modes[0].field(t, x, p)

@@ -31,7 +31,7 @@ def pair(columns=44):
 
 
 def test_convolve():
-    """The width of a convolution and its registers' are known from the text; each is a branch of its own."""
+    """The widths of a convolution and of its registers are constants of the text, one branch per width."""
     cases = [
         (width, inset, widest, name)
         for width in (4, 8, 12, 20, 36)
@@ -102,7 +102,7 @@ def test_combine_tangents(n, width):
 
 @pytest.mark.parametrize("count", [0, 1, 4, 6])
 def test_tangent_vectors_there_and_back(count):
-    """Vectors that fill no whole register are followed by zeros."""
+    """Vectors that do not fill a register are padded with zeros."""
     y = np.random.default_rng(count).normal(size=3 * (1 + count))
     runs = both(["vectors = 8", "spread_tangents(x, 3, out, vectors, 20)"])
     found = []

@@ -1,4 +1,4 @@
-"""Two parts hold what one number cannot: sums of products and their quotients to twice the digits."""
+"""Doubled numbers: sums of products and their quotients to twice the digits."""
 
 from fractions import Fraction
 
@@ -36,5 +36,5 @@ def test_twice_the_digits(run, seed):
         for row, exact in enumerate((once, twice), start=1):
             found = Fraction(matrix[row, lane]) + Fraction(matrix[row, 4 + lane])
             assert abs(found - exact) <= size * Fraction(2) ** -96
-            # The first part is the whole, rounded.
+            # The first part is the rounded sum of both parts.
             assert matrix[row, lane] == float(exact)

@@ -54,7 +54,7 @@ def angle(a, b, c, d):
     return _angle(a, b, c, d)
 
 
-# Each function with its derivative; None where it is zero but for jumps.
+# Each function with its derivative; None if the derivative is zero except at jumps.
 FUNCTIONS = {
     op.EXP: (math.exp, math.exp),
     op.LOG: (math.log, lambda u: 1 / u),
@@ -106,7 +106,7 @@ def test_a_function_lies_within_its_bounds(code, case):
     except (ValueError, OverflowError):
         assume(False)
     least, most, below, above = bounds(code, low, high)
-    # The reference is rounded itself.
+    # The reference is rounded, too.
     slack = 1e-15 * abs(value)
     assert least - slack <= value <= most + slack
     if derivative is None:

@@ -59,7 +59,7 @@ def test_the_largest_wherever_it_is(place):
     ("count", "filled"), [(1, 4), (3, 4), (4, 4), (5, 8), (8, 8), (9, 12), (12, 12), (13, 16)]
 )
 def test_a_row_is_written_in_whole_registers(count, filled):
-    """What is not a whole register is filled up with zeros, and nothing behind it is touched."""
+    """An incomplete register is padded with zeros, and no memory behind it changes."""
     numbers = tuple(1.0 + i for i in range(count))
     expected = np.full((3, 20), np.nan)
     expected[1, 2 : 2 + count], expected[1, 2 + count : 2 + filled] = numbers, 0.0

@@ -1,4 +1,4 @@
-"""LU factors against NumPy, with row exchanges and without an answer."""
+"""LU factors compared with NumPy, with row exchanges and for singular matrices."""
 
 import numpy as np
 import pytest

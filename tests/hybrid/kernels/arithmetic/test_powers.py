@@ -1,4 +1,4 @@
-"""Logarithms and powers that a step length needs are right to half a percent."""
+"""Logarithms and powers for the step length are accurate to half a percent."""
 
 import numpy as np
 import pytest

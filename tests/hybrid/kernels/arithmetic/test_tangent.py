@@ -1,4 +1,4 @@
-"""Orthonormalisation and determinants against LAPACK, and where LAPACK has no word for it."""
+"""Orthonormalisation and determinants compared with LAPACK, and cases beyond LAPACK."""
 
 import math
 
@@ -99,7 +99,7 @@ def test_a_zero_vector_has_collapsed(threshold):
 
 
 def test_what_a_projection_leaves_of_a_direction_is_rounding():
-    """Both images lie on one line up to rounding, as after a catch; only their part off it is dropped."""
+    """Both images lie on one line up to rounding, as after a catch; only the rounding part is dropped."""
     image = np.array([[0.3, 0.7], [0.6, 1.4 + 3e-16]])
     _, growth, indistinct = orthonormalise(image, COLLAPSED)
     assert growth[1] == -math.inf
@@ -110,7 +110,7 @@ def test_what_a_projection_leaves_of_a_direction_is_rounding():
 
 
 def test_vectors_that_only_rounding_tells_apart_are_counted():
-    """Without a threshold none collapses, and what is left of the second is no direction of the flow."""
+    """Without a threshold no vector collapses, but the rest of the second vector is only rounding."""
     _, growth, indistinct = orthonormalise(np.array([[0.3, 0.7], [0.6, 1.4 + 3e-16]]))
     assert math.isfinite(growth[1])
     assert indistinct == 1
@@ -125,7 +125,7 @@ def test_a_zero_vector_stays_minus_infinity():
 
 @given(tall_matrices())
 def test_independence_is_the_square_of_the_product_of_the_sines(matrix):
-    """The squares of the diagonal of ``R`` over those of the columns' lengths."""
+    """It equals the squared diagonal of ``R`` divided by the squared lengths of the columns."""
     n, k = matrix.shape
     diagonal = np.diag(np.linalg.qr(matrix)[1])
     expected = np.prod(diagonal**2 / (matrix**2).sum(axis=0))

@@ -19,7 +19,7 @@ def rotation(t, x, p):
 
 
 def oscillator(*transitions, parameters=None):
-    """``q = e^(-0.1 t) sin(w t)`` from ``(0, w)``: through zero every half turn, slower each time."""
+    """``q = e^(-0.1 t) sin(w t)`` from ``(0, w)``: crosses zero every half turn, slower each time."""
     return HybridSystem(
         state=("q", "v"),
         parameters=parameters or {"c": 0.0},
@@ -67,7 +67,7 @@ def test_only_crossings_where_the_condition_holds_fire(when, shape):
 
 @pytest.mark.parametrize("directions", [(-1, +1), (0,)])
 def test_a_passed_crossing_changes_nothing(directions):
-    """Neither the state nor the tangents nor the sides of the other guards."""
+    """The state, the tangents and the sides of other guards stay the same."""
     passed = Transition("swing", "swing", Guard(height, when=lambda t, x, p: -1.0), name="passed")
     turning = [
         Transition("swing", "swing", Guard(lambda t, x, p: x.v, direction), name=f"turning {direction}")
@@ -95,7 +95,7 @@ def test_a_passed_crossing_changes_nothing(directions):
 @pytest.mark.parametrize("direction", [0, +1])
 @pytest.mark.parametrize("shape", [lambda q: q, lambda q: q + q**3])
 def test_the_second_of_two_crossings_in_one_step(width, direction, shape):
-    """``q = (t - 1)^2 - width^2`` has no error to hold steps back: both zeros lie in one."""
+    """``q = (t - 1)^2 - width^2`` is integrated exactly, so that both zeros lie in one step."""
     guard = Guard(lambda t, x, p: shape(x.q), direction, when=lambda t, x, p: t > 1.0)
     fall = HybridSystem(
         state=("q", "v"),
@@ -107,7 +107,7 @@ def test_the_second_of_two_crossings_in_one_step(width, direction, shape):
 
 
 def two_modes(when, **options):
-    """``q' = 1``; up where ``q`` rises through zero if the condition holds."""
+    """``q' = 1``; the mode changes to "up" where ``q`` rises through zero, if the condition holds."""
     return HybridSystem(
         state=("q",),
         parameters={"c": 1.0},
@@ -123,7 +123,7 @@ def two_modes(when, **options):
 class TestEntry:
     @pytest.mark.parametrize("start", [0.0, 0.5])
     def test_a_start_on_or_beyond_the_guard(self, start):
-        """On the guard it fires at once if the condition holds there; if not, or beyond, it lies behind."""
+        """A start on the guard fires if the condition holds; otherwise the guard is already passed."""
         system = two_modes(lambda t, x, p: p.c + t)
         arc = simulate(system, (start,), (0.0, 1.0), mode="low")
         assert [(jump.t, jump.target) for jump in arc.jumps] == ([(0.0, "high")] if start == 0 else [])
@@ -140,7 +140,7 @@ class TestEntry:
             simulate(system, (0.5,), (0.0, 0.1), parameters={"c": -1.0})
 
     def test_the_condition_is_that_after_a_reset(self):
-        """A reset puts the state beyond the guard of the next mode, where its condition looks."""
+        """A reset puts the state beyond the guard of the next mode, and the condition is evaluated there."""
         system = HybridSystem(
             state=("q",),
             parameters={"to": 1.0},
@@ -157,7 +157,7 @@ class TestEntry:
 
 
 class TestTogether:
-    """Guards that are reached at the same point, of which not all may fire."""
+    """Several guards are reached at the same point, and conditions refuse some of them."""
 
     def system(self, *transitions):
         return HybridSystem(
@@ -220,7 +220,7 @@ def test_a_section_with_a_condition():
 
 
 class TestEndOfTheRun:
-    """A projectile that is stopped where it meets the slope ``y = s x``."""
+    """A projectile whose run ends where it meets the slope ``y = s x``."""
 
     SYSTEM = HybridSystem(
         state=("x", "y", "u", "v"),

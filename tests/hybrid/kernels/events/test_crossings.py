@@ -63,7 +63,7 @@ class TestCrossings:
         ("gap", "bent"), [(1e-2, False), (1e-4, False), (1e-6, False), (1e-2, True), (1e-4, True)]
     )
     def test_two_in_one_step(self, gap, bent):
-        """``x = (t - 1)(t - 1 - gap)`` is followed exactly, in one step of any length."""
+        """``x = (t - 1)(t - 1 - gap)`` is integrated exactly, in one step of any length."""
         guard = (lambda t, x, p: np.sinh(x.x)) if bent else (lambda t, x, p: x.x)
         system = polynomial_motion(lambda t: 2 * t - 2 - gap, guard)
         arc = simulate(system, (1 + gap, 0.0), (0.0, 2.0), solver=LONG_STEPS)
@@ -86,7 +86,7 @@ class TestCrossings:
     @pytest.mark.parametrize("direction", [0, 1])
     @pytest.mark.parametrize("start", [0.5, 0.3, 1 / 7])
     def test_two_guards_at_one_instant_both_fire(self, direction, start):
-        """A puck in the corner turns back on itself."""
+        """A puck in the corner returns the way it came."""
         arc = simulate(box(direction), (start, start, 1.0, 1.0), (0.0, 6.0), mode="slide")
         assert [jump.transition for jump in arc.jumps[:4]] == ["right", "top", "left", "bottom"]
         np.testing.assert_allclose(arc.jumps.t, np.repeat(1 - start + np.arange(6), 2), atol=1e-12)
@@ -94,7 +94,7 @@ class TestCrossings:
 
     @pytest.mark.parametrize("step", [0.1, np.inf])
     def test_a_reset_beyond_another_guard_fires_it_however_long_the_step(self, step):
-        """Flow alone would have crossed the second guard later in the same step."""
+        """Without the reset the flow would cross the second guard later in the same step."""
         jumper = HybridSystem(
             state=("x", "n"),
             modes=[Mode("go", lambda t, x, p: (1.0, 0.0))],
@@ -110,7 +110,7 @@ class TestCrossings:
         np.testing.assert_allclose(arc.x[-1], [0.9, 2.0], atol=1e-12)
 
     def test_landing_at_the_very_end_of_a_step(self):
-        """Crossings anywhere near the joint of two coarse steps fire once each."""
+        """Crossings near the boundary of two coarse steps fire once each."""
         for solver in (hybrid.Tsit5(rtol=1.0, atol=1.0, max_step=1.0), hybrid.DOP853(rtol=1.0, max_step=2.5)):
             free = simulate(PENDULUM, (-1.5, 0.0), (0.0, 3.6), mode="left",
                             parameters={"c": 50.0}, solver=solver)  # fmt: skip
@@ -158,7 +158,7 @@ class TestStartOnAGuard:
 
     @pytest.mark.parametrize("q", [0.0, 3e-17, -3e-17, -1e-16])
     def test_rounding_is_no_side(self, ball, q):
-        """What a run that ended on the guard leaves there is a start on the guard."""
+        """A run that ended on the guard, up to rounding, restarts on the guard."""
         assert len(simulate(ball, (q, -4.0), (0.0, 0.5), mode="flight").jumps) == 1
         assert len(simulate(ball, (q, 4.0), (0.0, 0.5), mode="flight").jumps) == 0
         assert not simulate(PENDULUM, (q, 1.0), (0.0, 1.0), mode="right", parameters={"c": 0.0}).jumps
@@ -238,7 +238,7 @@ class TestEnds:
 
     @pytest.mark.parametrize("gap", [0.0, 1.0])
     def test_stuck(self, gap):
-        """Fields that point at each other leave no way on."""
+        """Fields that point towards each other leave no mode for the state."""
         stuck = HybridSystem(
             state=("x",),
             modes=[Mode("left", lambda t, x, p: (1.0,)), Mode("right", lambda t, x, p: (-1.0,))],

@@ -1,4 +1,4 @@
-"""Guards that touch zero, or nearly: classified, kept on the arc, never lost and never fired twice."""
+"""Guards that touch or nearly touch zero: classified, stored on the arc, never lost or fired twice."""
 
 from functools import cache
 
@@ -36,7 +36,7 @@ def parabola(guard="affine", direction=0):
 
 @cache
 def rigid(e=0.8):
-    """The parabola with a wall at zero, off which it bounces."""
+    """The parabola with a wall at zero that reflects it."""
     return HybridSystem(
         state=("q", "v"),
         modes=[Mode("move", lambda t, x, p: (x.v, 2.0))],
@@ -76,13 +76,13 @@ class TestTouches:
         if c >= 1e-14:
             assert len(arc.jumps) == expected
         else:
-            # The depth is of the size of the rounding of 1 - c.
+            # The depth is about the rounding of 1 - c.
             assert arc.x[-1, 2] == len(arc.jumps) <= 2
             assert len(arc.jumps) + len(arc.grazings) > 0
         if c >= 1e-9:
             exact = [1 - np.sqrt(c), 1 + np.sqrt(c)]
             chosen = {-1: exact[:1], 0: exact, +1: exact[1:]}[direction]
-            # A time error is the guard's error over its speed.
+            # The time error is the guard's error divided by its speed.
             np.testing.assert_allclose(arc.jumps.t, chosen, rtol=0, atol=1e-14 / np.sqrt(c))
 
     @pytest.mark.parametrize("guard", GUARDS)
@@ -102,7 +102,7 @@ class TestTouches:
 
     @pytest.mark.parametrize("guard", GUARDS)
     def test_an_exact_flight_tells_a_miss_from_a_touch(self, guard):
-        """Its error is rounding: one unit in a million millionth above the guard is a clear miss.
+        """The flight is exact to rounding: 1e-12 above the guard is a clear miss.
 
         Rounding may take an exact touch for two crossings, and then says that these graze.
         """
@@ -160,7 +160,7 @@ class TestKinds:
 
 
 class TestRounding:
-    """Dips of the depth of rounding: what is found depends on it, but must be consistent."""
+    """Dips as deep as rounding: the result depends on rounding but must be consistent."""
 
     @pytest.mark.parametrize("guard", GUARDS)
     @pytest.mark.parametrize("direction", [-1, 0, +1])
@@ -191,7 +191,7 @@ class TestBounces:
         assert len(arc.jumps) in ((1,) if c >= 1e-14 else (0, 1))
         s = np.sqrt(c)
         exact = 0.8 * 2 * s * (1 + s) + (1 + s) ** 2
-        # Rounding of the height, some 1e-14, over the speed at the wall, and the root of it next to the wall.
+        # Rounding of the height, about 1e-14, divided by the wall speed; near the wall its square root.
         assert arc.x[-1, 0] == pytest.approx(exact, abs=3e-14 / s if c >= 1e-14 else 4e-7)
 
     @given(
@@ -209,7 +209,7 @@ class TestBounces:
 
 
 def test_a_guard_that_is_not_affine_is_followed_from_a_turning_point():
-    """The state hardly moves at first: that does not tell how far the guard's series reaches."""
+    """The state hardly moves at first, which says nothing about the convergence of the guard's series."""
     first, gap = 0.225031, 2e-8
 
     def height(t):

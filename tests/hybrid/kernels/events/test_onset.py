@@ -33,7 +33,7 @@ GUARDS = {
 
 
 def moderate(largest):
-    """Numbers whose products with others keep all their digits, and zero."""
+    """Zero, or numbers of moderate size, whose products with others keep all their digits."""
     return st.floats(-largest, largest).filter(lambda a: a == 0.0 or abs(a) > 1e-60)
 
 
@@ -73,9 +73,9 @@ def leaving(guard, direction):
     split=st.floats(0.1, 0.9),
 )
 def test_a_start_beside_the_guard(solver, guard, direction, ulps, power, towards, c, split):
-    """The start is the guard itself up to rounding: only a motion in the guard's direction fires it, once.
+    """The start is on the guard up to rounding: only a motion in the guard's direction fires it, once.
 
-    A guard that jumps has no rounding: its sign at the start is its side.
+    A discontinuous guard has no such tolerance: its sign at the start is its side.
     """
     pushed = [towards if power == i else 0.0 for i in (1, 2, 3)]
     start = (away(c, ulps), pushed[0], pushed[1], 0.0)
@@ -122,7 +122,7 @@ def test_a_run_cut_beside_a_jump(solver, name):
 
 @cache
 def riding():
-    """``q`` moves as fast as both its guards do, on which it lies; ``s`` turns, for steps of some length."""
+    """``q`` moves with both moving guards and stays on them; ``s`` oscillates to limit the steps."""
     count = Reset(lambda t, x, p: (x.q, x.s, x.n + 1))
     return HybridSystem(
         state=("q", "s", "n"),

@@ -1,4 +1,4 @@
-"""Guards that are not affine: each change of sign fires once, at its place, and the guard is zero there."""
+"""Guards that are not affine: each change of sign fires once, at the right place, where the guard is zero."""
 
 from functools import cache
 
@@ -25,8 +25,8 @@ from hybrid import (
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-9, atol=1e-11), Tsit5(rtol=1e-9, atol=1e-11))
 END = 10.0
-# Guards as functions of the position ``q = 1.5 cos t``, with a sharpness and a threshold; each vanishes, or
-# jumps, where ``q`` is one of the values behind it.
+# Guards as functions of the position ``q = 1.5 cos t``, with a sharpness and a threshold; each is zero, or
+# jumps, where ``q`` equals one of the values given.
 FAMILIES = {
     "tanh": (lambda t, x, p: np.tanh(p.k * (x.q - p.c)), lambda k, c: [c]),
     "exp": (lambda t, x, p: np.exp(p.k * (x.q - p.c)) - 1, lambda k, c: [c]),
@@ -66,7 +66,7 @@ def oscillator(family, direction):
 
 
 def crossing_times(values):
-    """When ``1.5 cos t`` takes one of the values."""
+    """Times at which ``1.5 cos t`` equals one of the values."""
     times = [
         sign * np.arccos(value / 1.5) + 2 * np.pi * turn
         for value in values
@@ -77,7 +77,7 @@ def crossing_times(values):
 
 
 def guard_of(family, k, c, time):
-    """The guard on the exact solution, as the model has it."""
+    """The guard of the model, evaluated on the exact solution."""
 
     class Names:
         pass
@@ -105,7 +105,7 @@ def test_each_change_of_sign_fires_once(family, direction, k, c, solver):
     if np.any(np.diff(expected) < 1e-6):
         return
     if direction:
-        # The exact solution says which of them lead upwards.
+        # The exact solution shows which crossings lead upwards.
         around = [np.sign(guard_of(family, k, c, expected + shift)) for shift in (-1e-7, 1e-7)]
         expected = expected[(around[0] < 0) & (around[1] > 0)]
     arc = simulate(
@@ -132,7 +132,7 @@ def test_the_guard_is_zero_at_its_events(solver):
             class P:
                 k, c = 30.0, 0.2
 
-            # As large as rounding of the position makes it.
+            # Bound from the rounding of the position.
             scale = abs(function(jump.t, type("X", (), {"q": X.q + 1e-13, "v": X.v}), P)) + 1e-13
             assert abs(function(jump.t, X, P)) <= scale
 
@@ -188,7 +188,7 @@ def test_a_guard_that_touches_does_not_fire():
     near = simulate(touch, (-1.5, 0.0), (0.0, 12.0), parameters={"depth": -1e-9})
     assert len(near.jumps) == 0
     over = simulate(touch, (-1.5, 0.0), (0.0, 12.0), parameters={"depth": 1e-9})
-    # In and out again, around t = pi and 3 pi; at depth d the guard is below zero for 2 sqrt(2 d / 1.5).
+    # Two crossings around each of t = pi and 3 pi; at depth d the guard is below zero for 2 sqrt(2 d / 1.5).
     half = np.sqrt(2e-9 / 1.5)
     expected = [np.pi - half, np.pi + half, 3 * np.pi - half, 3 * np.pi + half]
     np.testing.assert_allclose(over.jumps.t, expected, atol=1e-9)
@@ -197,7 +197,7 @@ def test_a_guard_that_touches_does_not_fire():
 @pytest.mark.parametrize("solver", SOLVERS[:2])
 @pytest.mark.parametrize("start", [0.0, 0.25])
 def test_a_guard_that_is_zero_at_both_ends_of_a_step(solver, start):
-    """From period to period each step starts and ends on the guard, and crosses it in between."""
+    """In every period each step starts and ends on the guard and crosses it in between."""
     system = HybridSystem(
         state=("x", "n"),
         modes=[Mode("decay", lambda t, x, p: (-x.x, 0.0))],
@@ -243,7 +243,7 @@ def test_a_guard_that_cannot_be_traced_is_said_to_be_sampled():
 
 @pytest.mark.parametrize("solver", SOLVERS[:2])
 def test_a_moving_guard_beside_a_steep_one(solver):
-    """``x' = 0.25`` against ``1 + x - t / 2``: both move, and the surface is met at t = 4 only."""
+    """``x' = 0.25`` against ``1 + x - t / 2``: both move, and they meet only at t = 4."""
     system = HybridSystem(
         state=("x",),
         modes=[Mode("creep", lambda t, x, p: (0.25,))],
@@ -288,7 +288,7 @@ def test_a_jump_or_a_vertical_tangent_is_as_sharp_as_its_argument(function, argu
     ]
     plain, sharp = (np.asarray(arc.jumps.t) for arc in runs)
     assert len(plain) == len(sharp)
-    # A shallow crossing lies where rounding leaves it.
+    # Rounding sets the place of a shallow crossing.
     slopes = np.array([abs(jump.transversality) for jump in runs[0].jumps])
     np.testing.assert_array_less(np.abs(sharp - plain) * np.minimum(slopes, 1.0), 2e-14)
 
@@ -324,7 +324,7 @@ def test_a_jump_after_other_crossings_on_one_step(solver, a, b, c, direction):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_fall_behind_a_jump_at_the_start_of_a_step(solver):
-    """The jump puts the guard on its far side, from where it only falls: one more change of sign."""
+    """The guard jumps to its far side and then only falls, which is one more change of sign."""
     system = HybridSystem(
         state=("q",),
         modes=[Mode("ramp", lambda t, x, p: (0.3,))],
@@ -343,7 +343,7 @@ def test_a_fall_behind_a_jump_at_the_start_of_a_step(solver):
 @pytest.mark.parametrize("power", [3, 5, 7])
 @given(c=st.floats(-0.5, 0.5), a=st.floats(0.2, 0.5))
 def test_flat_roots_on_flights_that_are_polynomials(power, c, a):
-    """The power of a polynomial is flat where that is zero, however it would round written out."""
+    """A power of a polynomial has flat roots, whatever rounding its expanded form would have."""
     system = HybridSystem(
         state=("q",),
         parameters={"c": 0.0, "a": 0.4},

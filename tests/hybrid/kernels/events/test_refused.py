@@ -1,4 +1,4 @@
-"""A crossing that is refused where the run stands lies behind it: it is not found there again."""
+"""A crossing that its condition refuses has been passed: it is not found again at the same place."""
 
 from functools import cache
 
@@ -16,7 +16,7 @@ GUARDS = {
 
 @cache
 def pulled(guard="affine", direction=+1, forced=False):
-    """``q'' = s - (q - 1)`` with a clock ``s``: from rest at ``q = 1`` the motion is of third order."""
+    """``q'' = s - (q - 1)`` with a clock ``s``; from rest, ``q - 1`` grows as the third power of time."""
     pull = (lambda t, x, p: t - (x.q - 1)) if forced else (lambda t, x, p: x.s - (x.q - 1))
     return HybridSystem(
         state=("q", "v", "s", "n"),
@@ -40,7 +40,7 @@ def pulled(guard="affine", direction=+1, forced=False):
 @pytest.mark.parametrize("rounding", [-1e-16, 0.0, 2.3e-16, 4.5e-16])
 @pytest.mark.parametrize("allowed", [0.0, 1.0])
 def test_a_guard_left_by_its_third_derivative(solver, forced, guard, direction, rounding, allowed):
-    """Its acceleration at the start is rounding, of either sign, and so no reason to refuse, or to stay."""
+    """The acceleration at the start is rounding with either sign and must not decide the result."""
     start = (1.0 + rounding, 0.0, 0.0, 0.0)
     system = pulled(guard, direction, forced)
     arc = simulate(system, start, (0.0, 2.0), mode="move", solver=solver, parameters={"open": allowed})

@@ -1,4 +1,4 @@
-"""Jumps that accumulate: their limit, what comes after it, and the tangent map through it."""
+"""Jumps that accumulate: their limit, the run after it, and the tangent map through it."""
 
 import math
 from functools import cache
@@ -19,7 +19,7 @@ SLOPE = 0.3
 
 @cache
 def resting_ball():
-    """The bouncing ball with a mode for what comes after its last bounce."""
+    """The bouncing ball with a mode of rest after its bounces."""
     return HybridSystem(
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.8},
@@ -71,7 +71,7 @@ def ball_on_a_table():
 
 @cache
 def incline():
-    """A ball that bounces down a frictionless incline in air, and slides once it has stopped bouncing."""
+    """A ball that bounces down a frictionless incline in air, and slides after its bounces."""
     sine, cosine = math.sin(SLOPE), math.cos(SLOPE)
 
     def hit(t, x, p):
@@ -285,7 +285,7 @@ def smooth_incline():
 
 
 class TestIncline:
-    """Bouncing normal to the incline, and along it uniform acceleration, as if there were no bounces."""
+    """Normal to the incline the ball bounces; along it the acceleration is uniform, unaffected by bounces."""
 
     START = np.array([0.1, 1.0, 0.2, -0.3])
 
@@ -314,7 +314,7 @@ class TestIncline:
         )
         last = arc.jumps[-1]
         assert last.kind == "limit"
-        # Rounding of the distance, over the speed of the last bounces, is an error of their times.
+        # The error of a time is the rounding of the distance divided by the speed of the last bounces.
         assert last.t == pytest.approx(limit, rel=2e-11 if e < 0.95 else 2e-10)
         np.testing.assert_allclose(last.x_plus, self.slid(angle, last.t), rtol=1e-13, atol=1e-13)
         np.testing.assert_allclose(arc.x[-1], self.slid(angle, limit + 1.0), rtol=2e-13, atol=1e-13)
@@ -328,7 +328,7 @@ class TestTangents:
     @pytest.mark.parametrize("drag", [0.0, 0.3])
     @pytest.mark.parametrize("e", [0.2, 0.7])
     def test_through_a_complete_chatter(self, drag, e):
-        """The end is affine in the start here, so that a long difference has no error but rounding."""
+        """The end is affine in the start, so that a wide finite difference has only rounding errors."""
         x0, step = np.array([0.1, 1.0, 0.2, -0.3]), 0.02
 
         def end(start, **options):
@@ -357,7 +357,7 @@ class TestTangents:
         np.testing.assert_allclose(arc.fundamental, exact, rtol=0, atol=1e-11)
 
     def test_when_the_limit_mode_brakes(self):
-        """The time of the limit then matters to what follows, against the closed form."""
+        """The time of the limit affects the motion after it; compared with the closed form."""
         brake, end = 1.0, 4.0
         system = braked(brake)
 
@@ -407,7 +407,7 @@ class TestTangents:
 
 
 def test_the_matrix_of_the_limit_does_not_depend_on_who_looks():
-    """Height and speed are lost, and ``w``, which grew with the height, keeps what it had from the ground."""
+    """Height and speed are lost; ``w``, which grew with the height, keeps its value from the ground."""
     system = HybridSystem(
         state=("q", "v", "w"),
         modes=[

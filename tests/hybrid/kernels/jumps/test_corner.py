@@ -10,7 +10,7 @@ from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, sim
 
 @cache
 def corner(order=1, e=1.0):
-    """A puck in a quadrant, off whose walls it bounces."""
+    """A puck in a quadrant with reflecting walls."""
     walls = [
         Transition(
             "slide",

@@ -1,4 +1,4 @@
-"""What fires at one instant: random systems beside a slow reference, invariances, and each rule by itself."""
+"""Transitions at one instant: random systems against a slow reference, invariances, and each rule."""
 
 from functools import cache
 
@@ -47,7 +47,7 @@ STRUCTURES = {
 
 
 def shift(i, x, value):
-    """The reset of transition ``i``: both components are moved or set, and a counter goes on."""
+    """The reset of transition ``i``: moves or sets both components, and increments a counter."""
     x = list(x)
     x[0] = value(f"k{i}") * x[0] + value(f"r{i}")
     x[1] = value(f"k{i}") * x[1] + value(f"s{i}")
@@ -92,12 +92,12 @@ def system(name, order=(0, 1, 2, 3)):
 
 
 def drawn(rng):
-    """Small whole numbers, so that guards are often met together and resets land on them."""
+    """Small integers, so that guards are often reached together and resets land on them."""
     values = {f"g{i}": int(rng.integers(-2, 3)) for i in range(4)}
     for i in range(4):
         values[f"r{i}"], values[f"s{i}"] = (int(v) for v in rng.integers(-2, 3, 2))
         values[f"k{i}"] = int(rng.integers(0, 2))
-        # Between the whole numbers: no condition is decided by rounding.
+        # Thresholds between integers, so that rounding decides no condition.
         values[f"w{i}"] = rng.integers(-2, 3) + 0.3
     for mode in "AB":
         values[f"u{mode}"], values[f"v{mode}"] = (int(v) for v in rng.choice([-1, 1, 2], 2))
@@ -152,13 +152,13 @@ def test_random_systems_beside_a_slow_reference(name):
         else:
             assert arc.status.code in (StatusCode.SUCCESS, StatusCode.AMBIGUOUS_ORDER), told
             assert arc.mode[-1] == expected.mode
-    # The drawing is no use unless much of it happens at once.
+    # Check that many of the drawn transitions fire together.
     assert together + stuck > 25
 
 
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_splitting_a_run_between_events_changes_nothing(name):
-    """Also where crossings were refused, and where guards lie behind the state."""
+    """Runs with refused crossings and with guards that the state has passed are included."""
     rng = np.random.default_rng(21)
     for _ in range(40):
         values, start = drawn(rng)
@@ -178,7 +178,7 @@ def test_splitting_a_run_between_events_changes_nothing(name):
 
 
 def clock(*transitions, modes=("run",), state=("y", "n", "m"), **options):
-    """``y' = 1`` in every mode; everything else waits."""
+    """``y' = 1`` in every mode; all other components are constant."""
     rest = (0.0,) * (len(state) - 1)
     return HybridSystem(
         state=state,
@@ -262,7 +262,7 @@ class TestSeveral:
 
     @pytest.mark.parametrize("when", ["before", "after"])
     def test_a_condition_that_a_reset_of_the_instant_makes_true(self, when):
-        """One that is made true later comes too late."""
+        """A condition that becomes true after the instant has no effect."""
         opens = 1.0 if when == "before" else 2.0
         system = clock(
             up(
@@ -299,7 +299,7 @@ class TestSeveral:
 
     @pytest.mark.parametrize("target", ["a", "b"])
     def test_a_timer_that_is_reset_to_zero(self, target):
-        """``t - d`` comes to zero from its positive side, and moves on."""
+        """``t - d`` reaches zero by the reset from its positive side, and grows again."""
         system = HybridSystem(
             state=("y", "d", "n"),
             modes=[Mode(name, lambda t, x, p: (1.0, 0.0, 0.0)) for name in "ab"],
@@ -337,7 +337,7 @@ class TestSeveral:
             np.testing.assert_allclose(arc.fundamental, turn, atol=1e-8)
 
     def test_each_reset_leads_beyond_the_next_guard(self):
-        """More jumps at one instant than a small limit would let pass: 0 to 39, one after the other."""
+        """Jumps 0 to 39 fire one after another at one instant, more than a small limit would allow."""
         system = clock(
             *(
                 up(
@@ -387,7 +387,7 @@ class TestStart:
         arc = simulate(system, (0.0, 0.0, 0.0), (0.0, 2.0), mode="m")
         assert [(jump.transition, jump.t) for jump in arc.jumps] == [("up", 1.0)]
         assert "beyond" not in arc.status.message
-        # Entered below the surface, from a mode that does not watch it.
+        # The mode is entered below the surface, from a mode without this guard.
         arc = simulate(system, (-6.0, 0.0, 0.0), (0.0, 10.0), mode="d")
         assert fired(arc) == ["from d"]
 
@@ -414,7 +414,7 @@ class TestStuck:
 
 class TestTangents:
     def test_a_jump_locked_to_a_grazing_one_is_one(self):
-        """The second matrix stands for the same square root as the first."""
+        """A locked jump inherits the grazing flag of the jump that triggered it."""
         system = HybridSystem(
             state=("q", "v", "z"),
             modes=[Mode("fall", lambda t, x, p: (x.v, 2.0 + 0 * x.v, 0.0))],
@@ -457,7 +457,7 @@ class TestTangents:
 
 
 def test_a_flow_cut_by_identities_changes_nothing():
-    """Guards that lie behind, refused ones and those still ahead, in modes that are one."""
+    """Passed, refused and pending guards, in copies of one mode joined by identity transitions."""
 
     def counting(mode):
         return [
@@ -503,7 +503,7 @@ def test_the_order_of_transitions_that_do_not_meet_does_not_matter():
     rng = np.random.default_rng(5)
     for _ in range(20):
         values, start = drawn(rng)
-        # Places that no two guards share, nor any reset reaches.
+        # Places without other guards, which no reset reaches.
         values |= {f"g{i}": 0.37 + 0.11 * i for i in range(4)}
         arcs = [
             simulate(system("loops", order), start, (0.0, END), mode="A", parameters=values)

@@ -1,4 +1,4 @@
-"""Jumps that a jump sets off at once, by landing beyond their guards: their time is that of its guard."""
+"""Locked jumps: a reset lands beyond their guards, so they fire at the time of the first guard."""
 
 from functools import cache, reduce
 
@@ -22,7 +22,7 @@ def steady(name, *velocity):
 
 
 def product(arc):
-    """The saltation matrices of all jumps, multiplied."""
+    """The product of the saltation matrices of all jumps."""
     return reduce(lambda total, xi: xi @ total, arc.jumps.saltation)
 
 
@@ -88,7 +88,7 @@ class TestExact:
         np.testing.assert_allclose(arc.fundamental, [[0, 0], [0, 3]], atol=1e-13)
 
     def test_one_that_lands_on_a_guard_has_its_own_time(self, solver):
-        """The orbits on one side cross the second guard later; its own matrix is the one of that side."""
+        """Orbits on one side cross the second guard later; the jump's own matrix belongs to that side."""
         arc = simulate(pair(), (0.0, 1.0), (0.0, 2.0), mode="a", solver=solver)
         assert len(arc.jumps) == 1
         system = hybrid.HybridSystem(
@@ -139,7 +139,7 @@ class TestExact:
 
 
 class TestSingular:
-    """A first reset that loses ``x`` in a mode that waits, while its time keeps it."""
+    """The first reset sets ``x`` to a constant, but the time of the jump still depends on ``x``."""
 
     @staticmethod
     @cache
@@ -179,7 +179,7 @@ class TestSingular:
 
 @cache
 def bent():
-    """Nonlinear forced modes, moving guards, resets that depend on all there is and go beyond a guard."""
+    """Nonlinear forced modes, moving guards, resets that depend on time and state and land beyond a guard."""
     return HybridSystem(
         state=("q", "v"),
         parameters={"w": 1.7},

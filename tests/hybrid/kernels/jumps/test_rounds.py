@@ -1,4 +1,4 @@
-"""Jumps of several transitions in turn that accumulate: their limit, and the runs that have none."""
+"""Jumps of alternating transitions that accumulate: their limit, and runs without a limit."""
 
 import math
 from functools import cache
@@ -18,7 +18,7 @@ def height(t, x, p):
 
 @cache
 def two_flights(names_limit=True, direction=-1):
-    """A ball whose impacts lead from one flight mode to the other, with restitutions of their own."""
+    """A ball whose impacts lead from one flight mode to the other, with one restitution per mode."""
     return HybridSystem(
         state=("q", "v", "s"),
         parameters={"one": 0.5, "two": 0.8},
@@ -129,7 +129,7 @@ def test_twisting(a, b, solver):
 
 
 def test_flights_that_a_reset_halves():
-    """The reset leaves the guard, and yet the heights from which ``q`` falls add up: ``1 + 2 h``."""
+    """The reset leaves the guard, but the heights from which ``q`` falls still sum to ``1 + 2 h``."""
     system = HybridSystem(
         state=("q", "h"),
         modes=[Mode("fall", lambda t, x, p: (-1.0, 0.0)), Mode("down", lambda t, x, p: (0.0, 0.0))],
@@ -165,7 +165,7 @@ def test_a_guard_that_fires_both_ways_chatters_too(e):
 class TestNoLimit:
     @pytest.mark.parametrize("r", [1e-2, 1e-4, 1e-5, 1e-7, 1e-10, 0.0])
     def test_a_reset_that_leaves_the_guard(self, r):
-        """A spiral that is taken back each time; after the first its turns are all alike."""
+        """A reset takes the spiral back at each turn; after the first turn all turns are the same."""
         system = spiral()
         arc = simulate(system, (0.5, 0.0), (0.0, 60.0), parameters={"r": r})
         assert arc.status.ok
@@ -189,7 +189,7 @@ class TestNoLimit:
         np.testing.assert_allclose(arc.x[-1], [1.0, 0.0, 1.0], atol=1e-14)
 
     def test_pushed_through_a_guard_by_a_reset_that_keeps_the_speed(self):
-        """``x = -t^2`` from rest on the guard: counted once, and on it goes."""
+        """``x = -t^2`` from rest on the guard: the event counts once and the motion continues."""
         system = HybridSystem(
             state=("x", "n"),
             modes=[Mode("run", lambda t, x, p: (-2 * t, 0.0))],

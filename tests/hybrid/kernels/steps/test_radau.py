@@ -32,7 +32,7 @@ def system(*fields, state, **parameters):
     )
 
 
-# Volterra's equations with a season: nonlinear, not autonomous, with a divergence that varies.
+# Volterra's equations with seasonal forcing: nonlinear, non-autonomous, with a varying divergence.
 PREY = system(
     lambda t, x, p: x.u * (1 + 0.5 * np.sin(t) - x.w),
     lambda t, x, p: x.w * (x.u - 1),
@@ -105,7 +105,7 @@ def test_steps_are_of_order_five(exact):
 
 
 def test_interpolant_is_of_order_three(exact):
-    """Between the ends of one step its error falls with the fourth power of the length."""
+    """Inside one step the error of the interpolant falls with the fourth power of the length."""
     errors = []
     for h in LENGTHS:
         steps = Steps()
@@ -130,7 +130,7 @@ def test_the_last_stage_is_the_derivative_at_the_end():
 
 
 def test_tangents_are_the_derivative_of_the_step():
-    """Of the step itself, not only of the flow, which it misses by more than the differences do."""
+    """Tangents differentiate the step itself; the flow differs from the step by more than the test allows."""
     h, epsilon = 0.2, 1e-5
     tangents = Steps(tangent=np.eye(2)).take(h)[2:].reshape(2, 2).T
     for column, shift in enumerate(epsilon * np.eye(2)):
@@ -139,7 +139,7 @@ def test_tangents_are_the_derivative_of_the_step():
 
 
 def test_a_step_does_not_depend_on_what_was_tried_before():
-    """The guess from the last polynomial, of this step or of the one before, only saves iterations."""
+    """The first guess comes from an earlier polynomial and affects only the number of iterations."""
     fresh = Steps().take(0.2)
     retaken = Steps()
     retaken.attempt(0.7)
@@ -159,7 +159,7 @@ def test_a_step_of_no_length():
 
 
 def test_the_estimate_is_of_the_size_of_the_interpolants_error(exact):
-    """On a step at the tolerance the interpolant misses the solution by about as much."""
+    """For a step at the tolerance the error of the interpolant is about the tolerance."""
     tolerance = 1e-6
     arc = hybrid.simulate(PREY, X0, (0.0, 2.0), solver=hybrid.RadauIIA(rtol=tolerance, atol=tolerance))
     worst = max(np.abs(arc(t) - exact(t)).max() for t in np.linspace(0, 2, 500))

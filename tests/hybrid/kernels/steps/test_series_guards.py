@@ -1,4 +1,4 @@
-"""What the leading powers of a guard prove of it holds for the whole guard."""
+"""Results proved from the leading powers of a guard hold for the whole guard."""
 
 import math
 
@@ -33,7 +33,7 @@ def judged(powers, band=0.0):
 
 
 def guards(radius):
-    """Powers on the unit interval of a series with about that radius of convergence."""
+    """Coefficients on the unit interval of series with about the given radius of convergence."""
     entry = st.floats(-1.0, 1.0).filter(lambda v: abs(v) > 1e-6)
     return st.lists(entry, min_size=ORDER + 1, max_size=ORDER + 1).map(
         lambda values: [value * radius**-k for k, value in enumerate(values)]
@@ -104,7 +104,7 @@ def test_verdicts(powers, verdict):
 
 
 def test_the_share_of_nearly_all_steps_is_decided():
-    """Guards that move by their own size over a step: few go on to the whole polynomial."""
+    """For guards that change by their own size over a step, few cases need the whole polynomial."""
     random = np.random.default_rng(5)
     verdicts = []
     for _ in range(400):
@@ -123,7 +123,7 @@ def _converted(powers, degree):
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 7, 12, 15, 16, 20, 28])
 def test_bernstein_coefficients(degree):
-    """In registers up to degree 15, one by one above."""
+    """Up to degree 15 the computation uses registers, above it single numbers."""
     powers = np.random.default_rng(degree).normal(size=40)
     shares = [
         sum(math.comb(i, k) / math.comb(degree, k) * powers[k] for k in range(i + 1))
@@ -162,16 +162,16 @@ def test_value_and_derivatives(order, first):
 )
 def test_a_root_next_to_a_turning_point(root, gap, known_roots, tail):
     """The bracket ends where the guard turns back: the slope vanishes at one end of it."""
-    # (s - root) (s - root - 2 gap) times what keeps away from zero.
+    # (s - root) (s - root - 2 gap) times a factor away from zero.
     rest = np.polynomial.Polynomial([1.0, *(0.3 * v / len(tail) for v in tail)])
     pair = np.polynomial.Polynomial.fromroots([root, root + 2.0 * gap])
     powers = np.concatenate([np.zeros(known_roots), (pair * rest).coef])
     found = _root(powers, known_roots, 0.0 if known_roots == 0 else 1e-3, root + gap)
-    # Rounding of the terms, over the slope.
+    # Rounding of the terms, divided by the slope.
     assert abs(found - root) <= 64 * 2.2e-16 / (2.0 * gap * root**known_roots)
 
 
 def test_a_root_to_rounding():
-    """A series as long as those of exact modes: the cosine."""
+    """The cosine as a series of the length that exact modes use."""
     powers = np.array([0.0 if k % 2 else (-1.0) ** (k // 2) / math.factorial(k) for k in range(ORDER + 1)])
     assert _root(powers, 0, 1.0, 2.0) == pytest.approx(math.pi / 2, abs=2.3e-16)

@@ -1,4 +1,4 @@
-"""Structures: what Python puts into one is what a kernel finds there."""
+"""Structures: a kernel reads the values that Python wrote."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_missing_fields_are_named():
 
 
 class TestLayout:
-    """Structures in one block of memory are as good as those of separate arrays."""
+    """Structures in one block of memory behave like structures of separate arrays."""
 
     SHAPES = {"vector": (3,), "matrix": (2, 3)}  # noqa: RUF012
 
