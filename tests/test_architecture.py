@@ -1,4 +1,4 @@
-"""Imports go one way and never in a circle, and files stay small: the order of docs/architecture.md."""
+"""Imports follow the order of docs/architecture.md without circles, and files stay small."""
 
 import ast
 import subprocess
@@ -25,7 +25,7 @@ KERNELS_MAY_IMPORT = (
     "struct",
     "typing",
 )
-# Rooms from the ground up: each imports itself and those before it.
+# Packages from the lowest up: each may import itself and those before it.
 ROOMS = (
     "hybrid.errors",
     "hybrid.display",
@@ -76,7 +76,7 @@ def sources(folder):
 
 
 def imports_of(path):
-    """Every import statement of a file, also those inside functions, relative ones resolved."""
+    """Every import statement of a file, including those inside functions, with relative names resolved."""
     package = path.relative_to(ROOT).parent.parts
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
         if isinstance(node, ast.Import):
@@ -113,7 +113,7 @@ def module_of(path):
 
 
 def arrows(*packages):
-    """Pairs of modules, the first of which imports the second, and where."""
+    """Pairs of modules in which the first imports the second, and the place of the import."""
     modules = {module_of(path) for package in packages for path in sources(package)}
     for package in packages:
         for found in imports_in(package):
@@ -159,7 +159,7 @@ def test_an_upward_import_is_seen(tmp_path, monkeypatch):
 
 
 def test_no_circle_of_imports():
-    """Not even one that a late import or one for types alone would close."""
+    """Late imports and imports for types only also count."""
     graph = nx.DiGraph((one, other) for one, other, _ in arrows("hybrid", "models", "lyapunov"))
     circles = [sorted(each) for each in nx.strongly_connected_components(graph) if len(each) > 1]
     assert not circles, circles

@@ -1,4 +1,4 @@
-"""Every Python block of the documentation runs, in order, in one namespace a page."""
+"""Every Python block of the documentation runs, in order, in one namespace per page."""
 
 import contextlib
 import io
@@ -25,12 +25,12 @@ LINK = re.compile(r"\]\((?!https?://)([^)#]+)\)")
 
 
 def run(page):
-    """Namespace after the page's blocks, and what they printed."""
+    """The namespace after the page's blocks, and the printed text."""
     text = page.read_text(encoding="utf-8")
     namespace, printed = {"__name__": "page"}, io.StringIO()
     with contextlib.redirect_stdout(printed):
         for block in BLOCK.finditer(text):
-            # Line numbers of the page, for tracebacks.
+            # Keep the line numbers of the page, for tracebacks.
             source = "\n" * text.count("\n", 0, block.start(1)) + block[1]
             exec(compile(source, str(page), "exec"), namespace)
     plt.close("all")

@@ -1,4 +1,4 @@
-"""Systems that more than one file of tests runs."""
+"""Systems that several test files use."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from models import bouncing_ball, impact_oscillator
 
 
 def pendulum(guard=lambda t, x, p: x.q - p.c, *, both=False, names=("left", "right"), order=1):
-    """A pendulum cut at ``q = c``, where nothing happens."""
+    """A pendulum with an identity transition at ``q = c``."""
 
     def field(t, x, p):
         return x.v, -np.sin(x.q)

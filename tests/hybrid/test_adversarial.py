@@ -62,7 +62,7 @@ def test_the_truth_has_every_change_of_sign_that_dense_samples_see(index, family
 
 
 def found_from(flow, guard, times):
-    """A method that is right, but for its events."""
+    """Results of a method that is exact except for its events."""
     found = Found.empty(1, len(flow.state))
     every = guard.states(np.zeros(len(times), dtype=int), times)
     states = np.column_stack([every[name] for name in flow.state])

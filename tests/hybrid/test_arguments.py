@@ -1,4 +1,4 @@
-"""Every argument of every public function and method, given nonsense: an error of the library's, by its name.
+"""Invalid values for every argument of every public function: the error names the argument.
 
 The table is checked against the signatures, so that a new argument without an entry fails.
 """
@@ -30,7 +30,7 @@ PERIOD = OSCILLATOR.forcing_period()
 
 
 class Odd:
-    """An object that nothing is made for."""
+    """An object that no function accepts."""
 
     def __repr__(self):
         return "<odd>"
@@ -129,7 +129,7 @@ EXPONENTS = {
 
 @pytest.fixture(scope="module")
 def made():
-    """What methods and plots are called on."""
+    """The objects that methods and plots are called on."""
     return {
         "arc": hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.0)),
         "orbit": hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0)),
@@ -144,12 +144,12 @@ def made():
 
 
 def call(function, *positional, **options):
-    """A call that works, of which one argument at a time is replaced."""
+    """A valid call, of which the test replaces one argument at a time."""
     return function, positional, options
 
 
 def table(made):
-    """By public function: a call that works, and what each argument must refuse."""
+    """By public function: a valid call, and the values that each argument must refuse."""
     start = (OSCILLATOR, (0.0, 0.0))
     ball = (BALL, (1.0, 0.0))
     arc, chart = made["arc"], made["chart"]
@@ -359,7 +359,7 @@ def table(made):
             {
                 **EXPONENTS,
                 "k": [0, 3, *COUNT[1:]],
-                # What does not fit a single row is told by its status.
+                # A value that does not fit a single row is reported in the row's status.
                 "interval": OPTIONAL_POSITIVE,
                 "t0": NUMBER,
                 "over": [
@@ -604,7 +604,7 @@ def table(made):
     return entries
 
 
-# Made by the library, not by its users, or errors.
+# Classes that only the library creates, and errors.
 NOT_CALLED = {
     "Status",
     "StatusCode",
@@ -632,9 +632,9 @@ NOT_CALLED = {
     "discard",
     "Panel",
 }
-# Their methods are for the library and its properties.
+# Classes whose methods only the library and its properties call.
 WITHOUT_METHODS = {"Case", "CompiledSystem", "Engine", "Run"}
-# Where the argument of a method is called otherwise in the functions that it serves.
+# Arguments of methods that have another name in the function called.
 ALSO_CALLED = {"overrides": "parameters", "name": "mode", "flip": "elastic"}
 
 
@@ -659,7 +659,7 @@ def public_functions():
 
 
 def arguments_of(function):
-    """Names of what a caller gives."""
+    """Names of the arguments that a caller gives."""
     if not callable(function):
         return []
     return [
@@ -670,7 +670,7 @@ def arguments_of(function):
 
 
 def begins_with_its_name(text, argument):
-    """Whether an error begins with the name of the argument, or of the class or function and then of it."""
+    """Whether an error begins with the argument's name, alone or after the class or function."""
     text = text.lower()
     for name in (argument, ALSO_CALLED.get(argument, argument)):
         one = name.lower().removesuffix("s") if len(name) > 2 else name.lower()
@@ -692,13 +692,13 @@ def test_every_argument_has_an_entry(made):
         for name in arguments_of(function)
         if name not in known.get(function, ())
     ]
-    # Modes and transitions of a law of contact are given the bodies by the model.
+    # The model passes the bodies to the modes and transitions of a contact law.
     missing = [each for each in missing if not each.endswith("(bodies)")]
     assert not missing, missing
 
 
 def test_the_calls_work(made):
-    """Or else it would not be the argument that is refused."""
+    """The unchanged calls must work, so that an error comes from the replaced argument."""
     cheap = (
         "simulate",
         "HybridSystem",

@@ -1,4 +1,4 @@
-"""Generated text run twice: as the Python that it is, and as machine code."""
+"""Runs generated text twice: as Python and as machine code."""
 
 import ctypes
 
@@ -12,7 +12,7 @@ SIGNATURES = (VECTOR_SIGNATURE, MATRIX_SIGNATURE, SERIES_SIGNATURE)
 
 
 def both(lines, kind=SERIES_SIGNATURE, *, fused=False):
-    """Functions of the same arguments that run a text as Python, and as machine code."""
+    """Two functions with the same arguments that run a text as Python and as machine code."""
     head = f"def function({', '.join(kind.names)}):\n"
     source = head + "".join(f"    {line}\n" for line in lines)
     scope = {}
@@ -22,7 +22,7 @@ def both(lines, kind=SERIES_SIGNATURE, *, fused=False):
 
 
 def called(compiled):
-    """A compiled function to be called with numbers and arrays."""
+    """A compiled function that can be called with numbers and arrays."""
 
     def call(*arguments):
         words = [word for argument in arguments for word in _words(argument)]
@@ -33,7 +33,7 @@ def called(compiled):
 
 
 def _words(argument):
-    """A number itself; of an array who keeps it, its sizes and where its data begin."""
+    """The words of an argument: a number, or an array's owner, sizes and data address."""
     if not isinstance(argument, np.ndarray):
         return [argument]
     return [0, 0, argument.size, argument.itemsize, argument.ctypes.data, *argument.shape, *argument.strides]

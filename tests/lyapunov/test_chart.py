@@ -1,4 +1,4 @@
-"""Charts against spectra one by one, whatever the number of threads, and what they keep when rows fail."""
+"""Charts compared with single spectra for any number of threads, and their content when rows fail."""
 
 import contextlib
 import importlib
@@ -26,7 +26,7 @@ def assert_same(one, other):
 
 
 def duffing():
-    """Two wells: driven weakly, an orbit stays in the well where it is."""
+    """Two wells: a weakly driven orbit stays in its well."""
     return hybrid.HybridSystem(
         state=("x", "v"),
         parameters={"A": 0.05, "tilt": 0.0},
@@ -49,7 +49,7 @@ def test_rows_are_the_spectra_one_by_one():
 
 
 def test_a_chart_follows_the_closed_form():
-    """The larger multiplier of the orbits with one impact a period, over the damping."""
+    """The larger multiplier of the orbits with one impact per period, as the damping varies."""
     values = np.array([0.1, 0.15, 0.2, 0.3])
     system = models.impact_oscillator()
     chart = lyapunov.chart(system, {"c": values}, REST, k=None, intervals=1000, transient=100)
@@ -91,7 +91,7 @@ def test_the_grid_is_in_the_order_of_the_parameters():
 
 
 def test_the_attractor_is_carried_forward():
-    """Tilted by 0.6 there is the right well alone; untilted, the start is in the left one."""
+    """With a tilt of 0.6 only the right well exists; without tilt the start is in the left well."""
     over = {"tilt": np.linspace(0.6, 0.0, 7)}
     fresh = lyapunov.chart(duffing(), over, (-1.2, 0.0), **SHORT)
     carried = lyapunov.chart(duffing(), over, (-1.2, 0.0), continue_from="previous", **SHORT)
@@ -115,7 +115,7 @@ def test_each_line_of_a_grid_is_carried_by_itself():
 
 
 def test_the_carried_state_is_that_after_the_transient():
-    """The second row starts where the first's transient of whole periods led, at the phase of t0."""
+    """The second row starts at the end of the first row's transient of whole periods, at the phase of t0."""
     system, t0 = models.impact_oscillator(), 1.0
     two = lyapunov.chart(
         system, {"A": [1.0, 1.05]}, (0.1, 0.0), t0=t0, transient=3, intervals=5, continue_from="previous"
@@ -138,7 +138,7 @@ def test_the_section_is_that_of_the_orbit():
 
 
 def test_a_row_that_breaks_off_keeps_its_status():
-    """The field is nan beyond x = a; with a = 0.5 the orbit gets there."""
+    """The field is nan beyond x = a; with a = 0.5 the orbit reaches it."""
     system = hybrid.HybridSystem(
         state=("x",),
         parameters={"a": 9.0},
@@ -157,7 +157,7 @@ def test_a_row_that_breaks_off_keeps_its_status():
 
 
 def test_a_row_that_cannot_start_says_so():
-    """With the stop at -1 the state at rest is behind it."""
+    """With the stop at -1 the state at rest is beyond the stop."""
     chart = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, -1.0]}, REST, **SHORT)
     assert chart.status[0].ok
     assert chart.status[1].code == StatusCode.NOT_RUN
@@ -172,7 +172,7 @@ def test_a_row_that_cannot_start_where_the_one_before_led_starts_anew():
 
 
 def test_an_interrupt_keeps_the_rows_done(monkeypatch):
-    """The interrupt comes with the report of the third row, as it would in a terminal."""
+    """The interrupt arrives with the report of the third row, as in a terminal."""
     rows = []
 
     class Bar:
@@ -202,7 +202,7 @@ def test_an_error_in_a_thread_is_raised(monkeypatch):
 
 
 def test_autonomous_systems_have_charts_too():
-    """Exactly b, over whole times."""
+    """The exponent over integer times is exactly b."""
     values = np.array([0.3, 0.4, 0.5])
     chart = lyapunov.chart(
         models.solvable_oscillator(),
@@ -217,7 +217,7 @@ def test_autonomous_systems_have_charts_too():
 
 
 def test_spectra_in_threads_of_the_user_are_those_computed_alone():
-    """A model is compiled by whichever thread comes first, and each run has its own memory."""
+    """The first thread compiles a model, and each run has its own memory."""
     values = np.linspace(0.9, 1.1, 6)
     found = {}
 

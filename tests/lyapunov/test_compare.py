@@ -1,4 +1,4 @@
-"""Models held against each other where the exponents are known: those of linear systems."""
+"""Comparisons of linear models, whose exponents are known."""
 
 import math
 
@@ -13,7 +13,7 @@ SHORT = {"intervals": 20, "transient": 5}
 
 
 def decay(rate, ripple=0.0):
-    """Exponents ``-rate(p)`` and -3; the ripple costs steps and does not show in the exponents."""
+    """Exponents ``-rate(p)`` and -3; the ripple costs steps but does not affect the exponents."""
     return HybridSystem(
         state=("x", "y"),
         parameters={"a": 1.0},
@@ -25,7 +25,7 @@ def decay(rate, ripple=0.0):
 
 
 def forgetful(rate):
-    """Exponents ``-rate`` and minus infinity: once a period ``y`` is set to one."""
+    """Exponents ``-rate`` and minus infinity: once per period ``y`` is set to one."""
     midway = Guard(lambda t, x, p: np.sin(2 * np.pi * (t - 0.5)), +1)
     return HybridSystem(
         state=("x", "y"),

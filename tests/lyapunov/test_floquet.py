@@ -1,4 +1,4 @@
-"""Floquet exponents against multipliers in closed form."""
+"""Floquet exponents compared with multipliers in closed form."""
 
 import attrs
 import numpy as np
@@ -64,7 +64,7 @@ def test_a_strongly_contracting_orbit(van_der_pol, mu, period, exponent, solver)
 
 @pytest.mark.parametrize("decay", [8.0, 20.0, 200.0])
 def test_a_linear_system_has_its_eigenvalues(decay):
-    """Those of the matrix, also where the multiplier is below the smallest floating-point number."""
+    """The exponents are the matrix's eigenvalues, even if a multiplier is below the smallest double."""
     system = hybrid.HybridSystem(
         state=("a", "b"),
         parameters={"decay": 20.0},

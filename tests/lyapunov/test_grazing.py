@@ -1,6 +1,6 @@
-"""Exponents on both sides of a grazing: no spike there, by closed forms and by two orbits.
+"""Exponents on both sides of a grazing have no spike, by closed forms and by two orbits.
 
-An impact oscillator so damped that small displacements decay without turning. Up to the grazing its orbit has
+An overdamped impact oscillator: small displacements decay monotonically. Up to the grazing its orbit has
 the exponents of the linear flow. Beyond it stable orbits with one impact in ever more periods alternate with
 chaos, down to the grazing (Nordmark 1991, doi:10.1016/0022-460X(91)90592-8).
 """
@@ -42,7 +42,7 @@ def test_beyond_it_stable_orbits_have_the_exponents_of_the_closed_form(share, n)
     (orbit,) = one_impact_orbits(**p, n=n)
     exact = math.log(max(abs(orbit.multipliers))) / (n * PERIOD)
     assert exact < 0
-    # From half a flight after the impact on, so that each interval holds one.
+    # Start half a flight after an impact, so that each interval contains one impact.
     impact, start = orbit.theta, orbit.theta + n * PERIOD / 2
     x0 = simulate(impact_oscillator(), (p["d"], -p["r"] * orbit.V), (impact, start), parameters=p).x[-1]
     spectrum = lyapunov_spectrum(
@@ -56,7 +56,7 @@ def test_beyond_it_stable_orbits_have_the_exponents_of_the_closed_form(share, n)
         transient=60,
     )
     assert spectrum.jumps_per_interval == 1
-    # The relative error of a depth this small, and so of the impact's speed, is one over it.
+    # The relative error of so small a depth, and of the impact speed, is proportional to its reciprocal.
     assert abs(spectrum.exponents[0] - exact) < 1e-10 + 1e-13 / share
 
 
@@ -80,7 +80,7 @@ def test_in_the_chaos_between_two_orbits_separate_as_fast(share, exponent):
 
 
 def test_a_spectrum_with_grazed_jumps_says_so():
-    """So close that the tolerances cannot tell an impact from a touch: a warning, and still no spike."""
+    """Too close for the tolerances to separate an impact from a touch: a warning but no spike."""
     p = beyond_grazing(1e-12)
     spectrum = lyapunov_spectrum(impact_oscillator(), (0.0, 0.0), parameters=p, k=1, intervals=400)
     assert "jumps grazed within the tolerances" in spectrum.status.message

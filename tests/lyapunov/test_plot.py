@@ -1,4 +1,4 @@
-"""Charts of exponents show what they are given."""
+"""Charts of exponents show their data."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -20,7 +20,7 @@ def _no_figures_left():
 
 @pytest.fixture(scope="module")
 def line():
-    """Over the stop, unordered; at -1 the start is behind it."""
+    """A chart over the stop, not sorted; with the stop at -1 the start is beyond it."""
     over = {"d": [1.0, 0.5, 0.8, -1.0]}
     return lyapunov.chart(models.impact_oscillator(), over, (0.0, 0.0), k=2, section=3, **SHORT)
 
@@ -64,7 +64,7 @@ def test_a_map_is_white_at_zero_and_grey_where_nothing_is_known(grid):
 
 def test_a_figure_of_each_kind(line, grid):
     assert len(plot_chart(line).axes) == 2
-    # The map, and its colour bar.
+    # The map and its colour bar.
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
     assert len(plot_chart(bare).axes) == 1

@@ -1,4 +1,4 @@
-"""The spectrum against exact answers, its error bars, its memory, and its complaints."""
+"""Spectra compared with exact answers: error bars, memory and messages."""
 
 import math
 
@@ -30,7 +30,7 @@ def test_founding_system(founding):
 
 
 def test_plain_means_are_slower(founding):
-    """Benettin's running mean is off by 1/M where the tapered one is done."""
+    """Benettin's running mean still has an error of 1/M when the tapered mean has converged."""
     assert founding.benettin_history.shape == (2000, 4)
     assert 1e-5 < abs(founding.benettin_history[-1, 0] - EXPONENTS_740[0]) < 2e-3
 
@@ -100,7 +100,7 @@ def test_linear_systems_have_their_eigenvalues():
 
 
 def test_a_collapsed_direction_is_minus_infinity():
-    """The catch of the belt annihilates one: whatever the speed of the slip, the block then sticks."""
+    """The belt annihilates a direction: after any slip speed the block sticks at the belt's speed."""
     system = systems.stick_slip()
     result = lyapunov.lyapunov_spectrum(system, (0.0, 0.2), mode="stick", interval=12.001031295, intervals=50)
     assert result.exponents[0] == pytest.approx(0.0, abs=1e-4)
@@ -109,7 +109,7 @@ def test_a_collapsed_direction_is_minus_infinity():
 
 
 def test_without_history_memory_does_not_grow():
-    """Every array of a long run's result is as small as that of a short one."""
+    """Arrays in the result of a long run are as small as those of a short run."""
 
     def size(intervals, history=False):
         result = lyapunov.lyapunov_spectrum(
@@ -131,12 +131,12 @@ def test_without_history_the_result_is_the_same():
 
 
 def covered(exact, runs):
-    """In how many runs two standard errors hold the exact exponent."""
+    """Number of runs in which two standard errors contain the exact exponent."""
     return sum(bool(abs(run.exponents[0] - exact) <= 2 * run.standard_error[0]) for run in runs)
 
 
 def test_error_bars_hold_the_exact_exponent_of_the_solvable_oscillator():
-    """Over whole times its growth is exactly b, with no error to estimate; over others it fluctuates."""
+    """Over integer times the growth rate is exactly b; over other intervals it fluctuates."""
     system = models.solvable_oscillator()
     runs = [
         lyapunov.lyapunov_spectrum(
@@ -148,7 +148,7 @@ def test_error_bars_hold_the_exact_exponent_of_the_solvable_oscillator():
 
 
 def test_error_bars_hold_the_exact_exponent_of_the_skew_tent_map():
-    """Slopes 1/a and 1/(1 - a) come at random, so the exponent is -a ln a - (1 - a) ln(1 - a)."""
+    """The slopes 1/a and 1/(1 - a) are random, so the exponent is -a ln a - (1 - a) ln(1 - a)."""
     system = hybrid.HybridSystem(
         state=("x", "clock"),
         parameters={"a": 0.3},
@@ -221,7 +221,7 @@ def test_bad_state():
 
 
 def test_a_clock_among_the_states_hides_nothing():
-    """Nothing grows along the axis of a clock; the vectors start along no axis, the largest comes first."""
+    """Nothing grows along a clock's axis; the vectors start along no axis, so the largest comes first."""
     result = lyapunov.lyapunov_spectrum(
         models.buck_converter(),
         (12.03, 0.61, 0.0),
@@ -230,7 +230,7 @@ def test_a_clock_among_the_states_hides_nothing():
         interval=400e-6,
         intervals=500,
     )
-    # Nothing grows along the orbit itself; the first is that of the chaotic converter, per second.
+    # The exponent along the orbit is zero; the first is that of the chaotic converter, per second.
     assert result.exponents[0] == pytest.approx(1200.0, abs=200.0)
     assert result.exponents[1] == pytest.approx(0.0, abs=5.0)
     assert result.sum_defect == pytest.approx(0.0, abs=1e-6)
@@ -259,7 +259,7 @@ def test_what_only_the_transient_annihilates_is_not_minus_infinity():
 
 
 def drained(decay):
-    """Exponents known from the matrix, ``decay`` apart or so."""
+    """A system whose exponents are known from its matrix and about ``decay`` apart."""
     return np.sort(np.linalg.eigvals([[-0.1, 0.5], [0.3, -decay]]))[::-1]
 
 
@@ -281,7 +281,7 @@ def drain():
 @pytest.mark.parametrize("decay", [8.0, 20.0, 200.0, 2000.0])
 @pytest.mark.parametrize("interval", [0.01, None, 50.0])
 def test_exponents_far_apart_whatever_the_interval(drain, decay, interval):
-    """Vectors that nobody kept apart would all be along the first direction long before the interval ends."""
+    """Without orthonormalisation all vectors would align with the first direction within an interval."""
     result = lyapunov.lyapunov_spectrum(
         drain,
         (0.0, 0.0),
@@ -338,7 +338,7 @@ def test_lorenz_over_long_intervals(k, interval):
 
 @pytest.mark.parametrize("solver", [None, hybrid.DOP853(rtol=1e-12, atol=1e-14)])
 def test_jumps_between_orthonormalisations_do_not_disturb(solver):
-    """A reset that mixes what the flow keeps far apart: the exponents are those of the map of one period."""
+    """A reset mixes directions that the flow separates; the exponents are those of the period map."""
     flow, reset = np.array([[-0.5, 3.0], [0.0, -60.0]]), np.array([[0.3, -0.7], [1.1, 0.4]])
     system = hybrid.HybridSystem(
         state=("a", "b"),
@@ -359,13 +359,13 @@ def test_jumps_between_orthonormalisations_do_not_disturb(solver):
         result = lyapunov.lyapunov_spectrum(
             system, (0.0, 0.0), interval=interval, intervals=200, transient=10, solver=solver
         )
-        # Intervals that are no periods hold one jump more or less.
+        # Intervals that are not whole periods may contain one jump more or less.
         atol = 1e-9 if interval != 0.7 else 0.05
         np.testing.assert_allclose(result.exponents, [first, total - first], atol=atol)
 
 
 def test_rates_are_evaluated_anew_after_each_orthonormalisation():
-    """With fixed steps no error control hides the rates of vectors that are not there any more."""
+    """With fixed steps no error control can hide outdated rates of replaced vectors."""
     system = hybrid.HybridSystem(
         state=("a", "b"),
         modes=[hybrid.Mode("only", lambda t, x, p: (0.3 * x.a + x.b, -0.1 * x.b))],

@@ -1,4 +1,4 @@
-"""The standard error covers the truth, and the weighted mean converges, as their docstrings say."""
+"""The standard error covers the truth and the weighted mean converges as documented."""
 
 import numba
 import numpy as np
@@ -54,7 +54,7 @@ def coverage(series, truth=0.0):
 
 
 def error_ratio(series):
-    """Mean standard error over the scatter of the means that it should be."""
+    """Ratio of the mean standard error to the true scatter of the means."""
     return standard_error(series).mean() / series.mean(axis=0).std()
 
 

@@ -1,4 +1,4 @@
-"""What the paper's two-orbit formulas do, and that the renormalised companion converges."""
+"""Limits of the paper's two-orbit formulas, and convergence of the renormalised companion."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ PERIOD = 2 * np.pi
 
 @pytest.fixture(scope="module")
 def stable():
-    """The impact oscillator on its stable orbit; two orbits at rounding would coincide sooner or later."""
+    """The impact oscillator on its stable orbit; two orbits at rounding distance may coincide."""
     return lyapunov.two_orbit_exponents(
         models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=300, solver=hybrid.DOP853()
     )
@@ -35,7 +35,7 @@ def chaotic():
 
 
 def before_coincidence(result):
-    """How many intervals end with the orbits apart, from the first on; at rounding they can coincide."""
+    """Number of intervals before the orbits first coincide, which can happen at rounding distance."""
     return int(np.cumprod(result.distances > 0).sum())
 
 
@@ -57,7 +57,7 @@ def test_formulas_7_and_9_as_they_are_printed(name, request):
 
 
 def test_a_stable_distance_stops_at_rounding(stable):
-    """So (7) decays like 1/M from there on, though the exponent is -0.0855."""
+    """From then on (7) decays like 1/M, although the exponent is -0.0855."""
     distances = stable.distances[100 : before_coincidence(stable)]
     assert 1e-17 < distances.min() <= distances.max() < 1e-12
     assert stable.single_piece[before_coincidence(stable) - 1] > -0.5 * 0.0855
@@ -66,19 +66,19 @@ def test_a_stable_distance_stops_at_rounding(stable):
 def test_a_chaotic_distance_stops_at_the_size_of_the_attractor(chaotic):
     late = chaotic.distances[-500:]
     assert 0.1 < late.mean() < 1.5
-    # Five hundred intervals earlier the same level, over a shorter time, is a larger "exponent".
+    # Five hundred intervals earlier the same level over a shorter time gives a larger "exponent".
     assert chaotic.single_piece[-500] > 1.2 * chaotic.single_piece[-1] > 0
 
 
 def test_formula_9_tends_to_the_level_over_the_interval(stable):
-    """No exponent at all: the level of the distance, near -16, over the period."""
+    """The limit is not an exponent but the logarithmic distance, near -16, divided by the period."""
     M = before_coincidence(stable)
     level = np.log(stable.distances[100:M] / stable.separation).mean()
     assert stable.undivided[M - 1] == pytest.approx(level / stable.interval, rel=0.15)
 
 
 def test_renormalised_companion_of_the_impact_oscillator():
-    """The multipliers turn the tangent plane once in 650 periods, so it takes that long."""
+    """The multipliers turn the tangent plane once in 650 periods, so convergence takes that long."""
     result = lyapunov.two_orbit_exponents(
         models.impact_oscillator(), (0.0, 0.0), transient=100, intervals=1000
     )
@@ -93,7 +93,7 @@ def test_renormalised_companion_of_the_founding_system():
 
 
 def test_renormalised_companion_of_an_autonomous_chaotic_system():
-    """Solvable chaotic oscillator, exponent b = 0.5: the two-orbit estimate follows the spectrum's."""
+    """Solvable chaotic oscillator, exponent b = 0.5: the two-orbit estimate agrees with the spectrum."""
     where = {"mode": "plus", "interval": 1.0, "transient": 20}
     system, x0 = models.solvable_oscillator(), (0.3, 0.0)
     result = lyapunov.two_orbit_exponents(system, x0, intervals=500, solver=TIGHT, **where)
@@ -101,7 +101,7 @@ def test_renormalised_companion_of_an_autonomous_chaotic_system():
 
 
 def test_coinciding_orbits_give_minus_infinity():
-    """Where a distance is zero (7) is minus infinity, and (8) and (9) are so from there on."""
+    """(7) is minus infinity where the distance is zero, (8) and (9) from the first zero on."""
     result = lyapunov.TwoOrbitExponents(
         np.array([1e-9, 0.0, 0.0, 1e-17]),
         np.array([-1.0, -np.inf, -1.0, -1.0]),
@@ -126,7 +126,7 @@ def test_separation_and_direction_place_the_companion():
 
 
 def test_a_companion_beyond_a_guard_starts_in_the_mode_there():
-    """The reference is in mode left just before the guard, the companion behind it, in mode right."""
+    """The reference is just before the guard in mode left, the companion beyond it in mode right."""
     options = {"separation": 1e-2, "direction": (1.0, 0.0), "interval": 0.001, "intervals": 1}
     result = lyapunov.two_orbit_exponents(systems.constant_fields(), (-0.005, 0.0), mode="left", **options)
     assert result.distances[0] == pytest.approx(np.hypot(0.01, 0.002), rel=1e-9)
@@ -193,9 +193,9 @@ def test_the_transient_has_as_many_intervals_as_asked_for(transient, interval):
 
 
 def test_a_renormalised_companion_is_put_into_the_mode_of_the_orbit():
-    """Kicked past the guard alone, it is brought back before the guard and crosses that again with the orbit.
+    """A companion beyond the guard alone is brought back before the guard and crosses it with the orbit.
 
-    Left in the mode beyond, it would miss the kick that the orbit gets in the second interval.
+    In the wrong mode it would miss the kick that the orbit gets in the second interval.
     """
     system = hybrid.HybridSystem(
         state=("x", "y"),

@@ -1,4 +1,4 @@
-"""Balls in a line against rational arithmetic and the unfolded wedge; simultaneous collisions; collapse."""
+"""Balls in a line: rational arithmetic, the unfolded wedge, simultaneous collisions, collapse."""
 
 import math
 from fractions import Fraction
@@ -58,21 +58,21 @@ def test_collisions(masses, e, count):
 @pytest.mark.parametrize("masses", [(1.0, 1.0, 1.0), (1.0, 0.1, 1.0), (2.0, 0.03, 0.5), (1.0, 5.0, 2.0)])
 @pytest.mark.parametrize("v", [(1.0, 0.0, -0.4), (1.0, 0.9, -2.0), (0.3, -1.0, -1.2)])
 def test_elastic_collisions_unfold_to_a_straight_line(masses, v):
-    """In the plane of ``sqrt(m) q`` less the centre of mass the two contacts are rays from the origin."""
+    """In the plane of ``sqrt(m) q`` without the centre of mass the two contacts are rays from the origin."""
     m1, m2, m3 = masses
     phi = math.acos(math.sqrt(m1 * m3 / ((m1 + m2) * (m2 + m3))))
 
     def polar(q):
         """Angle from the left contact towards the right one, from the gaps alone."""
         left, right = q[1] - q[0], q[2] - q[1]
-        # Gaps over their lengths in the metric are distances from the two sides of the wedge.
+        # Gaps divided by their lengths in the metric are distances from the sides of the wedge.
         from_left = left / math.sqrt(1 / m1 + 1 / m2)
         from_right = right / math.sqrt(1 / m2 + 1 / m3)
         return math.atan2(from_left * math.sin(phi), from_right + from_left * math.cos(phi))
 
     q = (0.0, 1.0, 2.5)
     start, end = polar(q), polar(v)
-    # The straight line turns by less than half a turn, towards its direction.
+    # The angle along the straight line changes by less than half a turn.
     turn = (end - start + math.pi) % (2 * math.pi) - math.pi
     folds = math.floor((start + turn) / phi)
     arc = simulate(q, v, 1e3, masses)
@@ -98,7 +98,7 @@ def test_cradle_of_balls_that_touch():
     [((1, 1, 1), 1.0, True), ((1, 2, 1), 1.0, False), ((1, 1, 1), 0.9, False)],
 )
 def test_collision_of_all_three(masses, e, ok):
-    """Its order does not matter where ``pi / phi`` is whole and nothing is lost."""
+    """The order does not matter if ``pi / phi`` is an integer and the collisions are elastic."""
     arc = simulate((-1, 0, 1.0), (1, 0.0, -1.0), 3.0, masses, e)
     assert arc.status.ok == ok
     if ok:
@@ -109,7 +109,7 @@ def test_collision_of_all_three(masses, e, ok):
 
 @pytest.mark.parametrize(("e", "collapses"), [(0.075, False), (0.07, True)])
 def test_inelastic_collapse(e, collapses):
-    """Below ``e = 7 - 4 sqrt(3) = 0.0718`` equal balls meet again and again, and end at one speed."""
+    """Below ``e = 7 - 4 sqrt(3) = 0.0718`` equal balls collide infinitely often and end at one speed."""
     arc = simulate((0, 1, 2), (1, 0, 0), 100.0, e=e)
     v = arc.x[-1, 3:]
     assert v.sum() == pytest.approx(1.0, abs=1e-12)

@@ -18,7 +18,7 @@ K1, K2, C = 1.0, 10.0, 0.1
 
 @pytest.mark.parametrize("speed", [0.01, 1.0, 100.0])
 def test_natural_period(speed):
-    """Half an oscillation of each spring, whatever the amplitude: the flow over it is the identity."""
+    """Half an oscillation of each spring at any amplitude: the flow over a period is the identity."""
     stay = math.pi / math.sqrt(K2)
     period = math.pi / math.sqrt(K1) + stay
     start = (speed / math.sqrt(K2), 0.0)
@@ -48,7 +48,7 @@ def test_decay_of_free_motion():
 
 
 def forced_orbit(w, guess):
-    """Orbit with one visit to positive ``x`` a period: when that begins, how long it lasts, its middle.
+    """Orbit with one visit to positive ``x`` per period: its start, its length, its middle.
 
     Solved with both flights in closed form.
     """
@@ -67,7 +67,7 @@ def forced_orbit(w, guess):
 
 @pytest.mark.parametrize(("w", "guess"), [(1.5, (0.29, 1.0, 9.05)), (2.5, (1.25, 0.6, 0.4))])
 def test_forced_orbit(w, guess):
-    """At the higher frequency it has lost its stability to one of twice its period."""
+    """At the higher frequency the orbit is unstable after a period doubling."""
     t, stay, x = forced_orbit(w, guess)
     orbit = hybrid.periodic_orbit(bilinear_oscillator(), x + 1e-3, parameters={"w": w}, t0=t + stay / 2)
     np.testing.assert_allclose(orbit.x0, x, rtol=0, atol=1e-9)
@@ -80,7 +80,7 @@ def test_forced_orbit(w, guess):
 
 
 def test_exponents():
-    """Those of the orbit that attracts: its multipliers are complex, and share the damping."""
+    """Exponents of the attracting orbit: its multipliers are complex with a modulus set by the damping."""
     result = lyapunov.lyapunov_spectrum(
         bilinear_oscillator(), (0.0, 1.0), parameters={"w": 1.5}, intervals=2000
     )

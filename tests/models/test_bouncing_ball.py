@@ -1,4 +1,4 @@
-"""The ball against its closed form: times, states, saltation and the point of accumulation."""
+"""The ball compared with its closed form: times, states, saltation and the accumulation point."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_transversality_is_the_speed_of_approach(arc):
 
 
 def test_bounces_accumulate():
-    """The run ends, or says where the bounces pile up; it never hangs or falls through the ground."""
+    """The run ends or reports where the bounces accumulate; it never hangs or falls through the ground."""
     arc = hybrid.simulate(bouncing_ball(), BALL["x0"], (0.0, 5.0))
     assert max(jump.t for jump in arc.jumps) == pytest.approx(BALL["accumulation"], abs=1e-3)
     assert np.min(arc.x[:, 0]) > -1e-9

@@ -56,7 +56,7 @@ def test_the_period_doubles_where_the_closed_form_says():
 
 
 def test_a_ball_on_a_gentle_table_locks_onto_it():
-    """Below one g nothing lifts the ball again."""
+    """Below one g the ball never lifts off again."""
     arc = hybrid.simulate(bouncing_table(), (0.005, 0.0), (0.0, 5.0), mode="flight", parameters={"A": 0.005})
     assert arc.status.ok
     assert (arc.jumps[-1].kind, arc.mode[-1]) == ("limit", "rest")
@@ -75,7 +75,7 @@ def test_a_locked_ball_lifts_off_when_the_table_falls_as_fast():
 
 
 def test_a_ball_at_rest_lifts_off_once():
-    """It leaves with neither speed nor acceleration, on the guard of the next bounce."""
+    """The ball leaves with zero speed and acceleration, on the guard of the next bounce."""
     for e in (0.0, E):
         start = math.asin(G / (A * W**2)) / W
         arc = hybrid.simulate(
@@ -88,7 +88,7 @@ def test_a_ball_at_rest_lifts_off_once():
 
 
 def test_areas_contract_as_the_bounces_say():
-    """``det Phi = e^(2 N)`` after N bounces, here in chaos: a flight keeps areas."""
+    """``det Phi = e^(2 N)`` after N bounces of a chaotic run: a flight preserves areas."""
     parameters = {"A": 0.0125, "e": 0.8}
     arc = hybrid.simulate(
         bouncing_table(),

@@ -1,4 +1,4 @@
-"""The converter against matrix exponentials: its orbit, where that loses stability, saturated ramps.
+"""The converter compared with matrix exponentials: orbit, loss of stability, saturated ramps.
 
 State ``(v, i, tau)``: the clock adds the multiplier 1 of an autonomous flow.
 """
@@ -40,7 +40,7 @@ def test_one_ramp(converter):
     assert close.t / T == pytest.approx(converter["off_fraction"], abs=1e-10)
     assert ramp_ends.t == pytest.approx(T, rel=1e-12)
     np.testing.assert_allclose(ramp_ends.x_plus, [*converter["x0"], 0.0], atol=1e-9)
-    # With the clock left out this is the matrix of the converter driven by time.
+    # Without the clock this is the matrix of the converter driven by time.
     np.testing.assert_allclose(close.saltation[:2, :2], converter["saltation"], atol=1e-9)
 
 
@@ -69,7 +69,7 @@ def test_period_doubling():
 
 
 def switchings(E, v, i, ramps):
-    """Times at which the switch changes, off at first, from the eigenvalues of the filter alone."""
+    """Switching times, starting with the switch off, from the eigenvalues of the filter alone."""
     values, vectors = np.linalg.eig([[-1 / (R * C), 1 / C], [-1 / L, 0.0]])
 
     def flow(x, on, t):
@@ -112,6 +112,6 @@ def test_exponents_sum_to_the_damping_of_the_filter():
     first, clock, second = result.exponents * T
     assert first > 0.1
     assert second < -0.1
-    # Its vector turns into the clock's direction as the first one grows: of the order of one in 500.
+    # Its vector turns towards the clock's direction as the first vector grows, to about 1/500.
     assert clock == pytest.approx(0.0, abs=1e-3)
     assert result.exponents.sum() == pytest.approx(-1 / (R * C), rel=1e-8)

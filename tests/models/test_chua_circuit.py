@@ -42,7 +42,7 @@ def crossings(start, count):
             here = state
             while True:
                 ahead = rest + advance * (here - rest)
-                # A crossing of its own wall at the very start is the one before.
+                # A crossing at the very start is the previous crossing.
                 wall = next((w for w in walls if s > 0 and (here[0] - w) * (ahead[0] - w) < 0), None)
                 if wall is not None:
                     break

@@ -1,4 +1,4 @@
-"""Laws of contact against an impact in closed form, and against each other where they must agree."""
+"""Contact laws compared with an impact in closed form, and with each other where they must agree."""
 
 import math
 
@@ -16,10 +16,10 @@ from tests.reference.load import reference
 K, SPEED = hertz_stiffness(), 0.4
 M1, M2 = 1000.0, 100.0
 MASS = M1 * M2 / (M1 + M2)
-ALONE = {"omega1": 0.0, "omega2": 0.0, "P": 0.0}  # two bodies and nothing between or around them
+ALONE = {"omega1": 0.0, "omega2": 0.0, "P": 0.0}  # two free bodies without springs or drive
 DEPTH = (5 * MASS * SPEED**2 / (4 * K)) ** 0.4
 START = reference("founding_system")["D=0.05"]["x0"]
-# Of the springs and dampers, by which every law must contract volumes.
+# Divergence of the springs and dampers, by which every law must contract volumes.
 TRACE = reference("founding_system")["trace"]
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-15)
 
@@ -65,14 +65,14 @@ def test_momentum_is_kept_and_energy_is_lost_to_the_restitution(law, e):
 
 
 def test_two_masses_after_a_collision():
-    """A light body comes to rest on one of its own mass, and off a heavy one with its speed."""
+    """A body stops at a collision with an equal mass, and rebounds from a heavy body with its speed."""
     assert after_collision(1.0, 1.0, 3.0, 0.0, 1.0) == pytest.approx((0.0, 3.0))
     assert after_collision(1.0, 1e12, 3.0, 0.0, 0.5) == pytest.approx((-1.5, 0.0), abs=1e-9)
     assert after_collision(2.0, 1.0, 3.0, 0.0, 0.0) == pytest.approx((2.0, 2.0))
 
 
 def test_duration_of_a_hertz_contact():
-    """Half of it leads to the deepest point, where all of the energy is in the contact."""
+    """Half of the duration leads to the deepest point, where the contact holds all the energy."""
     half = mp.quad(lambda s: 2 * s / mp.sqrt(1 - (1 - s * s) ** 2.5), [0, 1], method="gauss-legendre")
     exact = 2 * DEPTH / SPEED * half
     touch, leave = impact(Hertz(K)).jumps.t
@@ -97,7 +97,7 @@ def test_kelvin_voigt_lasts_as_long_at_any_speed_and_never_pulls(e):
 
 @pytest.mark.parametrize("speed", [0.1, 0.4, 1.6])
 def test_hunt_crossley_at_any_speed(speed):
-    """The restitution falls with the speed, from one at none."""
+    """The restitution is one at zero speed and falls with the speed."""
     law = HuntCrossley.from_restitution(0.8, K, SPEED)
     arc = impact(law, speed)
     e = hunt_crossley_restitution(law.alpha, speed)
@@ -112,7 +112,7 @@ def test_hunt_crossley_loses_the_part_alpha_v_at_first_order():
 
 
 def test_pressed_bodies_come_to_rest_in_contact():
-    """A negative gap presses them together: a Kelvin-Voigt contact is left and entered until they rest."""
+    """A negative gap presses them together: a Kelvin-Voigt contact opens and closes until they rest."""
     law = KelvinVoigt(k=1e5, c=300.0)
     system, D = vibroimpact(law), -0.5
     arc = hybrid.simulate(
@@ -127,7 +127,7 @@ def test_pressed_bodies_come_to_rest_in_contact():
 
 
 def test_pressed_before_they_have_parted_they_are_in_contact_once_more():
-    """So much damping that the surfaces are deeply dented where the force vanishes, and a force to press."""
+    """With strong damping the surfaces are still dented when the force vanishes, and a force presses them."""
     law = KelvinVoigt(k=100.0, c=600.0)
     arc = hybrid.simulate(
         vibroimpact(law), (-0.1, 0.0, 6.0, 0.0), (0.0, 4.0), mode="free", parameters={"P": 0.0, "D": -0.5}
@@ -149,7 +149,7 @@ def test_pressed_before_they_have_parted_they_are_in_contact_once_more():
     ids=["Hertz", "Hunt-Crossley", "Kelvin-Voigt"],
 )
 def test_stiff_contacts_tend_to_the_rigid_one(stiffened, e):
-    """Matched at the speed of this impact, they differ by what happens in a contact of length ``K^-0.4``."""
+    """Matched at this impact speed, they differ by effects of the contact's duration, ``K^-0.4``."""
     span, stiffer = (0.0, 0.5), 10.0 ** np.array([2, 4, 6])
     rigid = hybrid.simulate(vibroimpact(Rigid(e)), START, span, solver=TIGHT).x[-1]
     ends = [hybrid.simulate(vibroimpact(stiffened(s)), START, span, mode="free").x[-1] for s in stiffer]
@@ -179,7 +179,7 @@ def test_exponents_of_rigid_impacts_sum_to_what_restitution_and_damping_say(e):
 
 
 def test_hunt_crossley_contracts_half_as_much_again():
-    """One impact contracts areas by ``(1 - e u) / (1 + u)``, where Newton's law says ``e^2``."""
+    """One impact contracts areas by ``(1 - e u) / (1 + u)``, while Newton's law gives ``e^2``."""
     law = HuntCrossley.from_restitution(0.8, K, SPEED)
     u = 1.5 * law.alpha * SPEED
     determinant = np.linalg.det(impact(law, tangent=True).fundamental)

@@ -1,4 +1,4 @@
-"""Den Hartog's motions: the closed form without stops, and slips between two stops a period."""
+"""Den Hartog's motions: the closed form without stops, and slips between two stops per period."""
 
 import math
 
@@ -68,7 +68,7 @@ def test_every_start_comes_to_the_amplitude(w):
 
 @two_stops
 def test_slips_between_two_stops(motion):
-    """Half a period after its release the block is released again, on the other side."""
+    """The block is released again half a period later, on the other side."""
     half = math.pi / motion["w"]
     start = (motion["amplitude"], 0.0)
     span = (0.5 * motion["release"], motion["release"] + 2.5 * half)
@@ -100,7 +100,7 @@ def test_a_stop_loses_a_direction(motion):
 
 
 def test_without_friction_a_linear_resonance():
-    """``x = A cos(w t) / (1 - w^2)`` where the friction is no more than rounding."""
+    """``x = A cos(w t) / (1 - w^2)`` if the friction is only rounding."""
     assert den_hartog_amplitude(0.0, 2.0, 0.5) == pytest.approx(2.0 / 0.75, rel=1e-14)
 
 
@@ -139,7 +139,7 @@ def test_viscous_damping_contracts_with_the_friction():
 @hypothesis.example(f=0.75, w=1.25, size=1.0, start=0)
 @hypothesis.example(f=0.75, w=1.15, size=1.0, start=0)
 def test_a_stop_ends_once(f, w, size, start):
-    """A mass that is about to slip is at rest: only rounding is left of its speed and its acceleration."""
+    """A mass that is about to slip is at rest: its speed and acceleration are only rounding."""
     period = 2 * math.pi / w
     arc = hybrid.simulate(
         SYSTEM,

@@ -1,4 +1,4 @@
-"""The impact oscillator against closed forms: orbits with one impact, twenty impacts, the exponents."""
+"""The impact oscillator compared with closed forms: orbits with one impact, twenty impacts, the exponents."""
 
 import math
 
@@ -84,7 +84,7 @@ def test_twenty_impacts():
     [(hybrid.DOP853, 8, (1e-6, 1e-8, 1e-10)), (hybrid.Tsit5, 5, (1e-5, 1e-7, 1e-9))],
 )
 def test_error_across_impacts_falls_with_the_tolerance(solver, order, tolerances):
-    """An event found to less than the solver's order would put a floor under the error."""
+    """An event of lower accuracy would limit the error from below."""
     errors = []
     for tolerance in tolerances:
         arc = hybrid.simulate(
@@ -99,7 +99,7 @@ def test_error_across_impacts_falls_with_the_tolerance(solver, order, tolerances
 
 
 def test_areas_contract_as_the_damping_and_the_impacts_say():
-    """``det Phi = r^(2 N) exp(-c t)`` after N impacts, on any orbit: here a chaotic one."""
+    """``det Phi = r^(2 N) exp(-c t)`` after N impacts on any orbit, here a chaotic one."""
     c, r, t_end = 0.1, 0.8, 20.0
     parameters = {"c": c, "w": 2.8, "d": 0.0, "r": r}
     arc = hybrid.simulate(
@@ -119,7 +119,7 @@ def test_exponents_of_the_published_orbit():
 
 @pytest.mark.parametrize("beyond", [1e-3, 1e-5, 1e-7, 1e-8])
 def test_near_grazing_an_orbit_listed_has_no_impact_on_its_way(beyond):
-    """Just beyond grazing every top between two impacts comes close to the stop, and some pass it."""
+    """Just beyond grazing every maximum between impacts is close to the stop, and some exceed it."""
     p = {"k": 0.1, "c": 1.1, "w": 1.0, "d": 1.0, "r": 0.8}
     p["A"] = (1 + beyond) * p["d"] * math.hypot(p["k"] - p["w"] ** 2, p["c"] * p["w"])
     listed = [(n, orbit) for n in range(1, 19) for orbit in one_impact_orbits(**p, n=n)]

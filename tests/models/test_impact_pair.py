@@ -1,4 +1,4 @@
-"""The impact pair: its symmetric orbits and their multipliers in closed form, and the losses in chaos."""
+"""The impact pair: its symmetric orbits and their multipliers in closed form, contraction in chaos."""
 
 import math
 
@@ -47,7 +47,7 @@ def test_the_default_orbit_attracts():
 
 
 def test_exponents_sum_to_the_losses_of_the_impacts():
-    """In chaos; each impact contracts areas by ``r^2`` and a flight keeps them."""
+    """In chaos each impact contracts areas by ``r^2``, and a flight preserves areas."""
     parameters = {"d": 1.0}
     result = lyapunov.lyapunov_spectrum(impact_pair(), (0.1, 1.0), parameters=parameters, intervals=2000)
     section = hybrid.stroboscopic_section(impact_pair(), (0.1, 1.0), parameters=parameters, periods=2000)

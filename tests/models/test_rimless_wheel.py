@@ -1,4 +1,4 @@
-"""The wheel against its step map: saltation, fixed point, period, multipliers."""
+"""The wheel compared with its step map: saltation, fixed point, period, multipliers."""
 
 import math
 
@@ -29,7 +29,7 @@ def test_steps_settle_on_the_fixed_point():
 
 
 def test_orbit():
-    """From mid-step: the closing point is no event."""
+    """The orbit starts in mid-step, so that its closing point is not an event."""
     theta, omega = hybrid.simulate(rimless_wheel(), (WHEEL["theta"], WHEEL["omega"]), (0.0, 0.5)).x[-1]
     orbit = hybrid.periodic_orbit(rimless_wheel(), (theta, omega + 0.01), period=1.0)
     assert orbit.period == pytest.approx(WHEEL["period"], rel=1e-10)
@@ -45,7 +45,7 @@ def test_exponents():
 
 
 def test_step_map():
-    """``omega^2 -> c^2 (omega^2 + 4 (g / l) sin(alpha) sin(gamma))`` while it rolls."""
+    """``omega^2 -> c^2 (omega^2 + 4 (g / l) sin(alpha) sin(gamma))`` while the wheel rolls."""
     arc = hybrid.simulate(rimless_wheel(), (WHEEL["theta"], 2.0), (0.0, 4.0), solver=TIGHT)
     squares = np.array([4.0, *(jump.x_plus[1] ** 2 for jump in arc.jumps)])
     gain = 4 * 9.8 * math.sin(ALPHA) * math.sin(GAMMA)
@@ -60,7 +60,7 @@ def test_it_rolls_if_it_comes_over_the_top(share, transition):
 
 
 def test_a_step_back_loses_as_much():
-    """It falls back at the speed it rose with, and then turns about the spoke behind."""
+    """The wheel falls back at the speed with which it rose, then turns about the spoke behind."""
     arc = hybrid.simulate(rimless_wheel(), (GAMMA - ALPHA, 0.8), (0.0, 1.0), solver=TIGHT)
     back = arc.jumps[0]
     assert back.transition == "step back"

@@ -11,7 +11,7 @@ from models import rocking_block
 
 ALPHA, P, E = 0.25, 2.0, 0.9
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-15)
-# Slender enough that terms in its square do not show, and tolerances that go with it.
+# Slender enough to neglect quadratic terms, with matching tolerances.
 SLENDER = 1e-5
 FINE = hybrid.DOP853(rtol=1e-12, atol=1e-18)
 
@@ -28,7 +28,7 @@ def quarter_period(theta0):
 
 
 def test_free_rocking():
-    """Each impact leaves ``e^2`` of the energy, which gives the next amplitude, and that the time."""
+    """Each impact leaves ``e^2`` of the energy, which gives the next amplitude and its time."""
     amplitudes = [mp.mpf("0.2")]
     for _ in range(6):
         fall = mp.cos(ALPHA - amplitudes[-1]) - mp.cos(ALPHA)
@@ -57,7 +57,7 @@ def test_impacts_accumulate():
 
 
 def test_elastic_rocking_is_a_shear():
-    """The tangent map over a period, from rest, follows from how the period depends on the amplitude."""
+    """The tangent map over a period from rest follows from the period as a function of the amplitude."""
     theta0 = 0.15
     T = 4 * float(quarter_period(theta0))
     arc = hybrid.simulate(
@@ -70,11 +70,11 @@ def test_elastic_rocking_is_a_shear():
 
 
 def harmonic_orbit(beta, w, e):
-    """Symmetric orbit of the slender block: when it rises from zero, how fast, and its multipliers.
+    """Symmetric orbit of the slender block: phase and speed as it leaves zero, and its multipliers.
 
     In units of ``alpha`` and ``1 / p`` it is ``x'' = x - 1 - beta cos(w t)`` from ``(0, V)`` to
-    ``(0, -V / e)`` in half a period. Less the forced response, ``(1 + c, s)`` at the start and
-    ``(1 - c, -s)`` at the end, that is a free flow, linear in ``c``, ``s`` and ``V``, and
+    ``(0, -V / e)`` in half a period. Without the forced response, ``(1 + c, s)`` at the start and
+    ``(1 - c, -s)`` at the end, the flow is free and linear in ``c``, ``s`` and ``V``, and
     ``c^2 + (s / w)^2`` is known.
     """
     ch, sh = math.cosh(math.pi / w), math.sinh(math.pi / w)
@@ -93,7 +93,7 @@ def harmonic_orbit(beta, w, e):
 
 @pytest.mark.parametrize(("beta", "w", "e"), [(3.0, 4.0, 0.9), (2.0, 2.0, 0.7), (5.0, 2.0, 0.9)])
 def test_rocking_with_the_ground(beta, w, e):
-    """Stable, a node, and unstable."""
+    """The cases are stable, a node, and unstable."""
     t, V, multipliers = harmonic_orbit(beta, w, e)
     parameters = {"alpha": SLENDER, "p": 1.0, "e": e, "A": beta * SLENDER, "w": w}
     quarter = math.pi / (2 * w)

@@ -1,4 +1,4 @@
-"""The simplest walker: both gaits at the slope of the paper, and its doublings of the period."""
+"""The simplest walker: both gaits at the slope of the paper, and its period doublings."""
 
 import numpy as np
 import pytest
@@ -15,14 +15,14 @@ STRIKE = hybrid.Guard(lambda t, x, p: x.phi - 2 * x.theta, direction=+1)
 
 
 def long_gait(gamma):
-    """The orbit at another slope, from the paper's scaling: angles grow as its cube root."""
+    """The orbit at another slope, from the paper's scaling: angles grow with the cube root of the slope."""
     theta, _, rate, _ = np.array(LONG["x0"]) * (gamma / 0.009) ** (1 / 3)
     guess = theta, 2 * theta, rate, (1 - np.cos(2 * theta)) * rate
     return hybrid.periodic_orbit(SYSTEM, guess, mode="behind", period=3.88, parameters={"gamma": gamma})
 
 
 def strikes(gamma, count):
-    """Stance angles at heelstrikes, once the walk has settled that begins close to the long gait."""
+    """Stance angles at heelstrikes of a settled walk that starts near the long gait."""
     orbit = long_gait(gamma)
     section = hybrid.poincare_section(
         SYSTEM, orbit.x0 * (1 + 1e-6), STRIKE, points=count, transient=250, mode=orbit.mode,
@@ -52,7 +52,7 @@ def test_orbit(gait):
 
 
 def test_heelstrike_is_an_impulse_along_the_new_leg():
-    """The hip keeps its velocity across the new leg, the old foot keeps its own, none, across the old leg."""
+    """The hip keeps its velocity across the new leg; the old foot keeps zero velocity across its leg."""
     arc = hybrid.simulate(SYSTEM, np.array(LONG["x0"]) * 1.02, (0.0, 4.2))
     strike = next(jump for jump in arc.jumps if jump.transition == "heelstrike")
 

@@ -17,7 +17,7 @@ APEX = hybrid.Guard(lambda t, x, p: x.vy, direction=-1)
 
 
 def energy(x):
-    """In flight, per mass."""
+    """Energy per mass in flight."""
     return 0.5 * (x[..., 2] ** 2 + x[..., 3] ** 2) + G * x[..., 1]
 
 
@@ -59,7 +59,7 @@ def test_multipliers():
     """One for time, one for energy, zero for the lost position, and the slope of the apex map."""
     start = (0, RUN["apex"], RUN["speed"], 0)
     arc = hybrid.simulate(SYSTEM, start, (0.0, RUN["period"]), mode="descent", tangent=True, solver=TIGHT)
-    # Away from the defective pair at 1, whose rounding is amplified to its square root.
+    # Compare away from the defective pair at 1, which is accurate only to the square root of rounding.
     found = sorted(np.linalg.eigvals(arc.fundamental), key=lambda m: m.real)
     np.testing.assert_allclose(found[:2], [RUN["multiplier"], 0.0], atol=1e-8)
     np.testing.assert_allclose(found[2:], [1.0, 1.0], atol=1e-4)

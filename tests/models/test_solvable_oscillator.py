@@ -1,4 +1,4 @@
-"""The solvable oscillator against its exact solution: the map, the flips, the spectrum."""
+"""The solvable oscillator compared with its exact solution: the map, the flips, the spectrum."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The block on the belt: Leine's limit cycle, and the closed form of Coulomb's."""
+"""The block on the belt: Leine's limit cycle, and the closed form with Coulomb friction."""
 
 import math
 
@@ -25,13 +25,13 @@ class TestStribeck:
         assert exponents[1] == -math.inf
 
     def test_largest_displacement(self):
-        """Where the velocity falls through zero."""
+        """The largest displacement is where the velocity falls through zero."""
         turning = hybrid.Guard(lambda t, x, p: x.v, direction=-1)
         section = hybrid.poincare_section(stick_slip(), (0.5, 0.2), turning, points=2, solver=TIGHT)
         np.testing.assert_allclose(section.x[:, 0], CYCLE["x_largest"], atol=1e-10)
 
     def test_release(self):
-        """Carried from 0.5 to 1 at the belt's 0.2; the slip begins without acceleration."""
+        """The belt carries the block from 0.5 to 1 at speed 0.2; the slip begins with zero acceleration."""
         arc = hybrid.simulate(stick_slip(), (0.5, 0.2), (0.0, 3.0), solver=TIGHT)
         [release] = arc.jumps
         assert release.t == pytest.approx(2.5, abs=1e-12)
@@ -66,7 +66,7 @@ class TestCoulomb:
         np.testing.assert_allclose(catch.saltation, [[1, 0], [0, 0]], atol=1e-9)
 
     def test_slips_inside_the_grazing_circle_never_stick(self):
-        """Harmonic about ``Fk`` with an amplitude that leaves it slower than the belt."""
+        """Harmonic motion about ``Fk`` that always stays slower than the belt."""
         arc = hybrid.simulate(coulomb_stick_slip(), (0.69, 0.0), (0.0, 30.0), mode="slip", solver=TIGHT)
         assert not arc.jumps
         np.testing.assert_allclose(
@@ -74,7 +74,7 @@ class TestCoulomb:
         )
 
     def test_the_block_waits_for_the_belt(self):
-        """However fast it slipped, it sticks again until ``x = Fs``."""
+        """After a slip of any speed the block sticks until ``x = Fs``."""
         for x0 in (0.9, 1.3, 1.9):
             arc = hybrid.simulate(coulomb_stick_slip(), (x0, 0.0), (0.0, 30.0), mode="slip")
             catch, release = arc.jumps[:2]

@@ -16,14 +16,14 @@ C, KS = 0.1, 10.0
 
 
 def period(V, F0):
-    """Of free undamped motion with ``k = d = 1``: an arc about zero and one about the stop's balance."""
+    """Period of free undamped motion with ``k = d = 1``: arcs about zero and about the stop's balance."""
     outer = mp.sqrt(1 + KS)
     return 4 * mp.asin(1 / V) + 4 / outer * mp.atan(outer * mp.sqrt(V**2 - 1) / (1 + F0))
 
 
 @pytest.mark.parametrize(("V", "F0"), [(1.5, 0.0), (1.5, 3.0), (10.0, 3.0), (4.0, -0.5)])
 def test_free_motion(V, F0):
-    """Where it meets the stops, and its tangent map: a shear, as the period depends on the speed."""
+    """Times at the stops, and the tangent map: a shear, because the period depends on the speed."""
     T = float(period(V, F0))
     arc = hybrid.simulate(
         stop_oscillator(),
@@ -57,7 +57,7 @@ def test_saltation(name):
 
 
 def forced_orbit(w, F0, guess):
-    """Symmetric orbit, each stop once a period: when the right one is touched, for how long, how fast."""
+    """Symmetric orbit, each stop once per period: time, duration and speed of the right contact."""
     free = ImpactOscillator(1.0, C, 2.0, w, 0.0, 1.0)
     stop = ImpactOscillator(1.0 + KS, C, 2.0, w, 0.0, 1.0)
     balance = mp.mpf(KS - F0) / (1 + KS)
@@ -80,7 +80,7 @@ def forced_orbit(w, F0, guess):
     [(1.5, 0.0, (3.75, 1.03, 1.98)), (1.5, 1.0, (3.79, 0.94, 1.86)), (2.0, 1.0, (2.77, 0.94, 3.2))],
 )
 def test_forced_orbit(w, F0, guess):
-    """Its multipliers are the squares of those of half a period, turned around."""
+    """The multipliers are the squares of those of half a period followed by a reflection."""
     t, stay, v_touch, v_leave, x = forced_orbit(w, F0, guess)
     parameters = {"w": w, "F0": F0, "A": 2.0}
     orbit = hybrid.periodic_orbit(stop_oscillator(), x + 1e-3, parameters=parameters, t0=t + stay / 2)

@@ -1,4 +1,4 @@
-"""The switched arrival system against rational arithmetic and its invariant density."""
+"""The switched arrival system compared with rational arithmetic and its invariant density."""
 
 from fractions import Fraction
 
@@ -64,7 +64,7 @@ def test_exponents(rates):
     exact = sum(2 * rate * (1 - rate) * np.log((1 - rate) / rate) for rate in rates)
     assert abs(result.exponents[0] - exact) <= 3 * result.standard_error[0]
     np.testing.assert_allclose(result.exponents[1:], 0.0, atol=3e-3)
-    # A Poisson count of this size would have a relative error of 1 %.
+    # A Poisson count of this size has a relative error of 1 %.
     switches = sum(2 * rate * (1 - rate) for rate in rates)
     assert result.jumps_per_interval == pytest.approx(switches, rel=0.03)
 

@@ -13,7 +13,7 @@ TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
 
 
 def multipliers(start, period, R):
-    """Of a closed orbit, by modulus; energy and direction of the flow give two that are 1."""
+    """Multipliers of a closed orbit by modulus; energy and flow direction give two that are 1."""
     arc = hybrid.simulate(
         three_disk_billiard(), start, (0.0, period), parameters={"R": R}, tangent=True, solver=TIGHT
     )
@@ -30,7 +30,7 @@ def test_orbit_between_two_disks(R):
     stretch = sigma - 1 + math.sqrt(sigma * (sigma - 2))
     assert found[0].real == pytest.approx(stretch**2, rel=1e-9)
     assert found[-1].real == pytest.approx(stretch**-2, rel=1e-6)
-    # A double eigenvalue with one eigenvector is known to the square root of the rounding.
+    # A double eigenvalue with one eigenvector is accurate to the square root of rounding.
     np.testing.assert_allclose(found[1:3], 1.0, atol=1e-5)
 
 
@@ -39,7 +39,7 @@ def test_triangular_orbit(R):
     a = 1.0
     sigma = R / a
     side = R - math.sqrt(3) * a
-    # The side below, from left to right, seen from its middle.
+    # The lower side, from left to right, relative to its middle.
     found = multipliers((0.0, -side / (2 * math.sqrt(3)), 1.0, 0.0), 3 * side, R)
     s = 2 * sigma / math.sqrt(3)
     stretch = s - 1 + s * math.sqrt(1 - math.sqrt(3) / sigma)
@@ -48,7 +48,7 @@ def test_triangular_orbit(R):
 
 
 def test_escape():
-    """A particle a little off the orbit between two disks leaves after some reflections, no slower."""
+    """A particle near the orbit between two disks leaves after some reflections at the same speed."""
     start = (0.0, -math.sqrt(3), math.cos(0.02), math.sin(0.02))
     arc = hybrid.simulate(three_disk_billiard(), start, (0.0, 1000.0))
     assert 1 <= len(arc.jumps) <= 10
@@ -57,7 +57,7 @@ def test_escape():
 
 
 def test_closed_pocket():
-    """The mean free path of any billiard that mixes is pi times its area over its perimeter."""
+    """The mean free path of a mixing billiard is pi times its area divided by its perimeter."""
     a, R = 1.0, 1.9
     cut = math.acos(R / (2 * a))
     perimeter = 3 * a * (math.pi / 3 - 2 * cut)
@@ -73,5 +73,5 @@ def test_closed_pocket():
     assert result.jumps_per_interval == pytest.approx(perimeter / (math.pi * area), rel=0.02)
     assert result.exponents[0] > 1.0
     np.testing.assert_allclose(result.exponents + result.exponents[::-1], 0.0, atol=1e-9)
-    # Speed and direction of flight neither grow nor shrink; vectors turn into them like one over the time.
+    # Two exponents are zero (speed, flight direction); their estimates converge like one over the time.
     np.testing.assert_allclose(result.exponents[1:3], 0.0, atol=3e-3)

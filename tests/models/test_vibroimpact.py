@@ -39,7 +39,7 @@ def test_at_rest_without_drive_the_bodies_stay_at_the_gap():
 
 
 def test_the_contact_keeps_total_momentum_of_the_impact():
-    """The contact force is internal: over the 0.8 ms of an impact only springs and drive act, a little."""
+    """The contact force is internal: during the 0.8 ms of an impact springs and drive have little effect."""
     arc = hybrid.simulate(vibroimpact(), case(0.05)["x0"], (0.0, 0.1), mode="free", solver=TIGHT)
     impact, release = arc.jumps[:2]
     momentum = [1000 * x[2] + 100 * x[3] for x in (impact.x_minus, release.x_plus)]

@@ -1,9 +1,9 @@
-"""The founding system's orbits and multipliers, to twenty digits and more.
+"""The founding system's orbits and multipliers to at least twenty digits.
 
 Free flight is linear and solved in closed form. In contact the force ``z^(3/2)`` is not smooth at the ends,
 so time is rescaled by ``dt = w ds`` with ``w = sqrt(z)``: the equations become polynomial in
 ``(w, x2, v1, v2, t, cos, sin)``, impact and release are simple zeros of ``w``, and a Taylor series converges.
-The map over forcing periods is differentiated by central differences at fifty digits, where these lose
+The map over forcing periods is differentiated by central differences with fifty digits, where these lose
 nothing that a double could hold.
 """
 
@@ -47,7 +47,7 @@ class FoundingSystem:
             self._solve_free_flight()
 
     def _solve_free_flight(self) -> None:
-        """Modes of free flight, its rest position and its response to ``(P / m1) exp(i omega t)``."""
+        """Eigenmodes of free flight, its rest position and its response to ``(P / m1) exp(i omega t)``."""
         d1, d2 = 2 * XI1 * OMEGA1, 2 * XI2 * OMEGA2
         s1, s2 = OMEGA1**2, OMEGA2**2
         A = mp.matrix(
@@ -68,7 +68,7 @@ class FoundingSystem:
         return self.rest + (self.response * mp.expj(OMEGA * t)).apply(mp.re)
 
     def free(self, x, t0):
-        """The free flight from ``x`` at ``t0``, a function of time."""
+        """The free flight from ``x`` at ``t0`` as a function of time."""
         amplitudes = self.to_modes * (x - self.forced(t0))
 
         def flight(t):
@@ -80,7 +80,7 @@ class FoundingSystem:
     def impact_time(self, flight, t0, t_end):
         """First time in ``(t0, t_end)`` at which ``x1 - x2`` rises through zero, or None."""
         gap = lambda t: flight(t)[0] - flight(t)[1]  # noqa: E731
-        # Fine enough for the shortest stay apart that these motions have, however far the end is.
+        # Fine enough for the shortest separation in these motions, independent of the end.
         step = 2 * mp.pi / OMEGA / SAMPLES_A_PERIOD
         left, before = t0 + step / 100, mp.mpf(-1)
         while left < t_end:
@@ -94,7 +94,7 @@ class FoundingSystem:
         return None
 
     def contact(self, x, t0):
-        """Release time and state of the contact that begins at ``t0`` in ``x``."""
+        """Release time and state of the contact that begins at ``t0`` with state ``x``."""
         phase = OMEGA * t0
         y = [mp.mpf(0), x[1], x[2], x[3], t0, mp.cos(phase), mp.sin(phase)]
         while True:
@@ -184,7 +184,7 @@ def _orbit_facts(system, guess, periods):
 
 
 def _transient(system):
-    """From near rest, no contact yet: 10 periods with all times and the fundamental matrix, 100 periods."""
+    """From near rest, without contact: 10 periods with all times and the fundamental matrix, 100 periods."""
     with mp.workdps(50):
         x = mp.matrix(["0", "0.001", "0", "0"])
         end, times = system.advance(x, 10)

@@ -1,4 +1,4 @@
-"""The forced oscillator with dry friction: its symmetric motions without stops and with two a period."""
+"""The forced oscillator with dry friction: symmetric motions with no or two stops per period."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def dry_friction_oscillator() -> dict:
 
 
 def _without_stops(f, w):
-    """From a turning point at ``X``, the forcing at phase ``phi``, to that at ``-X`` half a period later.
+    """From a turning point at ``X``, with forcing phase ``phi``, to the one at ``-X`` half a period later.
 
     ``x = f + C cos(s) + D sin(s) + p cos(w s) - q sin(w s)``; the four ends are linear in ``C, D, X, q`` and
     ``p``, and ``p^2 + q^2`` is the square of the forced response.
@@ -61,7 +61,7 @@ def _two_stops(f, w):
     response = 1 / (1 - w**2)
 
     def slip(X):
-        """Release, stop, and where it stops."""
+        """Times of release and stop, and the position of the stop."""
         release = mp.acos(X - f) / w
         a, b = X - f - response * mp.cos(w * release), response * w * mp.sin(w * release)
         rest = lambda t: a * mp.cos(t - release) + b * mp.sin(t - release)  # noqa: E731

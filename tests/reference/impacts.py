@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath as mp
 
 # k, c, A, w, d, r, n; the first is the published reference case, the others cover light and strong damping,
-# a stop at the rest position, and two forcing periods to an impact.
+# a stop at the rest position, and two forcing periods per impact.
 PARAMETER_SETS = [
     ((1.0, 0.1, 1.0, 1.0, 1.0, 0.8, 1), (1.7, 0.08)),
     ((1.0, 0.05, 1.0, 1.3, 0.5, 0.7, 1), None),
@@ -42,7 +42,7 @@ class ImpactOscillator:
         self.response = self.A / (self.k - self.w**2 + 1j * self.c * self.w)
 
     def flight(self, x, v, t0):
-        """Free flight from ``(x, v)`` at ``t0``: a function of time that gives ``(x, v)``."""
+        """Free flight from ``(x, v)`` at ``t0``: a function of time that returns ``(x, v)``."""
         forced = lambda t: self.response * mp.expj(self.w * t)  # noqa: E731
         a = x - forced(t0).real
         b = (v - (1j * self.w * forced(t0)).real + self.c / 2 * a) / self.w_d
@@ -114,7 +114,7 @@ class ImpactOscillator:
         return all(state(t0 + T * i / 2000)[0] < self.d for i in range(1, 2000))
 
     def multipliers(self, V, theta):
-        """By central differences of the map from ``(V, theta)`` to the next impact; no saltation matrix."""
+        """Multipliers by central differences of the map to the next impact, without saltation matrices."""
         T, step = 2 * mp.pi * self.n / self.w, mp.mpf(10) ** -13
 
         def impact_map(V, theta):

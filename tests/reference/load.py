@@ -10,5 +10,5 @@ def reference(name: str) -> Any:
 
 
 def complex_pairs(pairs: list[list[float]]) -> list[complex]:
-    """JSON has no complex numbers: ``[[re, im], ...]`` as such, ordered for comparison."""
+    """Complex numbers from ``[[re, im], ...]``, sorted for comparison."""
     return sorted((complex(*pair) for pair in pairs), key=lambda m: (round(m.real, 9), m.imag))

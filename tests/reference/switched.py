@@ -11,7 +11,7 @@ STEP = mp.mpf("0.05")
 
 
 def solvable_oscillator(b=0.5, u0=0.3, count=20) -> dict:
-    """Corron, Blakely and Stahl: the map at whole times, spectrum, the saltation matrix of each flip."""
+    """Corron, Blakely and Stahl: map at integer times, spectrum, saltation matrix of each flip."""
     with mp.workdps(DIGITS):
         b, u = mp.mpf(b), mp.mpf(u0)
         orbit, saltation = [u], []
@@ -57,7 +57,7 @@ def _wheel_saltation(gl, alpha, gamma, omega):
 
 
 def buck_converter(inputs=("25", "20")) -> list[dict]:
-    """The orbit with one switching a ramp: matrix exponentials and one scalar equation for the duty."""
+    """The orbit with one switching per ramp: matrix exponentials and one scalar equation for the duty."""
     with mp.workdps(DIGITS):
         return [_buck_orbit(mp.mpf(E)) for E in inputs]
 
@@ -171,7 +171,7 @@ def _slip_step(x, v, h, belt, delta, order=60):
 
 
 def saltation(angle="0.4") -> dict:
-    """Matrices that can be written down."""
+    """Saltation matrices in closed form."""
     with mp.workdps(DIGITS):
         c, s = mp.cos(mp.mpf(angle)), mp.sin(mp.mpf(angle))
         P = [[c * c, -c * s], [-c * s, s * s]]

@@ -34,7 +34,7 @@ def _gait(gamma, guess):
 
 
 def _jacobian(function):
-    """Central differences, whose error ``DELTA^2`` is far below what is kept."""
+    """Central differences, whose error ``DELTA^2`` is far below the stored digits."""
 
     def jacobian(*x):
         matrix = mp.matrix(2)
@@ -118,7 +118,7 @@ def _stride(energy, alpha, stiffness, g, y):
     fall = mp.sqrt(2 * g * (y - landing))
     state = (-mp.cos(alpha), landing, mp.sqrt(2 * (energy - g * y)), -fall)
     length = lambda state: state[0] ** 2 + state[1] ** 2 - 1  # noqa: E731
-    # The leg is 1 m long at touchdown too, so the search begins a little later.
+    # The leg is also 1 m long at touchdown, so the search begins a little later.
     flow = lambda x, h: _stance_flow(stiffness, g, x, h)  # noqa: E731
     t, state = _until(flow, length, flow(state, STEP / 5))
     return state[1] + state[3] ** 2 / (2 * g), fall / g + STEP / 5 + t + state[3] / g

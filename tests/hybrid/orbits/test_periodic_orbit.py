@@ -1,4 +1,4 @@
-"""Periodic orbits, stable and unstable, against closed forms; and what is said where there is none."""
+"""Stable and unstable periodic orbits compared with closed forms, and the status if there is none."""
 
 import math
 
@@ -43,7 +43,7 @@ class TestForced:
         assert orbit.t0 == t0
 
     def test_unstable_orbit(self):
-        """The one-impact orbit beyond its flip, found though no run ever stays near it."""
+        """The one-impact orbit beyond its flip is found although no run stays near it."""
         parameters = {"k": 1.0, "c": 0.1, "A": 1.0, "w": 2.8, "d": 0.0, "r": 0.8}
         (closed,) = one_impact_orbits(**parameters, n=1)
         assert abs(closed.multipliers).max() > 1.05
@@ -88,7 +88,7 @@ class TestAutonomous:
 
     @pytest.mark.parametrize("converter", reference("buck_converter"), ids=lambda c: f"{c['E']:g} V")
     def test_buck_converter(self, converter):
-        """Unstable at 25 V. The start is the clock's own event, with the ramp just begun."""
+        """Unstable at 25 V. The start is at the event of the clock, with the ramp just begun."""
         parameters = {"E": converter["E"]}
         orbit = periodic_orbit(
             buck_converter(), (*converter["x0"], 0.0), mode="off", parameters=parameters, period=4e-4
@@ -114,7 +114,7 @@ class TestAutonomous:
 
 
 def van_der_pol():
-    """The limit cycle of mu = 1 with its centre and its size anywhere."""
+    """The limit cycle of mu = 1 with any centre and size."""
 
     def field(t, x, p):
         q = (x.x - p.offset) / p.size
@@ -126,7 +126,7 @@ def van_der_pol():
 
 
 class TestOwnScale:
-    """An orbit closes on the scale of its own motion, wherever it is and whatever the units."""
+    """An orbit closes on the scale of its own motion, for any offset and units."""
 
     @pytest.mark.parametrize(
         ("offset", "size"), [(0.0, 1.0), (1e6, 1.0), (-30.0, 1e-3), (0.0, 1e-9), (0.0, 1e9)]
@@ -136,12 +136,12 @@ class TestOwnScale:
         orbit = periodic_orbit(van_der_pol(), (offset + 2 * size, 0.0), parameters=parameters, period=6.6)
         assert orbit.status.ok
         assert orbit.period == pytest.approx(6.66328685933, rel=1e-7)
-        # Of a millionth of the offset the tolerance of the states leaves fewer digits.
+        # An orbit of a millionth of the offset has fewer digits within the tolerance of the states.
         atol = 1e-6 if offset else 1e-9
         np.testing.assert_allclose(np.log(orbit.multipliers) / orbit.period, [0.0, -1.05937699], atol=atol)
 
     def test_one_component_a_billion_times_smaller_than_the_other(self):
-        """Closed in the units of each component, not in those of the largest."""
+        """Closure is checked on the scale of each component, not of the largest."""
         system = HybridSystem(
             state=("q", "v"),
             parameters={"unit": 1e-9},
@@ -167,7 +167,7 @@ class TestOwnScale:
             assert orbit.multipliers[0] == pytest.approx(math.exp(-1), rel=1e-10)
 
     def test_states_that_only_jumps_change(self):
-        """Once a period ``q`` becomes ``1 - q / 2``; between the jumps it rests. Fixed point 2/3."""
+        """Once per period ``q`` becomes ``1 - q / 2``; between jumps it is constant. Fixed point 2/3."""
         system = HybridSystem(
             state=("q",),
             modes=[Mode("rest", lambda t, x, p: (0.0,))],
@@ -187,7 +187,7 @@ class TestOwnScale:
         assert once.multipliers[0] == pytest.approx(-0.5, rel=1e-12)
 
     def test_one_of_a_family_of_orbits(self):
-        """Newton's step is arbitrary along the family of a pendulum, and the orbit is one all the same."""
+        """Newton's step is arbitrary along the family of a pendulum; the result is still an orbit."""
         pendulum = HybridSystem(state=("q", "v"), modes=[Mode("swing", lambda t, x, p: (x.v, -np.sin(x.q)))])
         orbit = periodic_orbit(pendulum, (1.0, 0.0), period=6.7)
         assert orbit.status.ok
@@ -214,7 +214,7 @@ class TestNoOrbit:
         assert orbit.status.code == StatusCode.NOT_CONVERGED
 
     def test_an_orbit_that_ends_in_another_mode_is_none(self):
-        """The states agree after one period, and only the mode tells that the orbit has not closed."""
+        """The states agree after one period, but the modes differ, so the orbit has not closed."""
         guard = hybrid.Guard(lambda t, x, p: np.sin(2 * np.pi * t), +1)
         system = HybridSystem(
             state=("q",),
@@ -232,7 +232,7 @@ class TestNoOrbit:
     @pytest.mark.parametrize("guess", [(0.0, 0.0), (1.0, 2.0)])
     @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
     def test_an_orbit_at_infinity_is_none(self, guess, unit):
-        """Forced at resonance the amplitude grows for ever; so far out that the ends agree in 13 digits."""
+        """At resonance the amplitude grows forever; far out the two ends agree in 13 digits."""
         system = HybridSystem(
             state=("q", "v"),
             parameters={"unit": 1.0},

@@ -1,4 +1,4 @@
-"""Eigenvalues of products of matrices against the product in many digits, which no float could hold."""
+"""Eigenvalues of matrix products compared with the product in many digits, beyond the range of floats."""
 
 from itertools import pairwise
 
@@ -14,7 +14,7 @@ def orthogonal(n, rng):
 
 
 def exact_eigenvalues(factors, digits):
-    """Eigenvalues of the product of the very floats, in many digits."""
+    """Eigenvalues of the product of exactly these floats, in many digits."""
     with mp.workdps(digits):
         product = mp.eye(len(factors[0]))
         for factor in factors:
@@ -25,7 +25,7 @@ def exact_eigenvalues(factors, digits):
 
 
 def relative_error(found, exact):
-    """Largest relative distance of the eigenvalues found from the nearest that are not taken yet."""
+    """Largest relative distance between found eigenvalues and their nearest unmatched exact ones."""
     worst, left = 0.0, list(exact)
     with mp.workdps(50):
         for log_modulus, phase in zip(found.log_moduli, found.phases, strict=True):
@@ -67,7 +67,7 @@ def test_eigenvalues_three_hundred_orders_of_magnitude_apart(n):
 
 
 def test_a_pair_of_equal_moduli_and_opposite_signs():
-    """+1 and -1, and +-1e-200 besides, told apart from one another and from pairs of complex numbers."""
+    """+1, -1 and +-1e-200 are distinguished from each other and from complex pairs."""
     rng = np.random.default_rng(1)
     frames = [orthogonal(4, rng) for _ in range(40)]
     frames.append(frames[0])
@@ -95,7 +95,7 @@ def test_a_complex_pair_of_modulus_far_below_the_largest():
 
 @pytest.mark.parametrize("n", [2, 3, 5])
 def test_a_defective_product(n):
-    """One block of Jordan: its eigenvalue is sensitive, as the n-th root of rounding, and real to that."""
+    """One Jordan block: its eigenvalue is accurate and real to the n-th root of rounding."""
     jordan = np.diag(np.full(n, 0.5)) + np.diag(np.ones(n - 1), 1)
     found = product_eigenvalues([jordan] * 3)
     np.testing.assert_allclose(found.values, np.full(n, 0.125), atol=20 * np.finfo(float).eps ** (1 / n))

@@ -1,4 +1,4 @@
-"""Sections against simulate at the same times, and against the jumps themselves."""
+"""Sections compared with simulate at the same times, and with the jumps."""
 
 import math
 
@@ -111,7 +111,7 @@ class TestPoincare:
         np.testing.assert_array_equal(section.jumps, [1, 1, 1, 1])
 
     def test_a_surface_that_moves(self):
-        """``x = sin t`` crosses ``t`` itself nowhere, and ``cos t`` at every quarter."""
+        """The surface ``cos t`` moves; ``x = sin t`` crosses it at ``pi / 4 + k pi``."""
         free = attrs.evolve(OSCILLATOR, transitions=[], period=None)
         section = poincare_section(
             free,
@@ -162,7 +162,7 @@ class TestPoincare:
         assert section.status.code == StatusCode.MAX_STEPS
 
     def test_a_surface_that_is_met_no_longer_while_impacts_go_on(self, monkeypatch):
-        """On the attractor the velocity falls through zero in impacts only."""
+        """On the attractor the velocity falls through zero only in impacts."""
         monkeypatch.setattr("hybrid.orbits.sections.STEPS_BETWEEN_POINTS", 20_000)
         section = poincare_section(OSCILLATOR, (0.0, 0.0), Guard(lambda t, x, p: x.v, -1), points=50)
         assert 0 < len(section) < 50
@@ -181,7 +181,7 @@ class TestPoincare:
 
 
 def test_counts_of_more_jumps_than_fit_into_one_burst():
-    """A clock that ticks a thousand times between two points of the section."""
+    """A clock with a thousand jumps between two points of the section."""
     clock = hybrid.HybridSystem(
         state=("q", "c"),
         modes=[hybrid.Mode("on", lambda t, x, p: (1.0, 1.0))],

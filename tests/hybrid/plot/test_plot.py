@@ -34,7 +34,7 @@ def contacts():
 
 
 def curves(axes):
-    """Data of the lines drawn, without those that name the modes in a legend."""
+    """Data of the drawn lines, without the legend entries of modes."""
     return [line.get_xydata() for line in axes.lines if len(line.get_xydata())]
 
 
@@ -118,7 +118,7 @@ def test_graph_shows_the_end_of_a_run():
 
 
 def test_a_curve_is_as_fine_as_it_bends():
-    """An exact step spans whole turns of a circle: each is still drawn round."""
+    """One exact step spans whole turns of a circle; every turn is drawn round."""
     system = hybrid.HybridSystem(state=("q", "v"), modes=[hybrid.Mode("free", lambda t, x, p: (x.v, -x.q))])
     arc = simulate(system, (1.0, 0.0), (0.0, 40.0))
     points = curves(plot_phase(arc, "q", "v"))[0]
@@ -145,7 +145,7 @@ def test_each_result_has_its_picture():
     (dots,) = axes.collections
     np.testing.assert_array_equal(dots.get_offsets(), section.x)
     assert (axes.get_xlabel(), axes.get_ylabel()) == oscillator.state_names == ("x", "v")
-    # Forty dots are large enough to be seen in print.
+    # With forty dots, each dot is large enough for print.
     assert dots.get_sizes()[0] >= 10
     axes = plot(section, y="x", x="v")
     np.testing.assert_array_equal(axes.collections[0].get_offsets(), section.x[:, ::-1])

@@ -1,4 +1,4 @@
-"""What an arc holds: both sides of jumps, dense output, samples, the sequence of jumps."""
+"""Contents of an arc: both sides of jumps, dense output, samples, the sequence of jumps."""
 
 import math
 
@@ -17,7 +17,7 @@ BALL, OSCILLATOR = bouncing_ball(), impact_oscillator()
 
 
 def ball_exact(t):
-    """From rest at 1: state after the jump, if there is one at ``t``."""
+    """From rest at 1: the state at ``t``, after a jump at ``t`` if there is one."""
     g, e, start = 9.81, 0.8, -math.sqrt(2 / 9.81)
     v = math.sqrt(2 * g)
     while t - start >= 2 * v / g:
@@ -121,7 +121,7 @@ class TestDense:
 
 
 class TestDenseOnEveryClock:
-    """Polynomials in time, series in time, series on a contact's own clock, steps of a pair, at any time."""
+    """Dense output: polynomials and series in time, series on a contact's clock, Runge-Kutta steps."""
 
     SYSTEM = vibroimpact()
     PERIOD = SYSTEM.forcing_period()
@@ -133,7 +133,7 @@ class TestDenseOnEveryClock:
         return simulate(self.SYSTEM, self.START, (0.0, 3 * self.PERIOD), mode="free", solver=request.param)
 
     def test_inside_contacts(self, run):
-        """A state on the way is the end of a run that ends there."""
+        """A state on the arc equals the end of a run that ends at that time."""
         entry, leave = run.jumps.t[:2]
         for t in [*np.linspace(entry, leave, 12), *np.linspace(0.0, entry, 5)]:
             end = simulate(self.SYSTEM, self.START, (0.0, t), mode="free", solver=self.EXACT).x[-1]
@@ -141,7 +141,7 @@ class TestDenseOnEveryClock:
             np.testing.assert_allclose(run(t), end, rtol=0, atol=atol)
 
     def test_next_to_the_start_of_a_contact(self, run):
-        """Its clock starts without speed: there the place grows like the square root of the time."""
+        """The clock of a contact starts at zero speed, so the position on it grows like sqrt(time)."""
         jump = run.jumps[0]
         field = np.array([*jump.x_plus[2:], 0.0, 0.0])
         for since in 10.0 ** np.arange(-13, -5):
@@ -214,7 +214,7 @@ class TestSamples:
         np.testing.assert_array_equal(arc.x, [[1.0, 0.0]])
 
     def test_across_the_record_s_capacity(self):
-        """More steps and jumps than are kept between two visits of Python."""
+        """More steps and jumps than a record holds between two returns to Python."""
         t = np.linspace(0.0, 900.0, 5001)
         fine = hybrid.DOP853(rtol=1e-13, atol=1e-14, max_step=0.05)
         sampled = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 900.0), samples=t, solver=fine)

@@ -1,4 +1,4 @@
-"""What a grazing does to tangent vectors is said in the status."""
+"""The status reports the effect of a grazing on tangent vectors."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, sim
 
 
 def parabola(depth):
-    """``q = (t - 1)^2 - depth``: a dip of that depth below the guard, kicked there."""
+    """``q = (t - 1)^2 - depth``: a dip of that depth below the guard, with a kick at the guard."""
     system = HybridSystem(
         state=("q", "v"),
         modes=[Mode("fall", lambda t, x, p: (x.v, 2.0 + 0 * x.v))],

@@ -1,4 +1,4 @@
-"""Ctrl-C ends any call soon, and what was computed is kept."""
+"""Ctrl-C ends any call soon and keeps the results so far."""
 
 import os
 import signal
@@ -118,14 +118,14 @@ CALLS = {
 
 @pytest.fixture(autouse=True)
 def python_hears_interrupts():
-    """Processes that a shell has put into the background ignore them."""
+    """Background processes of a shell ignore interrupts, so enable them."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
 def test_real_interrupts():
-    """The seconds are those of a processor, so that other programs on the machine do not count."""
+    """Processor time is measured, so that other programs on the machine have no effect."""
     child = subprocess.run(
         [sys.executable, "-c", PROGRAM, *CALLS],
         cwd=ROOT,
@@ -145,7 +145,7 @@ def test_real_interrupts():
 
 @pytest.fixture
 def pressed(monkeypatch):
-    """Press Ctrl-C at the n-th question whether to stop."""
+    """Press Ctrl-C at the n-th check for an interrupt."""
 
     def at(question):
         asked = iter(range(1, 10**9))
@@ -178,7 +178,7 @@ def test_the_arc_so_far_goes_on_where_it_was_interrupted(pressed, monkeypatch):
 
 
 def test_where_bursts_end_has_no_influence(monkeypatch):
-    """To the last bit, in bursts of three steps."""
+    """The result is the same to the last bit in bursts of three steps."""
     system, start = models.impact_oscillator(), (0.0, 0.0)
 
     def compute():

@@ -1,4 +1,4 @@
-"""Systems that nobody holds any more are freed, with all that was made for them."""
+"""Unreferenced systems are freed, with everything that was made for them."""
 
 import gc
 import weakref

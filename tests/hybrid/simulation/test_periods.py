@@ -1,4 +1,4 @@
-"""Time as whole periods and a phase, and times without digits."""
+"""Time as whole periods and a phase, and times too large to resolve a step."""
 
 import math
 
@@ -20,7 +20,7 @@ def test_a_whole_number_of_periods_has_no_phase(period, count):
 @pytest.mark.parametrize(
     ("t", "period", "found"),
     [
-        (-1e-20, 1.0, (0, 0.0)),  # nearer to the end of its period than a number can tell
+        (-1e-20, 1.0, (0, 0.0)),  # too close to the end of its period for a double
         (-0.25, 1.0, (-1, 0.75)),
         (2.75, 1.0, (2, 0.75)),
         (math.nextafter(3.0, 0.0), 1.0, (2, math.nextafter(3.0, 0.0) - 2)),
@@ -77,7 +77,7 @@ def test_an_interval_that_does_not_advance_the_clock():
 
 @pytest.mark.parametrize("solver", [hybrid.Taylor(), hybrid.DOP853(max_steps=10_000)])
 def test_a_run_whose_steps_are_below_the_rounding_of_its_time(solver):
-    """An autonomous run does not need the digits of its time; one that did could not succeed."""
+    """An autonomous run does not need the digits of its time, so it succeeds."""
     arc = hybrid.simulate(lorenz(), (1.0, 1.0, 1.0), (1e17, 1e17 + 16), solver=solver)
     near = hybrid.simulate(lorenz(), (1.0, 1.0, 1.0), (0.0, 16.0), solver=solver)
     if arc.status.ok:

@@ -1,4 +1,4 @@
-"""Saltation matrices: closed forms, finite differences of the flow, and what they cannot depend on."""
+"""Saltation matrices: closed forms, finite differences of the flow, and invariances."""
 
 import attrs
 import numpy as np
@@ -19,7 +19,7 @@ STEP = 1e-5
 
 
 def forced():
-    """Two forced nonlinear modes, a curved guard that moves, a reset that depends on all there is."""
+    """Two forced nonlinear modes, a moving curved guard, a reset that depends on time and state."""
     return HybridSystem(
         state=("q", "v"),
         parameters={"w": 1.7},
@@ -71,12 +71,12 @@ class TestClosedForms:
 
     @given(st.floats(0.0, 3.0), st.floats(-8.0, -1.0))
     def test_moving_table(self, t, v):
-        """As on fixed ground, with speed and acceleration relative to the table."""
+        """The matrix is that of fixed ground with speed and acceleration relative to the table."""
         e, a, w, g = 0.7, 0.1, 5.0, 9.81
         relative = v - a * w * np.cos(w * t)
         pull = g - a * w**2 * np.sin(w * t)
         found = saltation_matrix(TABLE, "hit", t, (a * np.sin(w * t), v))
-        # The reset leaves the position as it is, so the speed is mirrored in the first row only by the guard.
+        # The reset keeps the position, so the first row comes from the guard alone.
         expected = [[-e, 0.0], [(1 + e) * pull / -relative, -e]]
         np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
 
@@ -210,13 +210,13 @@ class TestErrors:
 
 
 class TestOfARun:
-    """Matrices that a run without tangent vectors did not need, against those of one that carries some."""
+    """Matrices of a run without tangent vectors, compared with those of a run with tangent vectors."""
 
     @pytest.mark.parametrize(
         ("name", "x0", "mode", "t_end"),
         [
             ("bouncing_ball", (1.0, 0.0), "flight", 2.0),
-            # Its jumps accumulate; the limit has a matrix of its own.
+            # The jumps accumulate, and the limit has its own matrix.
             ("bouncing_table", (0.1, 0.0), "flight", 3.0),
             ("stop_oscillator", (0.0, 0.0), "free", 40.0),
             ("rocking_block", (0.1, 0.1), "right", 3.0),
@@ -233,7 +233,7 @@ class TestOfARun:
         np.testing.assert_allclose(plain.jumps.saltation, carrying.jumps.saltation, rtol=1e-6, atol=1e-6)
 
     def test_of_more_jumps_than_a_record_holds(self):
-        """Each is that of its own transition, time and state."""
+        """Each matrix belongs to its own transition, time and state."""
         system = models.impact_oscillator()
         jumps = simulate(system, (0.0, 0.0), (0.0, 10000.0)).jumps
         assert len(jumps) > 1100

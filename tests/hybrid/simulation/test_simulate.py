@@ -1,4 +1,4 @@
-"""Runs against exact answers, and what must not change a run."""
+"""Runs compared with exact answers, and changes that must not affect a run."""
 
 import math
 from concurrent.futures import ThreadPoolExecutor
@@ -45,7 +45,7 @@ class TestExactAnswers:
         assert arc.fundamental[0, 0] == pytest.approx(math.exp(-3), rel=1e-9)
 
     def test_many_states(self):
-        """A chain of twelve: its energy, and a jump that mirrors it."""
+        """A chain of twelve masses: its energy, and a jump that mirrors it."""
         n = 6
 
         def field(t, x, p):
@@ -85,11 +85,11 @@ class TestExactAnswers:
 
 
 class TestStays:
-    """How long the last stay in a mode was says how far to step, not what is found."""
+    """The length of the last stay in a mode sets the step, not the result."""
 
     @staticmethod
     def turn(lengths):
-        """A clock that stays in ``run`` for one of two lengths in turn, and for a second in ``rest``."""
+        """A clock that stays in ``run`` for two alternating lengths, and in ``rest`` for a second."""
         first, second = lengths
         return HybridSystem(
             state=("x", "length"),
@@ -189,14 +189,14 @@ class TestInvariance:
 
 
 def resumed(system, x0, split, end, mode=None):
-    """The jumps before and after, and the end, of a run cut at ``split``."""
+    """Jumps before and after the cut, and the end, of a run cut at ``split``."""
     first = simulate(system, x0, (0.0, split), mode=mode, solver=TIGHT)
     second = simulate(system, first.x[-1], (split, end), mode=first.mode[-1], solver=TIGHT)
     return len(first.jumps) + len(second.jumps), second.x[-1]
 
 
 class TestSplit:
-    """A run cut anywhere and taken up again is the same run."""
+    """A run that is cut anywhere and resumed is the same run."""
 
     @settings(max_examples=40)
     @given(st.floats(0.0, 3.0))
@@ -247,7 +247,7 @@ class TestSplit:
 
 class TestPeriodicTime:
     def test_a_million_radians_keep_their_phase(self, oscillator):
-        """Period-1 orbit, one impact a period: the impact's phase is the same at the end as at the start."""
+        """Orbit with one impact per period: the impact has the same phase at the end as at the start."""
         exact = reference("impact_oscillator")["orbits"][0]
         T = 2 * math.pi
         loose = hybrid.DOP853(rtol=1e-7, atol=1e-7)
@@ -312,7 +312,7 @@ class TestRunsKnowNothingOfOneAnother:
     @pytest.mark.parametrize("samples", [None, [1.0, 7.0, 9.0]])
     @pytest.mark.parametrize("t_end", [9.0, 900.0])
     def test_later_runs_leave_an_arc_as_it_is(self, oscillator, samples, t_end):
-        """They may have the memory of this one."""
+        """Later runs may reuse the memory of an earlier run."""
 
         def everything(arc):
             jumps = arc.jumps

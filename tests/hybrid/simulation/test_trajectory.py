@@ -12,7 +12,7 @@ PERIODS = [0.1, 1.0 / 3.0, 2 * math.pi / 7.46, 1e-9, 3e5]
 @pytest.mark.parametrize("period", PERIODS)
 @pytest.mark.parametrize("count", [-1000, -3, -1, 0, 1, 3, 7, 10, 1000, 2**20 + 1])
 def test_a_whole_number_of_periods_has_no_phase(period, count):
-    """Times beside it by one rounding have a phase next to 0 or next to a period, and no other cycle."""
+    """Times one rounding away have a phase next to 0 or to a period, and no other cycle."""
     whole = count * period
     for t in (math.nextafter(whole, -math.inf), whole, math.nextafter(whole, math.inf)):
         cycle, phase = split_time(t, period)
@@ -24,7 +24,7 @@ def test_a_whole_number_of_periods_has_no_phase(period, count):
 
 
 def test_the_phase_is_never_a_whole_period():
-    """``5.3 // 0.1`` is 52, and ``5.3 - 53 * 0.1`` is negative: either way a cycle has just begun."""
+    """``5.3 // 0.1`` is 52, and ``5.3 - 53 * 0.1`` is negative: in both cases a new cycle has just begun."""
     cases = [(cycle * 0.1, 0.1) for cycle in range(-2000, 2000)] + [(-1e-20, 1.0), (-5e-324, 0.1)]
     for t, period in cases:
         cycle, phase = split_time(t, period)

@@ -75,7 +75,7 @@ class TestBlockOnBelt:
         np.testing.assert_allclose(np.diff(release), FRICTION["period"], atol=1e-10)
 
     def test_release_holds_for_any_parameters(self, block):
-        """The slip starts on the surface at no acceleration, right up to rounding."""
+        """The slip starts on the surface with zero acceleration, exact up to rounding."""
         rng = np.random.default_rng(1)
         for _ in range(100):
             p = {"belt": rng.uniform(0.1, 0.6), "delta": rng.uniform(0.5, 4), "Fs": rng.uniform(0.5, 2)}
@@ -132,7 +132,7 @@ class TestCrossing:
         np.testing.assert_allclose(arc.fundamental, flows[0] @ salt @ flows[1], atol=1e-11)
 
     def test_same_speeds_never_slide(self):
-        """Parabolas on both sides: every half turn is as wide as the one before."""
+        """Parabolas on both sides: every half turn has the same width."""
         system = planar(lambda t, x, p: (-1.0, -x.x), lambda t, x, p: (1.0, -x.x))
         assert system.mode_names == ("below", "above")
         arc = hybrid.simulate(system, (-0.3, 0.0), (0.0, 60.1))
@@ -207,7 +207,7 @@ class TestSliding:
         ]
 
     def test_a_field_at_rest_on_the_surface(self):
-        """``L_a = 0`` everywhere: what arrives stays."""
+        """``L_a = 0`` everywhere: a state that arrives stays."""
         system = planar(lambda t, x, p: (1.0, 1.0), lambda t, x, p: (0.0, 0.0))
         arc = hybrid.simulate(system, (-2.3, -0.5), (0.0, 5.0))
         assert events(arc) == ["below->sliding"]
@@ -297,7 +297,7 @@ class TestMovingSurface:
         np.testing.assert_allclose(arc.x[-1], [50.0, math.sin(50.0)], atol=1e-8)
 
     def test_leaves_where_it_turns_too_fast(self):
-        """``w = 4``: tangent where ``cos(4 t) = -1/2`` on the way down, caught by ``y = y0 - 2 t`` again."""
+        """``w = 4``: tangent where ``cos(4 t) = -1/2`` on the way down; ``y = y0 - 2 t`` meets it again."""
         arc = hybrid.simulate(
             self.SYSTEM, (0.0, 1.0), (math.pi / 8, 2.0), parameters={"w": 4.0}, solver=TIGHT
         )
@@ -335,7 +335,7 @@ class TestTwoFolds:
     INVISIBLE = two_fold(-1.0, -1.0)
 
     def test_visible_both(self):
-        """The orbit slides into the two-fold, where it might leave above, below, or not at all."""
+        """The orbit slides into the two-fold, from which it might leave above, below, or not at all."""
         arc = hybrid.simulate(self.VISIBLE, (-0.7, 0.0), (0.0, 5.0))
         assert arc.status.code == hybrid.StatusCode.TERMINAL
         assert events(arc) == ["two-fold"]
@@ -371,7 +371,7 @@ class TestTwoFolds:
             hybrid.simulate(self.INVISIBLE, (0.0, 0.0), (0.0, 1.0))
 
     def test_start_at_the_two_fold_with_one_way_out(self):
-        """The field below leads into the surface, that above away from it."""
+        """The field below points into the surface, the field above away from it."""
         arc = hybrid.simulate(self.MIXED, (0.0, 0.0), (0.0, 1.0))
         assert arc.mode[0] == "above"
         np.testing.assert_allclose(arc.x[-1], [1.0, 0.65], atol=1e-12)
@@ -389,7 +389,7 @@ class TestTwoFolds:
 
     @pytest.mark.parametrize("speed", [1e-3, 1e-6, 1e-9, 1e-12])
     def test_a_slow_arrival_is_not_lost(self, speed):
-        """Straight on, at an angle that is next to none."""
+        """A straight arrival at a very small angle."""
         system = planar(lambda t, x, p: (1.0, p.v), lambda t, x, p: (1.0, -1.0), parameters={"v": speed})
         arc = hybrid.simulate(system, (0.0, -speed), (0.0, 2.0), mode="below")
         assert events(arc) == ["below->sliding"]
@@ -398,7 +398,7 @@ class TestTwoFolds:
 
     @pytest.mark.parametrize("depth", [1e-4, 1e-8, 1e-12])
     def test_an_arrival_that_would_soon_turn_back(self, depth):
-        """``y = depth - (x - 1)^2`` from below: slides from its first zero to the fold at 1, and leaves."""
+        """``y = depth - (x - 1)^2`` from below: slides from its first zero to the fold at 1."""
         system = planar(lambda t, x, p: (1.0, -2.0 * (x.x - 1)), lambda t, x, p: (1.0, -1.0))
         arc = hybrid.simulate(system, (0.0, depth - 1.0), (0.0, 2.0))
         assert events(arc) == ["below->sliding", "sliding->below"]
@@ -447,7 +447,7 @@ class TestModel:
         )
 
     def test_sliding_field_keeps_the_surface(self):
-        """Far from simple: a moving, curved surface in three dimensions."""
+        """A general case: a moving, curved surface in three dimensions."""
         system = filippov(
             ("x", "y", "z"),
             {"k": 0.7},
@@ -495,7 +495,7 @@ class TestModel:
 
 
 def in_units(state, time):
-    """The relay and the block of above, a length and a time measured in other units."""
+    """The relay and the block in other units of length and time."""
     relay = planar(
         lambda t, x, p: ((x.y + state) / time, -x.x / time),
         lambda t, x, p: ((x.y - state) / time, -x.x / time),
@@ -509,7 +509,7 @@ def in_units(state, time):
 
 
 class TestUnits:
-    """Nothing is measured against one: powers of two as units change no digit."""
+    """No threshold has a unit: powers of two as units change no digit."""
 
     @pytest.mark.parametrize(("state", "time"), [(2.0**-30, 1.0), (2.0**-60, 2.0**20), (2.0**30, 2.0**-20)])
     @pytest.mark.parametrize("solver", [hybrid.Taylor, hybrid.DOP853])
@@ -539,7 +539,7 @@ def test_an_arrival_from_above_is_one_jump():
         assert events(arc) == ["above->sliding"]
         assert arc.jumps[0].t == pytest.approx(0.25, abs=1e-15)
         np.testing.assert_allclose(arc.x[-1], [offset + 1.0, 0.0], atol=1e-15)
-        # What is lost is the height; from above the height costs time at the field above.
+        # The height is lost; from above it becomes time spent in the field above.
         np.testing.assert_allclose(arc.jumps[0].saltation, [[1.0, 0.0], [0.0, 0.0]], atol=1e-15)
 
 
