@@ -17,21 +17,21 @@ def ball_chain() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``q1 <= q2 <= q3``, positions less the diameters of the balls before, and velocities ``v1``,
-        ``v2``, ``v3``; mode ``flight``; transitions ``left`` (balls 1 and 2) and ``right`` (2 and 3).
+        State ``q1 <= q2 <= q3``, positions minus the diameters of the balls to the left, and velocities
+        ``v1``, ``v2``, ``v3``; mode ``flight``; transitions ``left`` (balls 1 and 2) and ``right`` (2 and 3).
         Parameters: masses ``m1 = m2 = m3 = 1``, restitution ``e = 1``, ``0 <= e <= 1``; any consistent units.
 
     Notes
     -----
-    - Elastic balls are a billiard of ``sqrt(m_k) q_k``: with the motion of the centre of mass left out, a
-      point in a wedge of the angle ``phi``, ``cos(phi)^2 = m1 m3 / ((m1 + m2) (m2 + m3))``. Unfolded, its
-      path is a straight line through copies of the wedge. It crosses at most ``ceil(pi / phi)`` sides, each
-      a collision.
-    - Where ``pi / phi`` is whole, as for equal masses, a collision of all three has one outcome in
-      either order. Elsewhere, or with ``e < 1``, the order matters, and the status says ``AMBIGUOUS_ORDER``.
+    - Elastic balls are a billiard in the coordinates ``sqrt(m_k) q_k``. Without the motion of the centre of
+      mass, a point moves in a wedge of angle ``phi``, ``cos(phi)^2 = m1 m3 / ((m1 + m2) (m2 + m3))``.
+      Unfolded, its path is a straight line through copies of the wedge. The path crosses at most
+      ``ceil(pi / phi)`` sides; each crossing is a collision.
+    - If ``pi / phi`` is an integer, as for equal masses, and ``e = 1``, a collision of all three balls has
+      the same outcome in either order. Otherwise the order matters, and the status is ``AMBIGUOUS_ORDER``.
     - Equal balls with ``e < 7 - 4 sqrt(3) = 0.0718`` can collapse: infinitely many collisions, ``left`` and
-      ``right`` in turn, in finite time. A run follows them down to rounding; from there the balls
-      move as one.
+      ``right`` in turn, in finite time. A run follows them down to rounding; after that the balls move
+      together.
 
     References
     ----------

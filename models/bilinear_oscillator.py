@@ -26,11 +26,11 @@ def bilinear_oscillator() -> HybridSystem:
     With :math:`\omega_i = \sqrt{k_i - c^2 / 4}`:
 
     - free motion crosses zero after :math:`\pi / \omega_1` and :math:`\pi / \omega_2` in turn, whatever its
-      amplitude, and shrinks by :math:`\exp(-c T / 2)` in the natural period
+      amplitude, and shrinks by :math:`\exp(-c T / 2)` per natural period
       :math:`T = \pi / \omega_1 + \pi / \omega_2`;
     - the force is continuous, so every saltation matrix is the identity, and the exponents (phase left out)
       sum to ``-c``;
-    - all motions grow in proportion with ``A``: no bifurcation depends on it.
+    - all motions are proportional to ``A``, so no bifurcation depends on ``A``.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""A ball that bounces on fixed ground: the smallest system with impacts, and with chatter."""
+"""A ball that bounces on fixed ground: the simplest system with impacts and chatter."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def bouncing_ball() -> HybridSystem:
 
     Notes
     -----
-    Exact answers, with ``v_minus`` the velocity just before an impact:
+    Exact results, with ``v_minus`` the velocity just before an impact:
 
     - the saltation matrix is ``[[-e, 0], [g (1 + e) / abs(v_minus), -e]]``;
     - from rest at height ``h`` the impacts are at
       ``t_k = sqrt(2 h / g) (1 + 2 (e + ... + e^(k-1)))``, the k-th at the speed ``e^(k-1) sqrt(2 g h)``;
-    - so for ``e < 1`` they accumulate at ``sqrt(2 h / g) (1 + e) / (1 - e)``, where the ball comes to rest.
+    - for ``e < 1`` the impacts accumulate at ``sqrt(2 h / g) (1 + e) / (1 - e)``; the ball is then at rest.
 
     References
     ----------

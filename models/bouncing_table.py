@@ -14,27 +14,27 @@ def bouncing_table() -> HybridSystem:
 
         \ddot q = -g + A w^2 \sin(w t), \quad q \ge 0, \qquad v \mapsto -e\, v \text{ at } q = 0, v < 0
 
-    Where its bounces accumulate the ball locks onto the table, and lifts off when the table falls as fast as
-    it does, at :math:`A w^2 \sin(w t) = g`.
+    When its bounces accumulate, the ball locks onto the table. It lifts off when the downward acceleration of
+    the table reaches that of free fall, at :math:`A w^2 \sin(w t) = g`.
 
     Returns
     -------
     HybridSystem
-        State ``q`` (height above the table, m), ``v`` (velocity relative to it, m/s); modes ``flight``,
-        ``rest``; transitions ``bounce``, ``liftoff``; forcing period ``2 pi / w``. Parameters: ``g = 9.81``
-        m/s^2; ``e = 0.5``, the coefficient of restitution; amplitude ``A = 0.01`` m and frequency ``w = 36``
-        rad/s of the table, at most 1.32 g.
+        State ``q`` (height above the table, m), ``v`` (velocity relative to the table, m/s); modes
+        ``flight``, ``rest``; transitions ``bounce``, ``liftoff``; forcing period ``2 pi / w``. Parameters:
+        ``g = 9.81`` m/s^2; ``e = 0.5``, the coefficient of restitution; amplitude ``A = 0.01`` m and
+        frequency ``w = 36`` rad/s of the table, with accelerations up to 1.32 g.
 
     Notes
     -----
-    With :math:`\Gamma = A w^2 / g`, and no approximation of a high bounce:
+    With :math:`\Gamma = A w^2 / g`, exactly (without the high-bounce approximation):
 
     - orbits with one bounce every ``n`` periods leave the table at the absolute velocity
       :math:`\pi n g / w`, at the phase :math:`\cos \varphi = \pi n (1 - e) / (\Gamma (1 + e))`;
     - their multipliers have the product :math:`e^2` and the sum
       :math:`1 + e^2 - (1 + e)^2 \Gamma \sin \varphi`, so they are stable for
-      :math:`0 < \Gamma \sin \varphi < 2 (1 + e^2) / (1 + e)^2` and then double their period: for ``n = 1``
-      and the defaults from :math:`\Gamma = 1.047` to ``1.527``;
+      :math:`0 < \Gamma \sin \varphi < 2 (1 + e^2) / (1 + e)^2`; for ``n = 1`` and the defaults from
+      :math:`\Gamma = 1.047` to ``1.527``. At the upper limit their period doubles;
     - for :math:`\Gamma \le 1` a ball at rest stays at rest.
 
     References
@@ -68,7 +68,7 @@ def bouncing_table() -> HybridSystem:
                 "rest",
                 "flight",
                 Guard(weight, direction=-1),
-                # A chatter ends on the table up to rounding, and rounding must not bounce.
+                # At the limit of chatter the ball is on the table up to rounding, which must not bounce.
                 Reset(lambda t, x, p: (0.0, 0.0)),
                 name="liftoff",
             ),

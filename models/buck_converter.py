@@ -1,4 +1,4 @@
-"""Voltage-mode buck converter: a linear filter switched where the control voltage meets a ramp."""
+"""Voltage-mode buck converter: a linear filter, switched when the control voltage crosses a ramp."""
 
 from __future__ import annotations
 
@@ -6,34 +6,34 @@ from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 
 def buck_converter() -> HybridSystem:
-    r"""Buck converter in continuous conduction, its duty cycle set by proportional control of the voltage.
+    r"""Buck converter in continuous conduction, with proportional control of the voltage.
 
     .. math::
 
         C \dot v = i - v / R, \quad L \dot\imath = s E - v, \quad T \dot\tau = 1, \qquad
         s = 1 \text{ while } a (v - V_{ref}) < V_L + (V_U - V_L)\, \tau, \text{ else } 0
 
-    The ramp is driven by a clock ``tau``, a state that goes back to 0 where it reaches 1: so its return is an
-    event, and every field and reset is smooth.
+    The ramp follows a clock ``tau``, a state that is reset to 0 when it reaches 1. The end of the ramp is
+    thus an event, and every field and reset is smooth.
 
     Returns
     -------
     HybridSystem
         State ``v`` (output voltage, V), ``i`` (inductor current, A), ``tau`` (phase of the ramp, 0 to 1);
-        modes ``off`` and ``on`` of the switch; transitions ``close`` and ``open``, where control voltage and
-        ramp meet, and where the ramp ends ``reopen``, ``saturate`` (the switch stays closed, the control
-        voltage being below the new ramp) and ``skip`` (it stays open). Parameters: input voltage
+        modes ``off`` and ``on`` of the switch; transitions ``close`` and ``open``, where the control voltage
+        crosses the ramp, and, at the end of the ramp, ``reopen``, ``saturate`` (the switch stays closed: the
+        control voltage is below the new ramp) and ``skip`` (the switch stays open). Parameters: input voltage
         ``E = 25`` V; inductor ``L = 20e-3`` H, capacitor ``C = 47e-6`` F, load ``R = 22`` Ohm; ramp from
         ``V_L = 3.8`` V to ``V_U = 8.2`` V in the period ``T = 400e-6`` s; reference ``V_ref = 11.3`` V and
         gain ``a = 8.4`` of the control voltage ``a (v - V_ref)``.
 
     Notes
     -----
-    - With ``g = a dv/dt - (V_U - V_L) / T``, the guard's speed, the saltation matrix where the switch closes
+    - With the guard's speed ``g = a dv/dt - (V_U - V_L) / T``, the saltation matrix where the switch closes
       is the identity plus ``a E / (L g)`` in row ``i``, column ``v``, and a term in column ``tau``.
-    - No switching changes volumes, so on any orbit the exponents sum to ``-1 / (R C)``.
+    - Switching preserves volumes, so on any orbit the exponents sum to ``-1 / (R C)``.
     - The orbit of period ``T`` loses its stability in a period doubling at ``E = 24.5166`` V. A cascade to
-      chaos follows, and near 32.34 V the attractor grows suddenly.
+      chaos follows, and near 32.34 V the attractor suddenly becomes larger.
 
     References
     ----------

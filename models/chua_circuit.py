@@ -16,20 +16,20 @@ def chua_circuit() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``x``, ``y`` (voltages of the capacitors over the breakpoint of the resistor), ``z`` (scaled
-        current of the inductor); modes ``left`` (``x < -1``), ``inner`` and ``right`` (``x > 1``).
+        State ``x``, ``y`` (voltages of the capacitors, divided by the breakpoint voltage of the resistor),
+        ``z`` (scaled current of the inductor); modes ``left`` (``x < -1``), ``inner``, ``right`` (``x > 1``).
         Dimensionless parameters: ``alpha = 9``, ``beta = 100/7``, slopes ``m0 = -8/7`` of the resistor in the
         inner region and ``m1 = -5/7`` in the outer ones.
 
     Notes
     -----
-    - Field and state are continuous at the transitions: their saltation matrices are the identity.
-    - Equilibria are the origin and ``(x, 0, -x)`` with ``x = +-(m1 - m0) / (1 + m1)``, +-1.5. With ``m`` the
-      slope and ``a = alpha (1 + m)`` the eigenvalues there are the roots of
+    - Field and state are continuous at the transitions, so the saltation matrices are the identity.
+    - Equilibria are the origin and ``(x, 0, -x)`` with ``x = +-(m1 - m0) / (1 + m1)``, +-1.5. With the slope
+      ``m`` there and ``a = alpha (1 + m)``, their eigenvalues are the roots of
       ``s^3 + (1 + a) s^2 + (beta + a - alpha) s + beta a``.
-    - The divergence is ``-1 - a``. So with the share ``nu`` of time spent in the inner region the exponents
-      sum to ``-1 - alpha (1 + m1 + nu (m0 - m1))``.
-    - The defaults give the double scroll, with the exponents 0.327, 0, -2.520 (Sprott 2003), so of the
+    - The divergence is ``-1 - a``. If the fraction ``nu`` of the time is spent in the inner region, the
+      exponents sum to ``-1 - alpha (1 + m1 + nu (m0 - m1))``.
+    - The defaults give the double scroll, with the exponents 0.327, 0, -2.520 (Sprott 2003), and so the
       Kaplan-Yorke dimension 2.13.
 
     References
@@ -41,7 +41,7 @@ def chua_circuit() -> HybridSystem:
 
     def region(side):
         def field(t, x, p):
-            # In a mode the resistor is a straight line, through the breakpoint at x = side if there is one.
+            # In each mode the resistor is linear; in the outer modes its line starts at x = side.
             resistor = p.m1 * x.x + (p.m0 - p.m1) * (side if side else x.x)
             return p.alpha * (x.y - x.x - resistor), x.x - x.y + x.z, -p.beta * x.y
 

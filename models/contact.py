@@ -1,9 +1,9 @@
-r"""Laws of contact between two bodies, from rigid to Hunt and Crossley's, and how to match one to another.
+r"""Laws of contact between two bodies, from rigid to Hunt and Crossley's, and how to match them.
 
 With the penetration :math:`\delta`, its rate :math:`\dot\delta` and the reduced mass
-:math:`m = m_1 m_2 / (m_1 + m_2)` an impact by itself is :math:`m \ddot\delta = -F`, from
-:math:`\delta = 0, \dot\delta = v` until the bodies part at :math:`\dot\delta = -e\, v`; :math:`e` is the
-coefficient of restitution.
+:math:`m = m_1 m_2 / (m_1 + m_2)`, an isolated impact obeys :math:`m \ddot\delta = -F`. It starts at
+:math:`\delta = 0, \dot\delta = v` and ends at :math:`\dot\delta = -e\, v`; :math:`e` is the coefficient of
+restitution.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ import numpy as np
 
 from hybrid import Guard, Mode, Reset, Transition, arguments
 
-# Restitution of a Kelvin-Voigt contact with critical damping; below it the damping is above critical.
+# Restitution of a Kelvin-Voigt contact with critical damping; a smaller one needs damping above critical.
 CRITICAL_RESTITUTION = exp(-2)
 RESTITUTION = "satisfy 0 < e <= 1 in a compliant contact (in a rigid one e may be 0)"
-# Between them the restitution takes every value there is, in floating point.
+# Between these angles the restitution takes every value of floating point.
 LEAST_ANGLE, LARGEST_ANGLE = 1e-8, 350.0
 
 
 class Bodies(NamedTuple):
-    """What a law of contact needs to know of the two bodies.
+    """The functions of the two bodies that a law of contact needs.
 
     Attributes
     ----------
     field
-        ``(t, x, p, force)``: the time derivative of the state under a force that pushes them apart.
+        ``(t, x, p, force)``: the time derivative of the state under a force that pushes the bodies apart.
     penetration, rate
-        ``(t, x, p)``: how far they overlap, and how fast they approach.
+        ``(t, x, p)``: the overlap of the bodies, and its rate of growth.
     collided
         ``(t, x, p, e)``: the state after a collision by Newton's law.
     """
@@ -45,9 +45,9 @@ class Bodies(NamedTuple):
 
 @runtime_checkable
 class ContactLaw(Protocol):
-    """A law of contact: run-time parameters, and the part of the graph that it makes of two bodies.
+    """A law of contact: its parameters, and the modes and transitions of two bodies in contact.
 
-    The bodies are apart in the mode ``free``, and meet in the transition ``impact``.
+    In the mode ``free`` the bodies are apart; contact begins with the transition ``impact``.
     """
 
     @property
@@ -68,8 +68,8 @@ class ContactLaw(Protocol):
 class Rigid:
     r"""Rigid contact, with Newton's law of restitution: :math:`\dot\delta \mapsto -e\, \dot\delta`.
 
-    One mode, ``free``, and one transition, ``impact``. Impacts that accumulate end the run with the status
-    ACCUMULATION: there is no mode in which the bodies stay together.
+    There is one mode, ``free``, and one transition, ``impact``. If impacts accumulate, the run ends with the
+    status ACCUMULATION, since there is no mode in which the bodies stay together.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class Hertz:
 class HuntCrossley:
     r"""Hertz contact with losses: :math:`F = K\, \delta^{3/2} (1 + \tfrac32 \alpha\, \dot\delta)`.
 
-    Modes and transitions are those of :class:`Hertz`. The force starts and ends at zero and never pulls:
+    Modes and transitions are those of :class:`Hertz`. The force starts and ends at zero and never pulls, so
     no impact rebounds faster than :math:`2 / (3 \alpha)`.
 
     Parameters
@@ -182,8 +182,8 @@ class HuntCrossley:
     def from_restitution(cls, e: float, K: float, speed: float) -> HuntCrossley:
         r"""The law with restitution ``e``, ``0 < e <= 1``, at one speed of impact.
 
-        Energy lost along :math:`\delta` depends on neither stiffness nor mass: with
-        :math:`u = \tfrac32 \alpha v`, :math:`(1 + e)\, u = \ln\frac{1 + u}{1 - e u}` exactly.
+        The restitution depends on neither stiffness nor mass: with :math:`u = \tfrac32 \alpha v`,
+        :math:`(1 + e)\, u = \ln\frac{1 + u}{1 - e u}` exactly.
 
         Parameters
         ----------
@@ -202,11 +202,11 @@ class HuntCrossley:
         if e == 1:
             return cls(K, 0.0)
 
-        # The unknown w = -ln(1 - e u) keeps its digits where e u is next to one.
+        # The unknown is w = -ln(1 - e u), which keeps its digits if e u is close to one.
         def u(w: float) -> float:
             return -expm1(-w) / e
 
-        # The root, of u = (1 - e) 3/2 to first order, lies above a sixth of that.
+        # The root is u = 3/2 (1 - e) to first order, and lies above a sixth of that.
         least = -log1p(-e * (1 - e) / 4)
         w = _root(lambda w: log1p(u(w)) + w - (1 + e) * u(w), least, (1 + e) / e)
         return cls(K, 2 * u(w) / (3 * speed))
@@ -230,12 +230,12 @@ class HuntCrossley:
 
 @dataclass(frozen=True)
 class KelvinVoigt:
-    r"""Spring and damper side by side: :math:`F = k\, \delta + c\, \dot\delta`.
+    r"""Spring and damper in parallel: :math:`F = k\, \delta + c\, \dot\delta`.
 
-    At the impact the force jumps to :math:`c v`. The contact is left where the force vanishes, so it never
-    pulls, as it would if it were left at :math:`\delta = 0`. The surfaces are dented there still, and the
-    bodies move apart freely in the mode ``recovery`` until :math:`\delta = 0`; pressed together once more,
-    they are in contact as soon as the force would push.
+    At the impact the force jumps to :math:`c v`. The contact ends where the force vanishes; if it ended at
+    :math:`\delta = 0`, the force would pull at the end. The surfaces are still deformed when the contact
+    ends, and the bodies move freely in the mode ``recovery`` until :math:`\delta = 0`. If they approach again
+    before that, contact resumes as soon as the force would push.
 
     Modes ``free``, ``contact``, ``recovery``; transitions ``impact``, ``release`` (into ``recovery``),
     ``parting`` (into ``free``) and ``return`` (into ``contact``).
@@ -255,7 +255,7 @@ class KelvinVoigt:
 
     @classmethod
     def from_restitution(cls, e: float, mass: float, duration: float) -> KelvinVoigt:
-        r"""The law with restitution ``e``, ``0 < e <= 1``, at any speed, and with one duration of contact.
+        r"""The law with restitution ``e``, ``0 < e <= 1``, at any speed, and a given duration of contact.
 
         With the damping ratio :math:`\zeta = \cos\theta` the force vanishes after
         :math:`T = 2 \theta / (\omega \sin\theta)`, :math:`\omega^2 = k / m`, and
@@ -267,7 +267,7 @@ class KelvinVoigt:
         e
             Coefficient of restitution.
         mass, duration
-            Reduced mass, kg, and duration of contact, s, :meth:`Hertz.duration` for one.
+            Reduced mass, kg, and duration of contact, s, for example from :meth:`Hertz.duration`.
 
         Raises
         ------
@@ -314,8 +314,8 @@ class KelvinVoigt:
 def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[str, ContactLaw]:
     """Every law that can have restitution ``e``, matched at one speed of impact, the simplest first.
 
-    All lose the same energy at that speed. Hertz and Hunt-Crossley share the stiffness; Kelvin-Voigt shares
-    the duration of the Hertz contact, since that is how long tangent vectors are turned.
+    All laws lose the same energy at that speed. Hertz and Hunt-Crossley have the same stiffness. Kelvin-Voigt
+    has the duration of the Hertz contact, since tangent vectors rotate for that time.
 
     Parameters
     ----------
@@ -324,8 +324,8 @@ def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[st
     mass, speed
         Reduced mass, kg, and speed of approach, m/s.
     e
-        Coefficient of restitution, ``0 < e <= 1``; a Hertz contact is among the laws for ``e = 1`` only,
-        a Hunt-Crossley contact, which is then the same, for ``e < 1`` only.
+        Coefficient of restitution, ``0 < e <= 1``. The Hertz contact is included only for ``e = 1``, the
+        Hunt-Crossley contact only for ``e < 1``, since the two are equal for ``e = 1``.
 
     Raises
     ------
@@ -348,7 +348,7 @@ def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[st
 
 
 def after_collision(m1: float, m2: float, v1: Any, v2: Any, e: Any) -> tuple[Any, Any]:
-    """Velocities of two masses after a collision: momentum is kept, ``v1 - v2`` becomes ``-e (v1 - v2)``."""
+    """Velocities after a collision, which keeps the momentum and turns ``v1 - v2`` into ``-e (v1 - v2)``."""
     impulse = (1 + e) * m1 * m2 / (m1 + m2) * (v1 - v2)
     return v1 - impulse / m1, v2 + impulse / m2
 
@@ -373,7 +373,7 @@ def _in_and_out(bodies: Bodies) -> list[Transition]:
 
 
 def _hertz_force(penetration: Any, p: Any) -> Any:
-    # A step may try a point a little outside of the contact, where the power has no value.
+    # A step may evaluate a point slightly outside the contact, where the power is undefined.
     return p.K * np.maximum(penetration, 0.0) ** 1.5
 
 

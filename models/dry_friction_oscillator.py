@@ -8,7 +8,7 @@ from hybrid import HybridSystem, arguments, filippov
 
 
 def dry_friction_oscillator() -> HybridSystem:
-    r"""Forced linear oscillator of unit mass and stiffness on a support with Coulomb's friction.
+    r"""Forced linear oscillator of unit mass and stiffness on a support with Coulomb friction.
 
     .. math::
 
@@ -25,12 +25,12 @@ def dry_friction_oscillator() -> HybridSystem:
 
     Notes
     -----
-    - With the defaults the motion has no stops; :func:`den_hartog_amplitude` has its amplitude. With more
-      friction or slower forcing it stops twice a period or oftener, and one multiplier is exactly zero.
+    - With the defaults the motion has no stops; :func:`den_hartog_amplitude` gives its amplitude. With more
+      friction or slower forcing it stops at least twice per period, and one multiplier is exactly zero.
     - A turning point without a stop multiplies areas by ``a_plus / a_minus``, the ratio of the accelerations
-      after and before it, so that friction contracts only there; a stop loses a direction.
-    - At ``w = 1/2`` and ``c = 0`` the motion without stops is one of a family, the others unsymmetric; one
-      multiplier is 1: half a forcing period is a whole one of the free oscillator.
+      after and before it. Dry friction contracts areas only there; a stop removes one dimension.
+    - At ``w = 1/2`` and ``c = 0`` the motion without stops is one of a family, whose other members are
+      unsymmetric. One multiplier is 1, because half a forcing period is a period of the free oscillator.
 
     References
     ----------
@@ -62,18 +62,18 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
         X^2 = \left(\frac{A}{1 - w^2}\right)^2 - \left(\frac{f \tan(\pi / 2 w)}{w}\right)^2
 
     For half a period from the turning point at ``X`` the velocity is
-    ``f sin(s) + D (cos(s) - cos(w s)) - X w sin(w s)``, with ``D = -f tan(pi / 2 w)``; the motion exists if
-    that is negative throughout.
+    ``f sin(s) + D (cos(s) - cos(w s)) - X w sin(w s)``, with ``D = -f tan(pi / 2 w)``. The motion exists if
+    this velocity stays negative.
 
     Parameters
     ----------
     f, A, w
-        As in :func:`dry_friction_oscillator`; ``w`` is none of ``1, 1/3, 1/5, ...``.
+        As in :func:`dry_friction_oscillator`; ``w`` must not be ``1, 1/3, 1/5, ...``.
 
     Returns
     -------
     float
-        ``nan`` if there is no such motion.
+        The amplitude, or ``nan`` if the motion does not exist.
     """
     f, A, w = arguments.not_negative("f", f), arguments.number("A", A), arguments.positive("w", w)
     D = -f * np.tan(np.pi / (2 * w))

@@ -23,12 +23,12 @@ def impact_oscillator() -> HybridSystem:
 
     Notes
     -----
-    - With the defaults one orbit with one impact a period is stable; it is one of
-      :func:`models.one_impact.one_impact_orbits`.
+    - With the defaults one orbit with one impact per period is stable;
+      :func:`models.one_impact.one_impact_orbits` finds it.
     - On any orbit the exponents (phase left out) sum to ``-c + 2 ln(r)`` times the impacts per unit time,
       since the flow contracts areas by ``exp(-c t)`` and an impact by ``r^2``.
-    - The map is not differentiable where an orbit grazes the stop, its derivative growing like one over
-      the square root of the distance (Nordmark 1991, doi:10.1016/0022-460X(91)90592-8).
+    - The map is not differentiable where an orbit grazes the stop: its derivative grows like the inverse
+      square root of the distance (Nordmark 1991, doi:10.1016/0022-460X(91)90592-8).
 
     References
     ----------

@@ -17,13 +17,13 @@ def impact_pair() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``x`` (displacement from the middle of the box), ``v`` (velocity relative to it); mode
+        State ``x`` (displacement from the middle of the box), ``v`` (velocity relative to the box); mode
         ``flight``; transitions ``left``, ``right``; forcing period ``2 pi / w``. Dimensionless parameters:
         amplitude ``A = 1`` and frequency ``w = 1`` of the box, clearance ``d = 4``, restitution ``r = 0.8``.
 
     Notes
     -----
-    - Symmetric orbits with two impacts a period cross the box at the absolute speed ``u`` and hit the right
+    - Symmetric orbits with two impacts per period cross the box at the absolute speed ``u`` and hit the right
       wall at the phase :math:`\varphi`:
 
       .. math::
@@ -36,7 +36,7 @@ def impact_pair() -> HybridSystem:
     - Their multipliers are the squares of two numbers with the product :math:`r^2` and the sum
       :math:`2 r - \pi A w (1 + r)^2 \cos(\varphi) / (2 u)`.
     - On any orbit the exponents (phase left out) sum to ``2 ln(r)`` times the impacts per unit time.
-    - Impacts that accumulate at a wall end the run: the mass would stay there a while.
+    - If impacts accumulate at a wall, the run ends: the mass would stay at the wall for a while.
 
     References
     ----------

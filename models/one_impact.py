@@ -1,4 +1,4 @@
-"""Orbits of the impact oscillator with one impact in some forcing periods, in closed form."""
+"""Orbits of the impact oscillator with one impact every ``n`` forcing periods, in closed form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybrid import arguments
 
 
 class OneImpactOrbit(NamedTuple):
-    """Speed before impact ``V``, forcing phase there ``theta`` in (-pi, pi], the two multipliers."""
+    """Speed ``V`` and forcing phase ``theta`` in (-pi, pi] at impact, and the two multipliers."""
 
     V: float
     theta: float
@@ -22,11 +22,12 @@ def one_impact_orbits(
 ) -> list[OneImpactOrbit]:
     r"""Orbits of :func:`models.impact_oscillator` with one impact every ``n`` forcing periods.
 
-    With :math:`x_p = R \cos(\varphi)`, :math:`\varphi = w t - \psi`, the forced response and :math:`\Phi` the
-    free flow over :math:`T = 2 \pi n / w`, the orbit closes if
+    With the forced response :math:`x_p = R \cos(\varphi)`, :math:`\varphi = w t - \psi`, and the free flow
+    :math:`\Phi` over :math:`T = 2 \pi n / w`, the orbit closes if
     :math:`(\Phi - I)(d - x_p, -\dot x_p)^\top = V\, (\Phi\, (0, r)^\top + (0, 1)^\top)`. So
-    :math:`d - x_p = a V`, :math:`-\dot x_p = b V`, and :math:`\cos^2 \varphi + \sin^2 \varphi = 1` leaves a
-    quadratic in :math:`V`. Roots with ``V <= 0`` or that pass the stop between impacts are left out.
+    :math:`d - x_p = a V`, :math:`-\dot x_p = b V`, and :math:`\cos^2 \varphi + \sin^2 \varphi = 1` gives a
+    quadratic equation for :math:`V`. Roots with ``V <= 0`` are left out, as are orbits that pass the stop
+    between impacts.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def one_impact_orbits(
     Returns
     -------
     list of OneImpactOrbit
-        None, one or two orbits, the fastest first, stable or not.
+        Zero, one or two orbits, the fastest first; unstable orbits are included.
     """
     k, c, A, d = (arguments.number(*each) for each in (("k", k), ("c", c), ("A", A), ("d", d)))
     w, r, n = arguments.positive("w", w), arguments.not_negative("r", r), arguments.count("n", n, 1)
@@ -54,7 +55,7 @@ def one_impact_orbits(
             continue
         V = float(V.real)
         theta = np.arctan2(b * V / w, d - a * V) + psi
-        free = np.array([a * V, b * V - r * V])  # the state after impact, less the forced response
+        free = np.array([a * V, b * V - r * V])  # the state after impact, minus the forced response
         flight = _Flight(k, c, w, R, theta - psi, free)
         if _highest_top(flight, np.linspace(0.0, T, 1000 * n)) <= d + 1e-12 * (abs(d) + R):
             s = (1 + r) * (A * np.cos(theta) - k * d) / V
@@ -64,7 +65,7 @@ def one_impact_orbits(
 
 
 class _Flight(NamedTuple):
-    """Motion between impacts: the free flow of ``free`` and the response ``R cos(w t + phase)``."""
+    """Motion between impacts: the free flow from ``free`` plus the response ``R cos(w t + phase)``."""
 
     k: float
     c: float
@@ -81,9 +82,9 @@ class _Flight(NamedTuple):
 
 
 def _highest_top(flight: _Flight, times: np.ndarray) -> float:
-    """Largest displacement where the velocity turns from up to down.
+    """Largest of the local maxima of the displacement.
 
-    The tops are placed between the times by the secant: a grid alone would overlook a shallow one.
+    The secant locates each maximum between two times: the grid alone would miss a shallow one.
     """
     v = flight.at(times)[1]
     i = np.flatnonzero((v[:-1] > 0) & (v[1:] <= 0))
@@ -92,7 +93,7 @@ def _highest_top(flight: _Flight, times: np.ndarray) -> float:
 
 
 def _free_flow(k: float, c: float, t: float | np.ndarray) -> np.ndarray:
-    """``expm(t [[0, 1], [-k, -c]])``, ``t.shape + (2, 2)``; critically damped too: ``sinc`` has no pole."""
+    """``expm(t [[0, 1], [-k, -c]])``, ``t.shape + (2, 2)``; valid also for critical damping."""
     w_d = np.sqrt(complex(k - c**2 / 4))
     t = np.asarray(t)[..., None, None]
     sine = t * np.sinc(w_d * t / np.pi)

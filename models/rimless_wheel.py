@@ -8,7 +8,7 @@ from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 
 def rimless_wheel() -> HybridSystem:
-    r"""Massless spokes around a point mass, ``2 alpha`` apart, on a slope ``gamma``; impacts are plastic.
+    r"""Point mass with massless spokes, ``2 alpha`` apart, on a slope ``gamma``; impacts are plastic.
 
     .. math::
 
@@ -19,10 +19,10 @@ def rimless_wheel() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``theta`` (rad, of the stance spoke from the vertical, downhill positive), ``omega`` (rad/s);
-        mode ``stance``; transitions ``step``, onto the next spoke downhill, and ``step back``. Parameters:
-        ``g = 9.8`` m/s^2, spoke ``l = 1`` m, half angle between spokes ``alpha = pi / 8`` and slope
-        ``gamma = 0.08``, in rad.
+        State ``theta`` (angle of the stance spoke to the vertical, rad, downhill positive), ``omega``
+        (rad/s); mode ``stance``; transitions ``step``, onto the next spoke downhill, and ``step back``.
+        Parameters: ``g = 9.8`` m/s^2, spoke ``l = 1`` m, half angle between spokes ``alpha = pi / 8`` and
+        slope ``gamma = 0.08``, in rad.
 
     Notes
     -----
@@ -31,8 +31,8 @@ def rimless_wheel() -> HybridSystem:
     - Between steps ``omega^2 + 2 (g / l) cos(theta)`` is constant. The speeds after steps obey
       ``omega^2 -> c^2 (omega^2 + 4 (g / l) sin(alpha) sin(gamma))``, with the fixed point
       ``cot(2 alpha) sqrt(4 (g / l) sin(alpha) sin(gamma))`` and the multipliers ``{1, c^2}``.
-    - It rolls if that speed carries it over the top, ``omega^2 > 2 (g / l) (1 - cos(gamma - alpha))``. A
-      slower wheel rocks between two spokes, its steps to and fro accumulating where it stands.
+    - The wheel rolls if that speed carries it over the top, ``omega^2 > 2 (g / l) (1 - cos(gamma - alpha))``.
+      A slower wheel rocks between two spokes: its steps back and forth accumulate, and it comes to rest.
 
     References
     ----------

@@ -8,7 +8,7 @@ from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 
 
 def rocking_block() -> HybridSystem:
-    r"""Rigid block that rocks about its two lower corners on ground with the acceleration ``A g cos(w t)``.
+    r"""Rigid block that rocks about its two lower corners; the ground accelerates by ``A g cos(w t)``.
 
     .. math::
 
@@ -20,7 +20,7 @@ def rocking_block() -> HybridSystem:
     HybridSystem
         State ``theta`` (tilt, rad), ``omega`` (angular velocity, rad/s); modes ``right`` (``theta > 0``,
         about the right corner) and ``left``; transitions ``impact left``, ``impact right`` onto these
-        corners; forcing period ``2 pi / w``. Parameters: ``alpha = 0.25`` rad, between a side and a diagonal;
+        corners; forcing period ``2 pi / w``. Parameters: angle ``alpha = 0.25`` rad of a diagonal to a side;
         ``p = 2`` rad/s, ``p^2 = 3 g / (4 R)`` with half the diagonal ``R``; restitution ``e = 0.9``; ground
         acceleration ``A = 0``, in units of g, and frequency ``w = 2 pi`` rad/s.
 
@@ -28,11 +28,12 @@ def rocking_block() -> HybridSystem:
     -----
     - A block that keeps its angular momentum about the new corner has :math:`e = 1 - 1.5 \sin^2 \alpha`:
       0.908 for the default ``alpha``.
-    - Without forcing it overturns once :math:`|\theta| > \alpha` as it moves outwards; no event marks that.
+    - Without forcing the block overturns if it moves outwards with :math:`|\theta| > \alpha`; no event marks
+      this.
     - The amplitudes of free rocking obey
       :math:`\cos(\alpha - \theta_{k+1}) - \cos \alpha = e^2 (\cos(\alpha - \theta_k) - \cos \alpha)`, and a
-      slender block takes :math:`\operatorname{arcosh}(1 / (1 - \theta_k / \alpha)) / p` from the top to the
-      impact (Housner). So impacts accumulate, on one corner and the other in turn, and the run ends where the
+      slender block takes :math:`\operatorname{arcosh}(1 / (1 - \theta_k / \alpha)) / p` from the largest tilt
+      to the impact (Housner). So impacts accumulate, on the two corners in turn, and the run ends when the
       block comes to rest.
     - On any orbit the exponents (phase left out) sum to ``2 ln(e)`` times the impacts per unit time.
 

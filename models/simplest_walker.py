@@ -1,4 +1,4 @@
-"""Two straight legs that walk down a slope by themselves: the simplest walking model."""
+"""Two straight legs that walk down a slope without power: the simplest walking model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def simplest_walker() -> HybridSystem:
         \ddot\theta &= \sin(\theta - \gamma) \\
         \ddot\phi &= \ddot\theta + \dot\theta^2 \sin\phi - \cos(\theta - \gamma) \sin\phi
 
-    and at heelstrike, ``phi = 2 theta``, the legs exchange their names:
+    and at heelstrike, ``phi = 2 theta``, the legs exchange their roles:
 
     .. math::
 
@@ -25,22 +25,22 @@ def simplest_walker() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``theta`` (rad, of the stance leg from the slope's normal, uphill positive), ``phi`` (rad,
-        between the legs) and the rates ``dtheta``, ``dphi``; modes ``behind`` and ``ahead``, where the swing
-        foot is; transitions ``passing`` and ``heelstrike``. Parameter: the slope ``gamma = 0.009`` rad. Time
-        is in units of ``sqrt(l / g)``.
+        State ``theta`` (angle of the stance leg to the slope's normal, rad, uphill positive), ``phi`` (angle
+        between the legs, rad) and the rates ``dtheta``, ``dphi``; modes ``behind`` and ``ahead``, named after
+        the position of the swing foot; transitions ``passing`` and ``heelstrike``. Parameter: the slope
+        ``gamma = 0.009`` rad. Time is in units of ``sqrt(l / g)``.
 
     Notes
     -----
-    - The swing foot meets the ground twice a step, where ``phi - 2 theta`` falls through zero near mid-stance
-      and where it rises. As in the paper it may pass the first time (no foot scuffing).
-    - At ``gamma = 0.009`` there are two gaits of period one. The long one is stable: after heelstrike
+    - The swing foot meets the ground twice per step: where ``phi - 2 theta`` falls through zero near
+      mid-stance, and where it rises. As in the paper, the first contact is ignored (no foot scuffing).
+    - At ``gamma = 0.009`` there are two gaits of period one. The long gait is stable: after heelstrike
       ``theta = 0.200310900544``, ``dtheta = -0.199832473005``; multipliers
-      ``{1, -0.190099841066 +- 0.557598776682i, 0}``. The short one is not: ``theta = 0.193937369810``,
+      ``{1, -0.190099841066 +- 0.557598776682i, 0}``. The short gait is unstable: ``theta = 0.193937369810``,
       ``dtheta = -0.203866927442``; multipliers ``{4.003864358930, 1, 0.459589589798, 0}``.
-    - The long gait is stable for slopes below 0.015, then doubles its period again and again, and becomes
-      chaotic. From about ``gamma = 0.019`` on the walker falls. So it does from most starts at any slope;
-      there is no ground for its hip to fall on, and the run means nothing from there.
+    - The long gait is stable for slopes below 0.015, then doubles its period repeatedly and becomes chaotic.
+      Above about ``gamma = 0.019`` the walker falls. From most starts it falls at any slope. The model has no
+      ground for the hip, so the run is meaningless after a fall.
 
     References
     ----------

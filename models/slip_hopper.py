@@ -19,23 +19,23 @@ def slip_hopper() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``x``, ``y`` (m, of the mass from the last foothold on level ground), ``vx``, ``vy`` (m/s);
-        modes ``descent``, ``stance`` and ``ascent``; transitions ``touchdown``, where ``y`` falls to
-        ``l0 sin(alpha)`` and the foot is set down anew, so that ``x -> -l0 cos(alpha)``, ``takeoff``, where
-        the leg is ``l0`` long again, and ``apex``. Parameters: mass ``m = 80`` kg, leg stiffness
-        ``k = 20000`` N/m, its length at rest ``l0 = 1`` m, angle of attack ``alpha = 68 deg`` (in rad),
-        ``g = 9.81`` m/s^2.
+        State ``x``, ``y`` (position of the mass relative to the last foothold on level ground, m), ``vx``,
+        ``vy`` (m/s); modes ``descent``, ``stance`` and ``ascent``; transitions ``touchdown``, where ``y``
+        falls to ``l0 sin(alpha)`` and the foot gets a new place, so that ``x -> -l0 cos(alpha)``,
+        ``takeoff``, where the leg has the length ``l0`` again, and ``apex``. Parameters: mass ``m = 80`` kg,
+        leg stiffness ``k = 20000`` N/m, leg length at rest ``l0 = 1`` m, angle of attack ``alpha = 68 deg``
+        (in rad), ``g = 9.81`` m/s^2.
 
     Notes
     -----
-    - Energy is conserved. Runs from one apex to the next are a map of the apex height alone, whose slope is
-      the one multiplier of a running gait besides ``{1, 1, 0}``, those of time, energy and ``x``.
-    - ``alpha = pi / 2`` with ``vx = 0`` hops in place. With ``w = sqrt(k / m)`` and landing at the speed
-      ``v``, a stance lasts ``2 (pi - arctan(w v / g)) / w`` and a flight ``2 v / g``.
-    - With the energy of 5 m/s at the height 1 m running is stable: apex 0.940267144380 m, period
+    - Energy is conserved. The map from one apex to the next depends only on the apex height. Its slope is one
+      multiplier of a running gait; the others are ``{1, 1, 0}``, for time, energy and ``x``.
+    - ``alpha = pi / 2`` with ``vx = 0`` hops in place. With ``w = sqrt(k / m)`` and the landing speed ``v``,
+      a stance lasts ``2 (pi - arctan(w v / g)) / w`` and a flight ``2 v / g``.
+    - At the energy of 5 m/s at the height 1 m, running is stable: apex 0.940267144380 m, period
       0.252532613818 s, multiplier -0.161307631037.
-    - The runner has fallen, and the run means nothing from there, if it takes off downwards or its apex is
-      below ``l0 sin(alpha)``.
+    - If the runner takes off downwards, or its apex is below ``l0 sin(alpha)``, it has fallen, and the rest
+      of the run is meaningless.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""An oscillator of negative damping about a switched set point: chaos with an exact solution."""
+"""An oscillator with negative damping about a switched set point: chaos with an exact solution."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def solvable_oscillator() -> HybridSystem:
         \ddot u - 2 b\, \dot u + (w^2 + b^2)(u - s) = 0, \quad w = 2 \pi, \qquad
         s \mapsto \operatorname{sgn}(u) \text{ at } \dot u = 0
 
-    In mode ``plus`` the sign must change where the velocity rises through zero, on condition that ``u`` is
-    negative there. A turning point where ``s`` already has the sign of ``u``, such as the start, is passed.
+    In mode ``plus`` the sign changes where the velocity rises through zero and ``u`` is negative. A turning
+    point where ``s`` already has the sign of ``u``, such as the start, changes nothing.
 
     Returns
     -------
@@ -28,9 +28,10 @@ def solvable_oscillator() -> HybridSystem:
     -----
     From ``v = 0``, ``abs(u0) < 1``, ``s = sgn(u0)``:
 
-    - turning points come at whole and half times, flips only at whole ones, where the map is
-      ``u -> exp(b) u - (exp(b) - 1) s``, an expanding shift; the exponents are ``b`` and 0, exactly;
-    - from one whole time to the next ``u = s + (u_n - s) exp(b t) (cos(w t) - (b / w) sin(w t))``;
+    - turning points are at integer and half-integer times, flips of ``s`` only at integer times. The map from
+      one integer time to the next is ``u -> exp(b) u - (exp(b) - 1) s``, an expanding shift; the exponents
+      are ``b`` and 0, exactly;
+    - between integer times ``u = s + (u_n - s) exp(b t) (cos(w t) - (b / w) sin(w t))``;
     - a flip from ``s`` to ``-s`` has the saltation matrix ``diag(1, (s + u) / (u - s))``.
 
     References

@@ -1,4 +1,4 @@
-"""A block on a spring, carried along by a moving belt until it breaks loose: friction-induced vibration."""
+"""A block on a spring, carried by a moving belt until it breaks loose: friction-induced vibration."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from hybrid import Guard, HybridSystem, Mode, Reset, Transition, filippov
 
 
 def stick_slip() -> HybridSystem:
-    r"""Block of unit mass and stiffness on a belt, with friction that falls with sliding speed (Stribeck).
+    r"""Block of unit mass and stiffness on a belt; friction falls with the sliding speed (Stribeck).
 
     .. math::
 
@@ -17,16 +17,16 @@ def stick_slip() -> HybridSystem:
     HybridSystem
         State ``x`` (displacement), ``v`` (velocity). The modes are those of :func:`hybrid.filippov` with the
         switching function ``v - belt``: ``below`` slips behind the belt, ``above`` ahead of it, ``sliding``
-        sticks to it. Dimensionless parameters: speed of the ``belt = 0.2``, friction at rest ``Fs = 1``, its
-        decay with speed ``delta = 3``.
+        sticks to it. Dimensionless parameters: belt speed ``belt = 0.2``, friction at rest ``Fs = 1``, decay
+        of the friction with speed ``delta = 3``.
 
     Notes
     -----
-    - The block breaks loose at ``x = Fs``, where the spring takes all the friction there is, so without
-      acceleration.
+    - The block breaks loose at ``x = Fs``, where the spring force equals the largest friction; its
+      acceleration there is zero.
     - The limit cycle slips for 4.295999525 and sticks for 7.705031769, with the period 12.001031295; its
-      largest displacement is 1.133944674. A stick forgets how fast the block slipped: the multipliers are
-      ``{1, 0}``, and the second exponent is minus infinity, exactly.
+      largest displacement is 1.133944674. While the block sticks, differences in velocity are lost: the
+      multipliers are ``{1, 0}``, and the second exponent is minus infinity, exactly.
 
     References
     ----------
@@ -48,7 +48,7 @@ def stick_slip() -> HybridSystem:
 
 
 def coulomb_stick_slip() -> HybridSystem:
-    r"""Block of unit mass and stiffness on a belt, its friction larger at rest than in motion (Coulomb).
+    r"""Block of unit mass and stiffness on a belt, with static and smaller kinetic friction (Coulomb).
 
     .. math::
 
@@ -59,13 +59,13 @@ def coulomb_stick_slip() -> HybridSystem:
     -------
     HybridSystem
         State ``x`` (displacement), ``v`` (velocity); modes ``stick`` and ``slip``; transitions ``release``
-        and ``catch``. Dimensionless parameters: speed of the ``belt = 0.2``, static friction ``Fs = 1`` and
+        and ``catch``. Dimensionless parameters: belt speed ``belt = 0.2``, static friction ``Fs = 1`` and
         kinetic friction ``Fk = 0.5``.
 
     Notes
     -----
-    - After a stick the block never slips ahead of the belt; neither does any that slips with
-      ``hypot(x - Fk, v) < Fs + Fk``. The model knows no other slips.
+    - After a stick the block never slips ahead of the belt, nor does a block that slips with
+      ``hypot(x - Fk, v) < Fs + Fk``. The model does not describe slip ahead of the belt.
     - With ``D = Fs - Fk`` the slip is ``x = Fk + D cos(s) + belt sin(s)``, lasts
       ``2 (pi - arctan(D / belt))`` and ends at ``Fk - D``; the stick lasts ``2 D / belt``.
     - The saltation of the release is ``[[1, 0], [-D / belt, 1]]``, that of the catch ``[[1, 0], [0, 0]]``;

@@ -16,8 +16,8 @@ def stop_oscillator() -> HybridSystem:
         s = \begin{cases} 0 & |x| < d \\ F_0 \operatorname{sgn} x + k_s (x - d \operatorname{sgn} x)
         & |x| > d \end{cases}
 
-    Without preload the restoring force is trilinear. With it a stop is a spring set up against its seat,
-    which yields only to more than ``F0``.
+    Without preload the restoring force is trilinear. With preload each stop is a spring pressed against its
+    seat, which yields only to a force above ``F0``.
 
     Returns
     -------
@@ -30,7 +30,7 @@ def stop_oscillator() -> HybridSystem:
     Notes
     -----
     - The saltation matrix of touching and leaving is ``[[1, 0], [-F0 / abs(v), 1]]``, the identity without
-      preload. Exponents (phase left out) sum to ``-c`` in either case.
+      preload. The exponents (phase left out) sum to ``-c`` in both cases.
     - Free undamped motion that crosses ``x = 0`` at the speed :math:`V > d \sqrt{k}` has the period
 
       .. math::
@@ -39,8 +39,8 @@ def stop_oscillator() -> HybridSystem:
           + \frac{4}{\Omega} \arctan \frac{\Omega\, v}{k d + F_0}, \quad
           v = \sqrt{V^2 - k d^2}, \quad \omega^2 = k, \quad \Omega^2 = k + k_s
 
-    - A mass that comes to a preloaded stop and is pressed against it by less than ``F0`` rests at
-      ``x = d``, a point at which no mode of this model can stay.
+    - A mass that reaches a preloaded stop and is pressed against it by less than ``F0`` rests at ``x = d``.
+      No mode of this model can stay there.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Buffers that drain, and one server that fills whichever has just run empty: chaos of constant fields."""
+"""Draining buffers, and one server that fills the one just emptied: chaos with constant fields."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ def switched_arrival() -> HybridSystem:
     Returns
     -------
     HybridSystem
-        State ``x1``, ``x2``, ``x3``, the work in the buffers; modes ``fill1``, ``fill2``, ``fill3``, one a
-        buffer. Parameters: ``rho1 = rho2 = rho3 = 1/3``, the rates at which they drain (work per unit of
-        time). The server's rate is their sum, so the total of the work is constant.
+        State ``x1``, ``x2``, ``x3``, the work in the buffers; modes ``fill1``, ``fill2``, ``fill3``, one per
+        buffer. Parameters: ``rho1 = rho2 = rho3 = 1/3``, the rates at which the buffers drain (work per unit
+        of time). The server's rate is their sum, so the total work is constant.
 
     Notes
     -----
-    Exact answers for a total of 1 and rates that sum to 1:
+    Exact results for a total of 1 and rates that sum to 1:
 
-    - Equal rates: at a switch one buffer is empty, one holds ``a <= 1/2`` and one ``1 - a``. The next switch
-      comes after ``3 a`` and finds them with ``2 a``, 0 and ``1 - 2 a``: a doubling map of the sides of
-      the triangle of states. Its exponent is ln 2 a switch, and a switch comes every 3/4 on average.
+    - Equal rates: at a switch one buffer is empty, one holds ``a <= 1/2`` and one ``1 - a``. At the next
+      switch, after the time ``3 a``, they hold ``2 a``, 0 and ``1 - 2 a``: a doubling map of the sides of
+      the triangle of states. Its exponent is ln 2 per switch; the mean time between switches is 3/4.
     - Any rates: the fields are constant, so a density that is uniform on the triangle in each mode, with the
-      share ``rho_j`` of time in mode ``j``, is invariant. It gives
+      fraction ``rho_j`` of the time in mode ``j``, is invariant. It gives
       ``2 rho_j (1 - rho_j)`` switches to ``j`` per unit of time.
     - The saltation matrix of a switch to ``j`` has the determinant ``1 - 1 / rho_j``. The other two exponents
-      are zero, along the flow and by the total, so the largest is
+      are zero, for the flow direction and for the conserved total, so the largest is
       ``sum_j 2 rho_j (1 - rho_j) ln((1 - rho_j) / rho_j)``; for equal rates ``(4/3) ln 2 = 0.924196``.
-    - Two buffers that run empty together leave no time between switches: the run is ``STUCK``.
+    - If two buffers run empty together, no time passes between switches: the run ends as ``STUCK``.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""A particle among three disks: the scatterer with a chaotic repeller, or a closed dispersing billiard."""
+"""A particle among three disks: a scatterer with a chaotic repeller, or a closed dispersing billiard."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ def three_disk_billiard() -> HybridSystem:
     -------
     HybridSystem
         State ``x``, ``y``, ``vx``, ``vy``; mode ``flight``; transitions ``disk1`` (above), ``disk2`` (left),
-        ``disk3`` (right). Parameters: radius ``a = 1``, distance of the centres ``R = 6``, both lengths.
+        ``disk3`` (right). Parameters: radius ``a = 1`` and distance between centres ``R = 6``, both lengths.
 
     Notes
     -----
     With ``sigma = R / a``:
 
-    - A reflection of the orbit between two disks stretches by ``sigma - 1 + sqrt(sigma (sigma - 2))``.
-    - One of the triangular orbit does by ``s - 1 + s sqrt(1 - sqrt(3) / sigma)``, ``s = 2 sigma / sqrt(3)``;
-      its multiplier is minus the cube, since three reflections turn the plane over.
-    - Nearly all particles escape; those that stay, forwards and backwards, form a chaotic repeller.
-    - For ``sqrt(3) < sigma < 2`` the disks overlap, and a particle between them is caught: a closed
-      dispersing billiard with the exponents ``lambda, 0, 0, -lambda``. In a pocket of the area ``A`` and the
-      perimeter ``P`` the mean free path is ``pi A / P``.
+    - On the orbit between two disks a reflection stretches by ``sigma - 1 + sqrt(sigma (sigma - 2))``.
+    - On the triangular orbit a reflection stretches by ``s - 1 + s sqrt(1 - sqrt(3) / sigma)``,
+      ``s = 2 sigma / sqrt(3)``. The orbit's multiplier is minus the cube of this, since three reflections
+      reverse the orientation.
+    - Nearly all particles escape. Those that stay in forward and backward time form a chaotic repeller.
+    - For ``sqrt(3) < sigma < 2`` the disks overlap, and a particle between them is trapped: a closed
+      dispersing billiard with the exponents ``lambda, 0, 0, -lambda``. If the enclosed region has the area
+      ``A`` and the perimeter ``P``, the mean free path is ``pi A / P``.
 
     References
     ----------

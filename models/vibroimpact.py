@@ -1,4 +1,4 @@
-"""Two bodies on springs, one hit by the other through a Hertz contact, the founding model."""
+"""Two bodies on springs that collide through a Hertz contact: the model of Bazhenov and others."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from models.contact import Bodies, ContactLaw, Hertz, after_collision
 
 
 def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
-    r"""Two-body vibro-impact system, driven at the main body, with Hertz contact or another law.
+    r"""Two-body vibro-impact system, driven at the main body, with a Hertz contact or another law.
 
     .. math::
 
@@ -23,14 +23,14 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     ----------
     contact
         A law of :mod:`models.contact`, which replaces :math:`F_{con}`, its parameters and its modes;
-        by default ``Hertz(hertz_stiffness())``, the founding model.
+        by default ``Hertz(hertz_stiffness())``, the model of the paper.
 
     Returns
     -------
     HybridSystem
         State ``x1``, ``x2`` (m), ``v1``, ``v2`` (m/s); modes ``free`` and ``contact``, in contact while
         ``x1 - x2 >= 0``; transitions ``impact`` and ``release``; forcing period ``2 pi / omega``.
-        Parameters, of which all but D are recalled from other papers of the authors and are unchecked:
+        Parameters (all but D are recalled from other papers of the authors and are unchecked):
         bodies ``m1 = 1000``, ``m2 = 100`` kg; ``omega1 = 6.283``, ``omega2 = 5.646`` rad/s;
         ``xi1 = xi2 = 0.036``; drive ``P = 500`` N, ``phi0 = 0``, ``omega = 7.40`` rad/s; gap at rest
         ``D = 0.05`` m; contact stiffness ``K = 1.537e11`` N/m^(3/2), from :func:`hertz_stiffness`.
@@ -38,12 +38,12 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     Notes
     -----
     The paper does not print its parameters. **D was inferred here**: with these masses a random scan over
-    gap, stiffness and start finds the three regimes of the paper together only for D from 0.044 m to 0.057 m,
-    and at D = 0.05 m the Floquet exponent at omega = 7.40 is -0.0548936 against the paper's -0.056.
+    gap, stiffness and start finds the three regimes of the paper together only for D from 0.044 m to 0.057 m.
+    At D = 0.05 m and omega = 7.40 the Floquet exponent is -0.0548936; the paper has -0.056.
 
-    Slips of the printed paper, put right above: its second equation has ``omega_1`` and ``m_1`` where
-    ``omega_2`` and ``m_2`` belong; an ``omega_3`` appears that nothing defines; ``z = x2 - x1`` stands
-    against ``Fcon(x1 - x2)``; and the entry ``a34`` of its linearisation lacks ``chi``.
+    Errors of the printed paper, corrected above: its second equation has ``omega_1`` and ``m_1`` in place of
+    ``omega_2`` and ``m_2``; it uses an undefined ``omega_3``; ``z = x2 - x1`` contradicts ``Fcon(x1 - x2)``;
+    and the entry ``a34`` of its linearisation lacks ``chi``.
 
     Known facts:
 
@@ -51,9 +51,9 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
       ``-(2 xi1 omega1 + 2 xi2 omega2 chi + 2 xi2 omega2)``, -0.8995392 with the defaults.
     - At omega = 7.40 an orbit of one period and one impact is stable, with exponents -0.05489357 and
       -0.39487603, twice each; at 7.46 there is a torus, at 7.92 chaos, and other attractors coexist.
-    - Field and state are continuous at both transitions: their saltation matrices are the identity. Yet a
+    - Field and state are continuous at both transitions, so the saltation matrices are the identity. But a
       contact lasts a thousandth of a period, its stiffness starts like the square root of the penetration,
-      and it turns tangent vectors as much as a rigid impact does: they need error control of their own.
+      and it rotates tangent vectors as much as a rigid impact does: they need their own error control.
 
     References
     ----------
@@ -62,7 +62,7 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     """
     contact = Hertz(hertz_stiffness()) if contact is None else contact
     if isinstance(contact, type) or not isinstance(contact, ContactLaw):
-        wanted = "be a law of contact from models.contact, Rigid(e=0.8) for instance"
+        wanted = "be a law of contact from models.contact, for example Rigid(e=0.8)"
         raise arguments.refusal("contact", wanted, contact)
     bodies = Bodies(_field, lambda t, x, p: x.x1 - x.x2, lambda t, x, p: x.v1 - x.v2, _collided)
     return HybridSystem(
@@ -90,7 +90,7 @@ def hertz_stiffness(
     E, nu
         Young's modulus in N/m^2 and Poisson's ratio, the same for both bodies.
     A, B, q
-        Curvatures of the contact in 1/m, and the coefficient that goes with them.
+        Curvatures of the contact in 1/m, and the corresponding coefficient.
     """
     E, q = arguments.positive("E", E), arguments.positive("q", q)
     A, B = arguments.positive("A", A), arguments.positive("B", B)

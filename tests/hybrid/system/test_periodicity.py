@@ -76,7 +76,7 @@ def test_a_period_that_is_one_at_the_declared_parameters_only():
     assert not emitted_of(system).proved_period
     assert simulate(system, (0.0, 0.0), (0.0, 1.0)).status.ok
     assert simulate(system, (0.0, 0.0), (0.0, 1.0), parameters={"w": 2.6}).status.ok
-    with pytest.raises(ModelError, match=r"no period of the functions.*w = 1\.4.*period=lambda p"):
+    with pytest.raises(ModelError, match=r"not a period of the functions.*w = 1\.4.*period=lambda p"):
         simulate(system, (0.0, 0.0), (0.0, 1.0), parameters={"w": 1.4})
 
 

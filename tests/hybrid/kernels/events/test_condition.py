@@ -350,7 +350,7 @@ class TestModel:
             Transition("a", None, Guard(height), accumulates_to="b")
         with pytest.raises(hybrid.ModelError, match=r"Guard: when must be a function of \(t, x, p\); got 3"):
             Guard(height, when=3)
-        with pytest.raises(hybrid.ModelError, match=r"mode name '\(end\)' stands for the end of a run"):
+        with pytest.raises(hybrid.ModelError, match=r"mode name '\(end\)' is reserved for the end of a run"):
             HybridSystem(state=("q",), modes=[Mode("(end)", lambda t, x, p: (1.0,))])
 
     @pytest.mark.parametrize(
