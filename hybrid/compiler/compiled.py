@@ -218,7 +218,7 @@ class CompiledSystem:
         return Model(
             **self.functions(FIELDS),
             **self.functions(EVENTS),
-            variational_flow=Absent(),
+            variational_field=Absent(),
             series=Absent(),
             parameters=system.parameter_values(),
             dimension=system.dimension,

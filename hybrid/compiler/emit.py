@@ -2,7 +2,7 @@
 
 Each function is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
 fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
-columns, time last. The variational flow is the one function that reads all of ``x (n (1 + k),)``: the state
+columns, time last. The variational field is the one function that reads all of ``x (n (1 + k),)``: the state
 and ``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
 """
 
@@ -88,9 +88,9 @@ def _emitted(system: HybridSystem) -> Emitted:
     n = system.dimension
     series = [each.series for each in propagators]
     bodies: dict[str, list[Sequence[str]]] = {
-        "flow": [field.value for field in fields],
-        "flow_jacobian": [_zeros_first(field.derivative, n) for field in fields],
-        "variational_flow": [_variational(field, n) for field in fields],
+        "field": [field.value for field in fields],
+        "field_jacobian": [_zeros_first(field.derivative, n) for field in fields],
+        "variational_field": [_variational(field, n) for field in fields],
         "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
         "guard_gradient": [guard.derivative for guard in guards],
         "reset": [reset.value for reset in resets],

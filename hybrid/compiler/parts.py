@@ -3,12 +3,12 @@
 # The functions of a model, each with the index of a mode or of a transition first, in parts. A part is
 # compiled when a run first needs it; every run needs fields and events. Systems that differ in their guards
 # alone, such as one and its sections, share the fields.
-FIELDS, EVENTS, VARIATIONAL = "fields", "events", "variational flow"
+FIELDS, EVENTS, VARIATIONAL = "fields", "events", "variational field"
 SERIES, TANGENT_SERIES = "series", "tangent series"
 PARTS = {
-    FIELDS: ("flow", "flow_jacobian"),
+    FIELDS: ("field", "field_jacobian"),
     EVENTS: ("guard", "guard_gradient", "reset", "reset_jacobian"),
-    VARIATIONAL: ("variational_flow",),
+    VARIATIONAL: ("variational_field",),
     SERIES: ("series",),
     TANGENT_SERIES: ("tangent_series",),
 }

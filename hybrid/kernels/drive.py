@@ -51,7 +51,7 @@ def arrived(model, run, work):
     by their own rounding without having found it.
     """
     mode, t, found = run.mode, run.phase, NO_TRANSITION
-    model.flow(mode, t, run.y, model.parameters, work.field)
+    model.field(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
         work.settled[i] = run.scale[i]
         if model.propagator[mode] != RUNGE_KUTTA:

@@ -9,7 +9,7 @@ from hybrid.kernels.types.layout import ENTRY, MATRIX, MODEL, VECTOR
 def vector_function(model, function, index, t, x, out):
     """Value of a field (function 0), guard (1) or reset (2), or the gradient of a guard (3), into ``out``."""
     if function == 0:
-        model.flow(index, t, x, model.parameters, out)
+        model.field(index, t, x, model.parameters, out)
     elif function == 1:
         model.guard(index, t, x, model.parameters, out)
     elif function == 2:
@@ -22,6 +22,6 @@ def vector_function(model, function, index, t, x, out):
 def matrix_function(model, function, index, t, x, out):
     """Jacobian ``(n, n + 1)`` of a field (function 0) or a reset (2) into ``out``."""
     if function == 0:
-        model.flow_jacobian(index, t, x, model.parameters, out)
+        model.field_jacobian(index, t, x, model.parameters, out)
     else:
         model.reset_jacobian(index, t, x, model.parameters, out)

@@ -127,18 +127,18 @@ class Trajectory:
 
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
-        from hybrid.kernels.steps.step import flow_jacobian
+        from hybrid.kernels.steps.step import jacobian_at
 
         run, n = self.run, self.model.dimension
-        flow_jacobian(self.model, run.mode, run.phase, run.y, self.work.jacobian)
+        jacobian_at(self.model, run.mode, run.phase, run.y, self.work.jacobian)
         return self.work.jacobian[:, :n].copy()
 
     def field(self) -> np.ndarray:
         """``f`` of the current mode at the current point, ``(n,)``."""
-        from hybrid.kernels.steps.step import field
+        from hybrid.kernels.steps.step import field_at
 
         run, out = self.run, np.empty(self.model.dimension)
-        field(self.model, run.mode, run.phase, run.y, out)
+        field_at(self.model, run.mode, run.phase, run.y, out)
         return out
 
     def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # Texts whose machine code stays in memory after their systems are gone.
 MOST_SOURCES = 128
 SIGNATURES = {
-    "flow_jacobian": MATRIX_SIGNATURE,
+    "field_jacobian": MATRIX_SIGNATURE,
     "reset_jacobian": MATRIX_SIGNATURE,
     "series": SERIES_SIGNATURE,
     "tangent_series": SERIES_SIGNATURE,

@@ -142,7 +142,7 @@ def sides_at(model, run, t, work):
 def speed_rounding(model, run, mode, t, work):
     """How far from zero rounding of state and time can leave the speed of the guard in ``work.gradient``."""
     n = model.dimension
-    model.flow_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    model.field_jacobian(mode, t, run.y, model.parameters, work.jacobian)
     size = abs(work.gradient[n])
     for i in range(n):
         spread = abs(work.field[i]) + abs(work.jacobian[i, n] * t)
@@ -212,7 +212,7 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     along the flow.
     """
     n = model.dimension
-    model.flow_jacobian(mode, t, x, model.parameters, work.jacobian)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     total = 0.0
     for i in range(n):
         bend = work.jacobian[i, n]
@@ -244,7 +244,7 @@ def keep_grazing(model, run, record, transition, t, x, value, work):
     for i in range(model.dimension):
         record.grazing_state[slot, i] = x[i]
     place = record.grazing_state[slot]
-    model.flow(mode, t, place, model.parameters, work.field)
+    model.field(mode, t, place, model.parameters, work.field)
     guard_speed(model, transition, t, place, work.field, work.gradient)
     record.grazing_phase[slot] = t
     record.grazing_cycle[slot] = run.cycle

@@ -122,9 +122,9 @@ def is_held(model, run, transition, mode, t, x, work):
     for i in range(n):
         later[i] = x[i] + moment * work.field[i]
     model.reset(transition, t + moment, later, model.parameters, after)
-    model.flow(mode, t + moment, later, model.parameters, work.field_after)
+    model.field(mode, t + moment, later, model.parameters, work.field_after)
     speed = guard_speed(model, transition, t + moment, later, work.field_after, work.gradient)
-    model.flow(mode, t + moment, after, model.parameters, work.field_after)
+    model.field(mode, t + moment, after, model.parameters, work.field_after)
     kept = guard_speed(model, transition, t + moment, after, work.field_after, work.gradient)
     return not kept * speed > KEPT * speed * speed
 
@@ -139,7 +139,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
     crossed stays due while the state is beyond it. Of those whose condition holds the one listed first fires;
     ``RESTING`` instead if none does and the state rests on the guard that has just fired, pushed against it.
     """
-    model.flow(mode, t, x, model.parameters, work.field)
+    model.field(mode, t, x, model.parameters, work.field)
     chosen, rests = NO_TRANSITION, False
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]

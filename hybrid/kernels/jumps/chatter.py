@@ -63,7 +63,7 @@ def mean_field(model, run, transition, t, x, out, work):
     back the speed that the pull takes.
     """
     mode = run.mode
-    model.flow(mode, t, x, model.parameters, work.field)
+    model.field(mode, t, x, model.parameters, work.field)
     guard_speed(model, transition, t, x, work.field, work.gradient)
     acceleration = guard_acceleration(model, run, transition, mode, t, x, work)
     for i in range(model.dimension):
@@ -124,7 +124,7 @@ def accumulation(model, method, run, transition, since_last, work):
     goes to ``work.settled``.
     """
     n = model.dimension
-    model.flow(run.mode, run.phase, run.y, model.parameters, work.field)
+    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient)
     side = -far_side(model, run, transition)
     speed *= side
@@ -193,8 +193,8 @@ def speed_gradient(model, run, transition, mode, t, x, out, work):
     gradient.
     """
     n = model.dimension
-    model.flow(mode, t, x, model.parameters, work.field)
-    model.flow_jacobian(mode, t, x, model.parameters, work.jacobian)
+    model.field(mode, t, x, model.parameters, work.field)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     for j in range(n):
         total = 0.0
@@ -294,8 +294,8 @@ def add_change_of_duration(model, method, run, target, span, work):
     limit, side = run.phase + span, -far_side(model, run, transition)
     mean = work.trial
     pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
-    model.flow(target, limit, work.settled, model.parameters, work.field_after)
-    model.flow_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
+    model.field(target, limit, work.settled, model.parameters, work.field_after)
+    model.field_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
     by_speed = 2.0 * side / (pull * (1.0 - ratio))
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
     for j in range(n):
@@ -341,8 +341,8 @@ def drift_is_known(model, run, target, span, work):
     matter. The Jacobian at the limit is left in ``work.jacobian``.
     """
     n, t = model.dimension, run.phase
-    model.flow_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
-    model.flow_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
+    model.field_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
+    model.field_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
     constant = True
     for i in range(n):
         for j in range(n):

@@ -37,7 +37,7 @@ def enter(model, run, work):
     """
     mode, t, left = run.mode, run.phase, run.previous_mode
     if run.steps == 0:
-        model.flow(mode, t, run.y, model.parameters, work.field)
+        model.field(mode, t, run.y, model.parameters, work.field)
         widen_scale(model, run, work)
     came = STARTED if left == NO_MODE else LANDED
     fired = run.last_fired if run.jumps > 0 else NO_TRANSITION
@@ -106,7 +106,7 @@ def turns_back(model, run, transition, before, work):
     if run.on_guard[transition] == BY_SPEED and run.side[transition] != before:
         return False
     mode, t = run.mode, run.phase
-    model.flow(mode, t, run.y, model.parameters, work.field)
+    model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     if abs(speed) > speed_rounding(model, run, mode, t, work):
         return speed * before > 0.0
@@ -156,7 +156,6 @@ def first_in_order(task, fired):
             first = other
         elif not matters:
             matters = order_matters(model, run, first, other, work)
-    run.simultaneous += 1 if together > 1 else 0
     run.order_mattered += 1 if matters else 0
     if touched or chosen == NO_TRANSITION:
         run.side[fired] = 0

@@ -61,14 +61,14 @@ def cross(model, transition, mode, t, x_minus, x_plus, work):
     it is, ``f_plus = 0``.
     """
     n = model.dimension
-    model.flow(mode, t, x_minus, model.parameters, work.field)
+    model.field(mode, t, x_minus, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, x_minus, work.field, work.gradient)
     model.reset(transition, t, x_minus, model.parameters, x_plus)
     model.reset_jacobian(transition, t, x_minus, model.parameters, work.reset_jacobian)
     for i in range(n):
         work.field_after[i] = 0.0
     if model.target[transition] != NO_MODE:
-        model.flow(model.target[transition], t, x_plus, model.parameters, work.field_after)
+        model.field(model.target[transition], t, x_plus, model.parameters, work.field_after)
     for i in range(n):
         difference = work.field_after[i] - work.reset_jacobian[i, n]
         for j in range(n):
@@ -213,11 +213,11 @@ def leave(model, run, transition, transversality, work):
 def cross_without_map(model, run, transition, mode, work):
     """``cross`` where nobody asks for a saltation matrix: the state after the jump, and no derivatives."""
     t, target = run.phase, model.target[transition]
-    model.flow(mode, t, run.y, model.parameters, work.field)
+    model.field(mode, t, run.y, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     model.reset(transition, t, run.y, model.parameters, work.new)
     if mode == target and model.marker[transition] == 0:
-        model.flow(mode, t, work.new, model.parameters, work.field_after)
+        model.field(mode, t, work.new, model.parameters, work.field_after)
     postpone_map(run, model.dimension)
     return transversality
 
@@ -334,7 +334,7 @@ def follow_impacts(task, transition, remaining):
         n = model.dimension
         carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
         if not apart:
-            model.flow_jacobian(target, run.phase, x_limit, model.parameters, work.jacobian)
+            model.field_jacobian(target, run.phase, x_limit, model.parameters, work.jacobian)
             drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
             drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
     run.round = 1

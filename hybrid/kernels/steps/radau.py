@@ -95,7 +95,7 @@ def solve_stages(model, method, mode, t, h, y, work):
         for stage in range(1, s + 1):
             combine(y, h, method.a[stage], work.stages, s + 1, n, work.trial)
             residual = change_of_stages[(stage - 1) * n : stage * n]
-            model.flow(mode, t + method.c[stage] * h, work.trial, model.parameters, residual)
+            model.field(mode, t + method.c[stage] * h, work.trial, model.parameters, residual)
             for i in range(n):
                 residual[i] -= work.stages[stage, i]
         substitute(work.systems, work.pivots, s * n, change_of_stages)
@@ -141,7 +141,7 @@ def solve_tangents(model, method, mode, t, h, y, tangents, work):
     vector = work.systems[(s + 1) * n]
     for stage in range(1, s + 1):
         combine(y, h, method.a[stage], work.stages, s + 1, n, work.trial)
-        model.flow_jacobian(mode, t + method.c[stage] * h, work.trial, model.parameters, work.jacobian)
+        model.field_jacobian(mode, t + method.c[stage] * h, work.trial, model.parameters, work.jacobian)
         fill_rows(method, h, work.jacobian, n, stage, work.systems)
         trace = 0.0
         for i in range(n):
@@ -178,7 +178,7 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
     """
     n, s = model.dimension, method.b.shape[0]
     length = n * (1 + tangents)
-    model.flow_jacobian(mode, t, y, model.parameters, work.jacobian)
+    model.field_jacobian(mode, t, y, model.parameters, work.jacobian)
     for stage in range(1, s + 1):
         fill_rows(method, h, work.jacobian, n, stage, work.systems)
     gamma = method.error[0]

@@ -27,21 +27,21 @@ AT_REST = 1e-4
 def rates(model, mode, t, y, tangents, out):
     """Time derivative of ``y (n (1 + k),)`` into ``out``; with tangents, div f in the place after it."""
     if tangents == 0:
-        model.flow(mode, t, y, model.parameters, out)
+        model.field(mode, t, y, model.parameters, out)
     else:
-        model.variational_flow(mode, t, y, model.parameters, out)
+        model.variational_field(mode, t, y, model.parameters, out)
 
 
 @njit(**KERNEL)
 def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
     """The same, without the divergence, by the Jacobian ``(n, n + 1)``, which is left in ``jacobian``.
 
-    Runs by series have no variational flow: it is compiled for explicit and implicit methods alone.
+    Runs by series have no variational field: it is compiled for explicit and implicit methods alone.
     """
     n = model.dimension
-    model.flow(mode, t, y, model.parameters, out)
+    model.field(mode, t, y, model.parameters, out)
     if tangents > 0:
-        model.flow_jacobian(mode, t, y, model.parameters, jacobian)
+        model.field_jacobian(mode, t, y, model.parameters, jacobian)
     for first in range(n, n * (1 + tangents), n):
         for i in range(n):
             rate = 0.0
@@ -51,15 +51,15 @@ def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
 
 
 @njit(void(MODEL, int64, float64, VECTOR, VECTOR), **ENTRY)
-def field(model, mode, t, x, out):
+def field_at(model, mode, t, x, out):
     """``f`` into ``out (n,)``."""
-    model.flow(mode, t, x, model.parameters, out)
+    model.field(mode, t, x, model.parameters, out)
 
 
 @njit(void(MODEL, int64, float64, VECTOR, MATRIX), **ENTRY)
-def flow_jacobian(model, mode, t, x, out):
+def jacobian_at(model, mode, t, x, out):
     """``(D_x f, D_t f)`` into ``out (n, n + 1)``."""
-    model.flow_jacobian(mode, t, x, model.parameters, out)
+    model.field_jacobian(mode, t, x, model.parameters, out)
 
 
 @njit(**INLINE)
@@ -146,7 +146,7 @@ def interpolation_stages(model, method, mode, t, h, y, work):
     n = model.dimension
     for i in range(method.b.shape[0] + 1, method.a.shape[0]):
         combine(y, h, method.a[i], work.stages, i, n, work.trial)
-        model.flow(mode, t + method.c[i] * h, work.trial, model.parameters, work.stages[i])
+        model.field(mode, t + method.c[i] * h, work.trial, model.parameters, work.stages[i])
 
 
 @njit(**KERNEL)

@@ -17,9 +17,9 @@ CUBE = float64[:, :, ::1]
 INDICES = int64[::1]
 INDEX_MATRIX = int64[:, ::1]
 
-VECTOR_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, VECTOR))
-SERIES_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, int64, MATRIX))
-MATRIX_ROLE = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
+VECTOR_FUNCTION = types.FunctionType(void(int64, float64, VECTOR, VECTOR, VECTOR))
+SERIES_FUNCTION = types.FunctionType(void(int64, float64, VECTOR, VECTOR, int64, MATRIX))
+MATRIX_FUNCTION = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
 
 
 class Programs(Structure):
@@ -69,14 +69,14 @@ class Model(Structure):
     them have in each mode. ``period`` is 0 without a forcing period.
     """
 
-    flow: VECTOR_ROLE
-    flow_jacobian: MATRIX_ROLE
-    variational_flow: VECTOR_ROLE
-    guard: VECTOR_ROLE
-    guard_gradient: VECTOR_ROLE
-    reset: VECTOR_ROLE
-    reset_jacobian: MATRIX_ROLE
-    series: SERIES_ROLE
+    field: VECTOR_FUNCTION
+    field_jacobian: MATRIX_FUNCTION
+    variational_field: VECTOR_FUNCTION
+    guard: VECTOR_FUNCTION
+    guard_gradient: VECTOR_FUNCTION
+    reset: VECTOR_FUNCTION
+    reset_jacobian: MATRIX_FUNCTION
+    series: SERIES_FUNCTION
     parameters: VECTOR
     dimension: int64
     first_outgoing: INDICES
@@ -163,7 +163,6 @@ COUNTERS = (
     "chatter_jumps",
     "grazings",
     "ill_conditioned",
-    "simultaneous",
     "order_mattered",
     "grazing_guard",
     "last_kind",

@@ -78,12 +78,12 @@ def test_roles_are_the_model_functions():
     from hybrid.compiler.cache.loader import load_kernels
 
     load_kernels()
-    from hybrid.kernels.steps.step import field, flow_jacobian
+    from hybrid.kernels.steps.step import field_at, jacobian_at
 
-    field(compiled.model(), 0, t, x, out)
+    field_at(compiled.model(), 0, t, x, out)
     np.testing.assert_allclose(out, [-0.5, np.cos(0.7) + 0.05 - 0.3])
     jacobian = np.empty((2, 3))
-    flow_jacobian(compiled.model(), 0, t, x, jacobian)
+    jacobian_at(compiled.model(), 0, t, x, jacobian)
     np.testing.assert_allclose(jacobian, [[0.0, 1.0, 0.0], [-1.0, -0.1, -np.sin(0.7)]])
     assert len(p) == 6
 

@@ -165,7 +165,7 @@ def test_every_function_agrees_with_the_model(model, compiled):
     n, p = system.dimension, system.parameter_values()
     functions = load(emit(system), compiled=compiled)
     pairs = [
-        ("flow", "flow_jacobian", k, field_function(mode, system.dimension))
+        ("field", "field_jacobian", k, field_function(mode, system.dimension))
         for k, mode in enumerate(system.modes)
     ]
     for k, transition in enumerate(system.transitions):
@@ -193,7 +193,7 @@ def test_no_reset_is_the_identity():
 def test_a_result_may_overwrite_the_state():
     functions = load(emit(mode_system(lambda t, x, p: (x.v, -x.q))), compiled=False)
     x = np.array([3.0, 4.0])
-    functions["flow"](0, 0.0, x, np.empty(0), x)
+    functions["field"](0, 0.0, x, np.empty(0), x)
     np.testing.assert_array_equal(x, [4.0, -3.0])
 
 
@@ -201,7 +201,7 @@ def test_a_result_may_overwrite_the_state():
 @pytest.mark.parametrize("compiled", [False, True], ids=["plain", "compiled"])
 def test_a_contact_that_just_touches_has_slope_zero(power, compiled):
     system = mode_system(lambda t, x, p: (np.maximum(x.q, 0) ** power, 0.0))
-    jacobian = load(emit(system), compiled=compiled)["flow_jacobian"]
+    jacobian = load(emit(system), compiled=compiled)["field_jacobian"]
     for q, slope in ((-1.0, 0.0), (-0.0, 0.0), (0.0, 0.0), (4.0, power * 4.0 ** (power - 1))):
         result = run(jacobian, (2, 3), 0, 0.0, np.array([q, 1.0]), np.empty(0))
         np.testing.assert_allclose(result, [[slope, 0.0, 0.0], [0.0, 0.0, 0.0]], rtol=1e-15)
@@ -212,14 +212,14 @@ def test_an_open_contact_has_slope_zero_whatever_its_power(squeeze):
     system = mode_system(
         lambda t, x, p: (p.k * squeeze(x.q) ** p.n * x.v, 0.0), parameters={"k": 2.0, "n": 0.25}
     )
-    jacobian = load(emit(system), compiled=True)["flow_jacobian"]
+    jacobian = load(emit(system), compiled=True)["field_jacobian"]
     result = run(jacobian, (2, 3), 0, 0.0, np.array([-1.0, 3.0]), system.parameter_values())
     np.testing.assert_array_equal(result, np.zeros((2, 3)))
 
 
 def test_slopes_at_kinks():
     system = mode_system(lambda t, x, p: (np.maximum(x.q, x.v), np.abs(x.q - x.v)))
-    jacobian = load(emit(system), compiled=False)["flow_jacobian"]
+    jacobian = load(emit(system), compiled=False)["field_jacobian"]
     result = run(jacobian, (2, 3), 0, 0.0, np.array([1.0, 1.0]), np.empty(0))
     np.testing.assert_array_equal(result, [[0.5, 0.5, 0.0], [0.0, 0.0, 0.0]])
     result = run(jacobian, (2, 3), 0, 0.0, np.array([math.nan, 1.0]), np.empty(0))
@@ -229,7 +229,7 @@ def test_slopes_at_kinks():
 def test_division_by_zero_follows_ieee():
     functions = load(emit(mode_system(lambda t, x, p: (1 / x.q, np.log(x.v)))), compiled=True)
     np.testing.assert_array_equal(
-        run(functions["flow"], (2,), 0, 0.0, np.zeros(2), np.empty(0)), [np.inf, -np.inf]
+        run(functions["field"], (2,), 0, 0.0, np.zeros(2), np.empty(0)), [np.inf, -np.inf]
     )
 
 
@@ -291,15 +291,15 @@ def test_a_given_derivative_serves_where_nothing_else_can():
     functions = load(emit(system), compiled=True)
     for q, slope in ((1.0, -1.0), (-1.0, -2.0)):
         x = np.array([q, 0.5])
-        np.testing.assert_array_equal(run(functions["flow"], (2,), 0, 0.0, x, np.ones(1)), [0.5, slope * q])
-        result = run(functions["flow_jacobian"], (2, 3), 0, 0.0, x, np.ones(1))
+        np.testing.assert_array_equal(run(functions["field"], (2,), 0, 0.0, x, np.ones(1)), [0.5, slope * q])
+        result = run(functions["field_jacobian"], (2, 3), 0, 0.0, x, np.ones(1))
         np.testing.assert_array_equal(result, [[0.0, 1.0, 0.0], [slope, 0.0, 0.0]])
 
 
 def test_opaque_functions_without_parameters_compile():
     system = mode_system(branching, jacobian=branching_jacobian)
     functions = load(emit(system), compiled=True)
-    result = run(functions["flow"], (2,), 0, 0.0, np.array([-1.0, 0.5]), np.empty(0))
+    result = run(functions["field"], (2,), 0, 0.0, np.array([-1.0, 0.5]), np.empty(0))
     np.testing.assert_array_equal(result, [0.5, 2.0])
 
 
@@ -308,7 +308,7 @@ def test_a_traced_given_derivative_is_used_and_padded():
     emitted = emit(system)
     assert not emitted.opaque
     result = run(
-        load(emitted, compiled=False)["flow_jacobian"], (2, 3), 0, 0.0, np.array([3.0, 1.0]), np.empty(0)
+        load(emitted, compiled=False)["field_jacobian"], (2, 3), 0, 0.0, np.array([3.0, 1.0]), np.empty(0)
     )
     np.testing.assert_array_equal(result, [[0, 1, 0], [-6, 0, 0]])
 
