@@ -1,1 +1,1 @@
-"""What is kept on disk between processes: compiled kernels, and what was found out about models."""
+"""The cache on disk, shared between processes: compiled kernels and the results of analysing models."""

@@ -1,4 +1,4 @@
-"""Numba's cache of machine code with its contents checked: what is damaged is compiled anew."""
+"""Numba's cache of machine code with checksums: damaged code is compiled again."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ DIGEST_LENGTH = 32
 
 
 class DamagedError(Exception):
-    """A file of the cache does not hold what was written to it."""
+    """A file of the cache does not match its checksum."""
 
 
 class _CheckedFile(caching.IndexDataCacheFile):
-    """Data behind a digest of them."""
+    """A data file that starts with the SHA-256 digest of its content."""
 
     def _dump(self, obj: Any) -> bytes:
         data: bytes = super()._dump(obj)
@@ -40,13 +40,13 @@ class _CheckedFile(caching.IndexDataCacheFile):
 
 
 class _InFolder(caching.CompileResultCacheImpl):
-    """Looks into the folder that was chosen, and into no other."""
+    """Looks only into the chosen folder."""
 
     _locator_classes = [caching.UserProvidedCacheLocator]  # noqa: RUF012
 
 
 class _CheckedCache(caching.FunctionCache):
-    """The compiled code of one function on disk. Nothing that is wrong with it stops the function."""
+    """The compiled code of one function on disk. If the cache fails, the function is compiled as usual."""
 
     _impl_class = _InFolder
 
@@ -59,7 +59,7 @@ class _CheckedCache(caching.FunctionCache):
         try:
             return super().load_overload(sig, target_context)
         except Exception:
-            say(f"hybrid: compiled code in {self._cache_path} is damaged and is made again.")
+            say(f"hybrid: compiled code in {self._cache_path} is damaged; it is compiled again.")
             with suppress(OSError):
                 self._cache_file.flush()
             return None
@@ -69,11 +69,11 @@ class _CheckedCache(caching.FunctionCache):
             super().save_overload(sig, data)
         except Exception as error:
             reason = getattr(error, "strerror", None) or error
-            say(f"hybrid: compiled code cannot be kept: {reason}.")
+            say(f"hybrid: compiled code cannot be saved: {reason}.")
 
 
 def _cache_of(function: Any) -> Any:
-    """The cache of a function; none where there is no folder for it."""
+    """The cache of a function; a cache that stores nothing if no folder can be used."""
     try:
         return _CheckedCache(function)
     except (RuntimeError, OSError):
@@ -82,7 +82,7 @@ def _cache_of(function: Any) -> Any:
 
 @contextmanager
 def checked_contents() -> Iterator[None]:
-    """Have numba use this cache for what is decorated inside the block."""
+    """Make numba use this cache for functions decorated inside the block."""
     users: list[Any] = [dispatcher, ccallback]
     before = [user.FunctionCache for user in users]
     for user in users:

@@ -1,4 +1,4 @@
-"""Where compiled code is kept between processes, and what the user sees while it is made the first time."""
+"""The folder that stores compiled code between processes, and the messages about it."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _SAID: set[str] = set()
 def cache_directory() -> Path:
     """Folder of the compiled code: ``$HYBRID_CACHE_DIR``, or the user's cache folder of the platform.
 
-    What is in the folder becomes part of this process. So it must belong to the user, and nobody else may
-    write to it. Otherwise, or if it cannot be written to, a private folder takes its place, and one line says
-    so.
+    This process runs the code in the folder. So the folder must belong to the user, and nobody else may
+    write to it. If this does not hold, or if the folder cannot be written to, a private folder is used
+    instead, and one line says so.
     """
     chosen = os.environ.get("HYBRID_CACHE_DIR")
     if chosen:
@@ -38,7 +38,7 @@ def cache_directory() -> Path:
 
 
 def cache_folder(name: str) -> Path:
-    """A folder of that name in the cache, to which the same applies."""
+    """A folder of that name in the cache, under the same conditions as ``cache_directory``."""
     return _usable(cache_directory() / name, name)
 
 
@@ -48,12 +48,12 @@ def _usable(folder: Path, name: str = "") -> Path:
     if objection is None:
         return folder
     private = _private_folder() / name
-    say(f"hybrid: compiled code is kept in {private}, not in {folder}: {objection}.")
+    say(f"hybrid: compiled code is stored in {private}, not in {folder}: {objection}.")
     return private
 
 
 def _objection(folder: Path) -> str | None:
-    """Why a folder, which is made if need be, cannot be used; None if it can."""
+    """Why a folder cannot be used; None if it can. Creates the folder if it does not exist."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if hasattr(os, "geteuid"):
@@ -71,7 +71,7 @@ def _objection(folder: Path) -> str | None:
 
 @cache
 def _private_folder() -> Path:
-    """A folder that only this user can look into: the same in every process, if that is possible."""
+    """A folder that only this user can write to; the same in every process, if possible."""
     user = os.geteuid() if hasattr(os, "geteuid") else getpass.getuser()
     lasting = Path(tempfile.gettempdir()) / f"hybrid-systems-{user}"
     if not lasting.is_symlink() and _objection(lasting) is None:
@@ -92,9 +92,9 @@ def source_key(*texts: str) -> str:
 
 
 def keep(path: Path, content: bytes) -> bool:
-    """Write a file whole or not at all: other processes may be doing the same, or reading it.
+    """Write a file atomically, since other processes may be reading or writing it.
 
-    Where that is impossible, one line says so: the next process does the work again.
+    If the file cannot be written, one line says so, and the next process does the work again.
     """
     draft = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:16]}")
     try:
@@ -104,13 +104,13 @@ def keep(path: Path, content: bytes) -> bool:
     except OSError as error:
         with suppress(OSError):
             draft.unlink(missing_ok=True)
-        say(f"hybrid: compiled code cannot be kept: {error.strerror or error}.")
+        say(f"hybrid: compiled code cannot be saved: {error.strerror or error}.")
         return False
     return True
 
 
 def kept(path: Path) -> bytes | None:
-    """Content of a file, None if there is none or it cannot be read."""
+    """Content of a file; None if the file does not exist or cannot be read."""
     try:
         return path.read_bytes()
     except OSError:
@@ -118,7 +118,7 @@ def kept(path: Path) -> bytes | None:
 
 
 def say(message: str) -> None:
-    """Print a line to standard error, once a process."""
+    """Print a line to standard error, at most once per process."""
     if message not in _SAID:
         _SAID.add(message)
         print(message, file=sys.stderr, flush=True)
@@ -126,7 +126,7 @@ def say(message: str) -> None:
 
 @contextmanager
 def announced(message: str, after: float = 1.0) -> Iterator[None]:
-    """Print ``message`` to standard error, once a process, if the block takes longer than ``after``."""
+    """Print ``message`` as ``say`` does, if the block takes longer than ``after`` seconds."""
     timer = threading.Timer(after, say, [message])
     timer.daemon = True
     timer.start()
