@@ -1,4 +1,4 @@
-"""Import kernels with their compiled code kept under a name that follows from all their sources."""
+"""Import kernels; their compiled code is cached in a folder named by a hash of all their sources."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from hybrid.compiler.cache import second_process
 from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, source_key
 
 DRIVER = "hybrid.kernels.drive"
-# What every run needs besides: a second process compiles them meanwhile.
+# Every run needs these kernels too. A second process compiles them while this one compiles the driver.
 EVENTS = ("hybrid.kernels.jumps.jump", "hybrid.kernels.jumps.corner", "hybrid.kernels.events.initial_mode")
-# All that Python calls or hands on, those that take longest to compile first.
+# All kernels that Python calls or passes on, slowest to compile first.
 ALL_KERNELS = (
     DRIVER,
     "hybrid.kernels.jumps.jump",
@@ -40,7 +40,10 @@ MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) .
 
 @cache
 def load_kernels(module: str = DRIVER) -> ModuleType:
-    """The kernel module of that name, compiled now or taken from the cache; compilation is announced once."""
+    """The kernel module of that name, compiled now or loaded from the cache.
+
+    A line on standard error announces the compilation, once per process.
+    """
     kept = is_kept(module)
     if module == DRIVER and not kept:
         second_process.start([each for each in EVENTS if not is_kept(each)])
@@ -52,16 +55,16 @@ def load_kernels(module: str = DRIVER) -> ModuleType:
             return importlib.import_module(module)
 
 
-# Numba is told by a setting of the whole process where to keep what it compiles.
+# Numba's cache folder is a setting of the whole process, so only one thread may change it at a time.
 _LOCK = threading.RLock()
 
 
 @contextmanager
 def compiled_into(folder: Path) -> Iterator[None]:
-    """Let numba keep what is decorated inside this block in ``folder``, and nothing decorated elsewhere.
+    """Let numba cache functions decorated inside this block in ``folder``.
 
-    Numba stamps a compiled function with the age of its own file only. Kernels call one another across
-    files, so the folder must be named after all the sources that go into them.
+    Numba's cache entry depends only on the time stamp of the function's own file. Kernels call one another
+    across files, so the name of the folder must depend on all their sources.
     """
     from numba import config
 
@@ -83,8 +86,8 @@ def compiled_into(folder: Path) -> Iterator[None]:
 def _import_numba() -> None:
     """Import numba's array functions without SciPy's linear algebra, which kernels do not need.
 
-    They look for its BLAS as they are imported, and it takes a fifth of a second. It is there, since this
-    package requires SciPy; what calls BLAS looks for it again.
+    On import, the array functions look for SciPy's BLAS, which takes a fifth of a second. BLAS is available,
+    since this package requires SciPy; functions that call BLAS look for it again.
     """
     from numba.np import linalg
 
@@ -102,18 +105,18 @@ def _folder(module: str) -> Path:
 
 
 def is_kept(module: str) -> bool:
-    """Whether compiled code of a module of kernels is on disk."""
+    """Whether compiled code of a kernel module is on disk."""
     return any(_folder(module).rglob(f"{module.rpartition('.')[2]}.*.nbi"))
 
 
 def sources_in(folder: Path) -> list[Path]:
-    """All modules in a folder and in the folders in it."""
+    """All modules in a folder and its subfolders."""
     return sorted(folder.rglob("*.py"))
 
 
 @cache
 def kernels_key(module: str = DRIVER) -> str:
-    """Key of all sources that go into a module of kernels: ours, and those of the package that it is from."""
+    """Hash of all sources of a kernel module: our kernels, and files of its own package if it has another."""
     sources = sources_in(PACKAGE / "kernels")
     if not module.startswith("hybrid."):
         sources += sorted(_own_sources(module))
@@ -121,7 +124,7 @@ def kernels_key(module: str = DRIVER) -> str:
 
 
 def _own_sources(module: str) -> set[Path]:
-    """Files of a module and of what it imports from its own package, and so on."""
+    """Files of a module and of all modules that it imports, directly or not, from its own package."""
     package, found, left = module.partition(".")[0], set[Path](), [module]
     while left:
         spec = importlib.util.find_spec(left.pop())
@@ -139,23 +142,24 @@ def _own_sources(module: str) -> set[Path]:
 
 @cache
 def entry(kernel: Any) -> Any:
-    """A compiled kernel as Python calls it fastest: arguments are taken to have the types that it states.
+    """The fastest entry point of a compiled kernel; the types of arguments are not checked.
 
-    Numba's own call looks up the types of all arguments first, a third of a millisecond for our tuples.
+    Numba's own call first looks up the types of all arguments, which takes a third of a millisecond for our
+    tuples.
     """
     (compiled,) = kernel.overloads.values()
     return compiled.entry_point
 
 
 class Absent:
-    """Stands for a kernel that is never called."""
+    """A placeholder for a kernel that is never called."""
 
     address = 0
 
 
 @cache
 def address(kernel: Any) -> Any:
-    """A compiled kernel as a first-class function for an argument or for a structure."""
+    """A compiled kernel as a first-class function, for use as an argument or in a structure."""
     from numba.core.types import WrapperAddressProtocol
 
     (signature,) = kernel.nopython_signatures

@@ -1,7 +1,7 @@
-"""Kernels compiled by a second process, into the same cache, while this one compiles others.
+"""A second process compiles kernels into the same cache while this process compiles others.
 
-A process of its own, since compilation holds the interpreter. Whatever becomes of it, this process goes on:
-what it does not find in the cache it compiles itself.
+A thread would not do, since compilation holds the interpreter lock. If the second process fails, this process
+compiles the missing kernels itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _helpers: list[subprocess.Popen[bytes]] = []
 
 
 def start(modules: Sequence[str]) -> None:
-    """Have these kernel modules compiled by a second process, if there is a second processor for it."""
+    """Compile these kernel modules in a second process, if a second processor is available."""
     interpreter = bool(sys.executable) and not getattr(sys, "frozen", False)
     if not modules or not interpreter or processors() < 2:
         return
@@ -51,7 +51,7 @@ def finish() -> None:
 
 
 def environment() -> dict[str, str]:
-    """The variables of a process that compiles what this one would, into the same cache."""
+    """Environment variables for a process that uses the same cache and the same import path."""
     package = str(PACKAGE.parent)
     return {
         **os.environ,
@@ -61,7 +61,7 @@ def environment() -> dict[str, str]:
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""What was found out about systems, on disk, so that the next process need not wait for SymPy."""
+"""Results of tracing systems, stored on disk, so that the next process need not wait for SymPy."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from hybrid.compiler.emitted import Emitted, Programs, Propagator, Series
 
 
 def models_folder() -> Path:
-    """Folder of what is kept of models, named after what makes machine code of them."""
+    """Folder of stored models, named by a hash of the kernels and of the code that compiles models."""
     return cache_folder(f"models-{_compiler()}")
 
 
 def read(operations: str) -> Emitted | None:
-    """What was found out about the system of these operations; None if nothing is known, or it is damaged."""
+    """Stored results of tracing the system with these operations; None if missing or damaged."""
     return _read(_path(operations))
 
 
 def write(operations: str, emitted: Emitted) -> None:
-    """Keep what was found out about the system of these operations."""
+    """Store the results of tracing the system with these operations."""
     text = json.dumps(attrs.asdict(emitted), default=int)
     keep(_path(operations), f"{_checksum(text)}\n{text}".encode())
 
@@ -49,11 +49,11 @@ def _digest(operations: str) -> str:
 
 @cache
 def _tracer() -> str:
-    """What does the tracing: this package and what it stands on."""
+    """Sources of this package and versions of its dependencies, on which the results of tracing depend."""
     import importlib.metadata
 
     kernels = PACKAGE / "kernels"
-    # The folder is named after the kernels.
+    # The name of the folder already depends on the kernels.
     sources = [path for path in sources_in(PACKAGE) if kernels not in path.parents]
     digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
     versions = [importlib.metadata.version(package) for package in ("sympy", "mpmath")]

@@ -173,7 +173,7 @@ def test_a_folder_that_cannot_be_trusted_or_used_is_replaced(new_process, monkey
     assert private.parent == new_process / "temporary"
     assert private.stat().st_mode & 0o077 == 0
     [line] = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"hybrid: compiled code is kept in {private}, not in {chosen}: ")
+    assert line.startswith(f"hybrid: compiled code is stored in {private}, not in {chosen}: ")
     assert OBJECTIONS[made] in line
     assert cache_directory() == private
     assert capsys.readouterr().err == ""
@@ -264,7 +264,7 @@ def test_a_full_disk_stops_nothing(new_process, monkeypatch, capsys):
     monkeypatch.setattr(Path, "write_bytes", full)
     assert ends_well(decay(0.5))
     lines = [line for line in capsys.readouterr().err.splitlines() if "compiling" not in line]
-    assert lines == ["hybrid: compiled code cannot be kept: No space left on device."]
+    assert lines == ["hybrid: compiled code cannot be saved: No space left on device."]
     assert [path for path in store.models_folder().iterdir() if path.name.startswith(".")] == []
 
 
@@ -309,7 +309,7 @@ def test_damaged_kernels_are_compiled_again(tmp_path):
         assert float(done.stdout) == pytest.approx(1 - 9.81 / 32, rel=1e-14), done.stderr
         said = [line for line in done.stderr.splitlines() if "compiling" not in line]
         assert len(said) == lines
-        assert all("is damaged and is made again" in line for line in said)
+        assert all("is damaged; it is compiled again" in line for line in said)
 
 
 def test_kernels_are_kept_by_the_loader_alone(tmp_path):
