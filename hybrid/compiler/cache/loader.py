@@ -61,7 +61,7 @@ _LOCK = threading.RLock()
 
 @contextmanager
 def compiled_into(folder: Path) -> Iterator[None]:
-    """Let numba cache functions decorated inside this block in ``folder``.
+    """Let numba cache functions decorated inside this block, and no others, in ``folder``.
 
     Numba's cache entry depends only on the time stamp of the function's own file. Kernels call one another
     across files, so the name of the folder must depend on all their sources.

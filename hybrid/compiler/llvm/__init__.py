@@ -1,1 +1,1 @@
-"""From generated statements to LLVM's text and to machine code."""
+"""Translation of generated statements to LLVM's text and to machine code."""

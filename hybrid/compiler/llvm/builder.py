@@ -1,7 +1,8 @@
-"""LLVM's instructions as lines of text, written as they come.
+"""LLVM's instructions as lines of text, written immediately.
 
-llvmlite keeps an object with its operands for each instruction, and writes all of them out in the end. Nearly
-all instructions of a model are loads, stores, addresses and arithmetic: these are written at once.
+llvmlite creates an object with operands for each instruction and writes all of them as text at the end.
+Nearly all instructions of a model are loads, stores, addresses and arithmetic: this module writes their text
+immediately.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ _texts: dict[int, tuple[Any, str]] = {}
 
 
 class Line:
-    """An instruction that has been written, and stands for its value."""
+    """The text of an instruction; the object also represents the value of the instruction."""
 
     __slots__ = ("reference", "text", "type")
 
@@ -26,15 +27,15 @@ class Line:
         return self.text
 
     def get_reference(self) -> str:
-        """How other instructions name the value."""
+        """Name of the value in other instructions."""
         return self.reference
 
 
 def _text(kind: Any) -> str:
-    """A type in LLVM's words."""
+    """A type as LLVM's text."""
     found = _texts.get(id(kind))
     if found is None:
-        # With the type itself, whose place in memory nobody else gets then.
+        # The reference to the type keeps it alive, so that no other object gets its id.
         found = _texts[id(kind)] = kind, str(kind)
     return found[1]
 
@@ -54,12 +55,12 @@ def _arithmetic(operation: str) -> Callable[..., Line]:
 
 
 class Builder(ir.IRBuilder):
-    """A builder of llvmlite's that writes the commonest instructions as lines."""
+    """A builder of llvmlite that writes the most common instructions as lines of text."""
 
     count = 0
 
     def written(self, kind: Any, text: str) -> Line:
-        """Add an instruction that has a value of this type."""
+        """Add an instruction whose value has this type."""
         self.count += 1
         reference = f'%"line.{self.count}"'
         return self._added(Line(kind, reference, f"{reference} = {text}"))
@@ -73,20 +74,20 @@ class Builder(ir.IRBuilder):
     fadd, fsub, fmul, fdiv = map(_arithmetic, ("fadd", "fsub", "fmul", "fdiv"))
 
     def load(self, ptr: Any, name: str = "", align: int | None = None, typ: Any = None) -> Line:
-        """What is stored at an address."""
+        """The value stored at an address."""
         kind = typ or ptr.type.pointee
         text = f"load {_text(kind)}, {_text(ptr.type)} {_reference(ptr)}"
         return self.written(kind, text if align is None else f"{text}, align {align}")
 
     def store(self, value: Any, ptr: Any, align: int | None = None) -> Line:
-        """Put a value at an address."""
+        """Store a value at an address."""
         if ptr.type.pointee != value.type:
-            raise TypeError(f"{value.type} has no place at {ptr.type}")
+            raise TypeError(f"{value.type} cannot be stored at {ptr.type}")
         text = f"store {_text(value.type)} {_reference(value)}, {_text(ptr.type)} {_reference(ptr)}"
         return self._added(Line(ir.VoidType(), "", text if align is None else f"{text}, align {align}"))
 
     def gep(self, ptr: Any, indices: Sequence[Any]) -> Any:
-        """The address so many entries further; ``indices`` has one entry."""
+        """The address ``indices[0]`` entries after ``ptr``; ``indices`` has one entry."""
         [index] = indices
         entry, place = _text(ptr.type.pointee), f"{_text(index.type)} {_reference(index)}"
         return self.written(ptr.type, f"getelementptr {entry}, {_text(ptr.type)} {_reference(ptr)}, {place}")

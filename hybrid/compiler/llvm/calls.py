@@ -1,4 +1,4 @@
-"""What generated text may call, as LLVM's instructions."""
+"""Functions that generated text may call, as LLVM's instructions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Call:
     on_numbers
         Whether all arguments are floats.
     known
-        Places of arguments that are whole numbers known from the text.
+        Positions of the arguments that are written as integers in the text.
     """
 
     writer: Callable[..., Any]
@@ -48,12 +48,12 @@ class Call:
 
 
 def _of_libm(name: str) -> Call:
-    """A function of C's library of mathematics."""
+    """A function of the C math library."""
     return Call(lambda builder, *numbers: _declared(builder, name, numbers), on_numbers=True)
 
 
 def _of_llvm(name: str) -> Call:
-    """A function that LLVM knows."""
+    """An intrinsic function of LLVM."""
     return Call(lambda builder, *numbers: _declared(builder, f"llvm.{name}.f64", numbers), on_numbers=True)
 
 
@@ -63,7 +63,7 @@ def _declared(builder: Any, name: str, numbers: tuple[Any, ...]) -> Any:
 
 
 def _remainder(builder: Any, a: Any, b: Any) -> Any:
-    """Of the sign of the divisor, as Python's; exact where C's is."""
+    """Python's remainder: C's ``fmod``, plus the divisor if their signs differ."""
     zero = NUMBER(0.0)
     rest = builder.frem(a, b)
     is_negative = builder.fcmp_ordered("<", b, zero)
@@ -74,7 +74,7 @@ def _remainder(builder: Any, a: Any, b: Any) -> Any:
 
 
 def _largest(builder: Any, *numbers: Any) -> Any:
-    """As Python's ``max``: a later one takes the place of an earlier one that it is larger than."""
+    """As Python's ``max``: a later number replaces an earlier one only if it is larger."""
     largest, *others = numbers
     for other in others:
         largest = builder.select(builder.fcmp_ordered(">", other, largest), other, largest)

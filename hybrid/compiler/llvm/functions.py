@@ -1,4 +1,4 @@
-"""The compiled functions of a model, from their text or from what an earlier process has kept of them."""
+"""The compiled functions of a model, from their text or from the cache of an earlier process."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
     from hybrid.compiler.llvm.machine import Compiled
 
-# Texts whose machine code stays in memory after their systems are gone.
+# Number of texts whose machine code stays in memory after their systems are deleted.
 MOST_SOURCES = 128
 SIGNATURES = {
     "field_jacobian": MATRIX_SIGNATURE,
@@ -33,13 +33,13 @@ SIGNATURES = {
     "series": SERIES_SIGNATURE,
     "tangent_series": SERIES_SIGNATURE,
 }
-# The products of series may be fused into their sums; in a guard that could make a difference of equal terms
-# differ from zero.
+# In series, multiplications and additions may be fused. In a guard, fusing could make a difference of equal
+# terms nonzero.
 FUSED = ("series", "tangent_series")
 
 
 def own_functions(emitted: Emitted) -> dict[str, tuple[Any, int]]:
-    """What tracing could not follow, compiled as it is: by name, the code and how many numbers it returns.
+    """Functions that cannot be traced, compiled as they are: by name, the code and the size of its result.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]
     """The compiled functions of a part of ``PARTS`` by name; ``own`` are those of ``own_functions``."""
     if not own:
         return shared_functions(emitted.texts[part], part)
-    # Their addresses are of this process, so what calls them is not kept.
+    # The user's functions have addresses of this process, so code that calls them is not cached.
     calls = {name: OwnFunction(code.address, size) for name, (code, size) in own.items()}
     code = _code(emitted.texts[part], PARTS[part], calls)
     return load(code, PARTS[part], needs=[each for each, _ in own.values()])
@@ -64,7 +64,7 @@ def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]
 
 @lru_cache(maxsize=MOST_SOURCES)
 def shared_functions(source: str, part: str) -> dict[str, Compiled]:
-    """The compiled functions of a text that calls no function of the user's, shared by all who have it."""
+    """The compiled functions of a text without calls of the user's functions, shared by all its systems."""
     path = models_folder() / f"model_{source_key(source, processor())}.o"
     code = _checked(path)
     if code is None:
@@ -80,7 +80,7 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction]) -
 
 
 def _checked(path: Path) -> bytes | None:
-    """What is kept at a place if it is what was written there."""
+    """The machine code in a file; None if the file is missing or does not match its checksum."""
     content = kept(path)
     if content is None:
         return None
@@ -88,5 +88,5 @@ def _checked(path: Path) -> bytes | None:
     digest, code = content[:size], content[size:]
     if hashlib.sha256(code).digest() == digest:
         return code
-    say(f"hybrid: compiled code in {path.parent} is damaged and is made again.")
+    say(f"hybrid: compiled code in {path.parent} is damaged; it is compiled again.")
     return None

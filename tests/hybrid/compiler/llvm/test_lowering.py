@@ -227,7 +227,7 @@ def test_types_that_do_not_fit_are_refused():
     place = builder.alloca(NUMBER)
     with pytest.raises(ValueError, match="fadd of double and i64"):
         builder.fadd(number, whole)
-    with pytest.raises(TypeError, match="i64 has no place at double"):
+    with pytest.raises(TypeError, match="i64 cannot be stored at double"):
         builder.store(whole, place)
     assert builder.bitcast(number, NUMBER) is number
 
