@@ -64,7 +64,7 @@ def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]
 
 @lru_cache(maxsize=MOST_SOURCES)
 def shared_functions(source: str, part: str) -> dict[str, Compiled]:
-    """The compiled functions of a text without calls of the user's functions, shared by all its systems."""
+    """The compiled functions of a text that calls no user function, shared by all systems with it."""
     path = models_folder() / f"model_{source_key(source, processor())}.o"
     code = _checked(path)
     if code is None:

@@ -1,8 +1,8 @@
-"""Generated functions as LLVM's instructions, straight from their text.
+"""Generated functions as LLVM's instructions, translated directly from their text.
 
-The text is Python on numbers: assignments, sums and products, choices, loops over ranges, entries of arrays,
-and calls of ``CALLS``. A value is what its text says: a float, a whole number of 64 bits, a truth value, or
-four numbers in a register; so nothing has to be inferred, and a function is ready in milliseconds.
+The text is Python on numbers: assignments, arithmetic, branches, loops over ranges, entries of arrays, and
+calls of ``CALLS``. The text alone gives the type of each value: a float, a 64-bit integer, a truth value, or
+four numbers in a register. So no types have to be inferred, and a function is ready in milliseconds.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hybrid.kernels.types.codes import NARROW
 
 TRUTH = ir.IntType(1)
 LANES = vector_of(NARROW)
-# How numba hands an array of floats from function to function: who keeps its memory, its sizes, and its data.
+# Numba's structure for an array of floats: owner, parent, sizes, data, shape and strides.
 ARRAYS = {
     axes: ir.LiteralStructType(
         [
@@ -43,12 +43,12 @@ COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "
 
 
 class LoweringError(Exception):
-    """A text is not one of those that generated functions are made of."""
+    """A text uses syntax that generated functions do not have."""
 
 
 @attrs.frozen
 class Vector:
-    """An array of numbers: where its data begin, and how many they are."""
+    """An array of numbers: the address of its data, and its length."""
 
     data: Any
     length: Any
@@ -56,7 +56,7 @@ class Vector:
 
 @attrs.frozen
 class OwnFunction:
-    """A function of the user's: where its machine code begins, and how many numbers it fills in."""
+    """A function of the user: the address of its machine code, and the number of values that it writes."""
 
     address: int
     size: int
@@ -67,7 +67,7 @@ NO_CALLS: Mapping[str, OwnFunction] = {}
 
 @attrs.frozen
 class Signature:
-    """Names and types of the arguments of a function; an array is told by the number of its axes."""
+    """Names and types of the arguments of a function; an integer is an array with that number of axes."""
 
     names: tuple[str, ...]
     types: tuple[Any, ...]
@@ -86,25 +86,25 @@ def lower(
     fused: bool,
     calls: Mapping[str, OwnFunction] = NO_CALLS,
 ) -> None:
-    """Add a function to a module of LLVM's.
+    """Add a function to an LLVM module.
 
     Parameters
     ----------
     module
         The module, an ``llvmlite.ir.Module``.
     written
-        The function, parsed.
+        The parsed function.
     signature
         Types of its arguments.
     fused
-        Whether products may be fused into their sums.
+        Whether multiplications and additions may be fused.
     calls
-        Functions of the user's that the text may call besides.
+        Functions of the user that the text may also call.
 
     Raises
     ------
     LoweringError
-        If the function is not one that generated text has.
+        If the function has other arguments, or syntax that generated text does not have.
     """
     names = tuple(argument.arg for argument in written.args.args)
     if names != signature.names:
@@ -123,7 +123,7 @@ class _Body:
     ) -> None:
         self.flags, self.calls = flags, calls
         self.arguments = dict(zip(signature.names, function.args, strict=True))
-        # Variables live in the first block, where LLVM looks for those that need no memory.
+        # Variables are allocated in the first block: LLVM turns only those into registers.
         self.front = ir.IRBuilder(function.append_basic_block("front"))
         self.builder = Builder(function.append_basic_block("body"))
         self.values: dict[str, Any] = {}
@@ -137,7 +137,7 @@ class _Body:
         return Vector(data, sizes[0]) if axes == 1 else Matrix(self.builder, data, sizes[1])
 
     def write(self, statements: Iterable[ast.stmt]) -> None:
-        """The whole function."""
+        """Write the whole function."""
         self.block(statements)
         self.builder.ret_void()
         front, body, *_ = self.builder.function.basic_blocks
@@ -145,16 +145,16 @@ class _Body:
         self.front.branch(body)
 
     def block(self, statements: Iterable[ast.stmt]) -> None:
-        """Statements one after the other."""
+        """Write statements in order."""
         for statement in statements:
             self.STATEMENTS.get(type(statement), _Body._unknown)(self, statement)
 
     def value(self, node: ast.expr) -> Any:
-        """An expression."""
+        """Write an expression, and return its value."""
         return self.EXPRESSIONS.get(type(node), _Body._unknown)(self, node)
 
     def _unknown(self, node: ast.AST) -> Any:
-        raise LoweringError(f"no generated text has {ast.unparse(node)!r}")
+        raise LoweringError(f"generated text must not contain {ast.unparse(node)!r}")
 
     # Statements.
 
@@ -179,7 +179,7 @@ class _Body:
 
     def _store_variable(self, name: str, value: Any) -> None:
         if name in self.values:
-            raise LoweringError(f"{name} is an argument, and fixed")
+            raise LoweringError(f"{name} is an argument and cannot be assigned")
         if isinstance(value, tuple):
             self.variables[name] = value
             return
@@ -197,7 +197,7 @@ class _Body:
         self.value(node.value)
 
     def _if(self, node: ast.If) -> None:
-        """A chain of choices, as long as it may be: functions have one branch for each mode or transition."""
+        """A chain of branches, without recursion: functions have one branch per mode or transition."""
         builder, before, made = self.builder, dict(self.variables), dict(self.variables)
         end = builder.append_basic_block("end")
         rest: list[ast.stmt] = [node]
@@ -208,7 +208,7 @@ class _Body:
             self.block(each.body)
             builder.branch(end)
             builder.position_at_end(otherwise)
-            # What one branch has made is of the same type in all others, or not read behind them.
+            # A variable first assigned in a branch must not be read after it: each branch allocates its own.
             made |= self.variables
             self.variables, rest = dict(before), each.orelse
         self.block(rest)
@@ -259,7 +259,7 @@ class _Body:
         return tuple(self.value(each) for each in node.elts)
 
     def _place(self, node: ast.Subscript) -> Any:
-        """Address of an entry."""
+        """The address of an entry."""
         array, index = self.value(node.value), self.value(node.slice)
         if isinstance(array, Matrix):
             return array.address(*index)
@@ -278,7 +278,7 @@ class _Body:
         if value.type == WHOLE:
             return self.builder.neg(value)
         if value.type == LANES:
-            # As a product, which may be fused.
+            # A product, since it can be fused with an addition.
             return self.builder.fmul(everywhere(self.builder, NUMBER(-1.0), NARROW), value, flags=self.flags)
         return self.builder.fneg(value, flags=self.flags)
 
@@ -302,7 +302,7 @@ class _Body:
         ast.Mod: lambda builder, a, b, flags: CALLS["remainder"](builder, a, b),
         ast.Pow: lambda builder, a, b, flags: CALLS["pow"](builder, a, b),
     }
-    # Whole numbers are counts here: none is negative where it is divided.
+    # Integers are counts here. They are not negative in a division, so ``sdiv`` equals ``//``.
     WHOLE_OPERATIONS: ClassVar[dict[type[ast.AST], Callable[..., Any]]] = {
         ast.Add: Builder.add,
         ast.Sub: Builder.sub,
@@ -366,7 +366,7 @@ class _Body:
         return call(self.builder, *arguments)
 
     def _own_call(self, function: OwnFunction, nodes: Sequence[ast.expr]) -> tuple[Any, ...]:
-        """The numbers that a function of the user's fills in; arrays are handed on as they came."""
+        """The numbers that a function of the user writes; array arguments are passed on unchanged."""
         names = [node.id if isinstance(node, ast.Name) else "" for node in nodes]
         pairs = zip(names, nodes, strict=True)
         arguments = [self.arguments[name] if name in self.arguments else self.value(n) for name, n in pairs]
@@ -406,7 +406,7 @@ class _Body:
 
 
 def _is_at_hand(node: ast.expr) -> bool:
-    """Whether a value costs nothing, so that it may be computed although another is chosen."""
+    """Whether a value costs so little that it may be computed even if it is not used."""
     if isinstance(node, ast.UnaryOp):
         return _is_at_hand(node.operand)
     return isinstance(node, ast.Name | ast.Constant)

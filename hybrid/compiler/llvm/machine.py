@@ -1,4 +1,4 @@
-"""LLVM's instructions as machine code for this processor: optimised, written out, and loaded."""
+"""LLVM's instructions as machine code for this processor: optimised, emitted, and loaded."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from llvmlite import binding, ir
 
 from hybrid.compiler.llvm.lowering import NO_CALLS, OwnFunction, Signature, lower
 
-# As far as LLVM goes: more does not make generated code faster.
+# LLVM's highest optimisation level.
 SPEED = 3
 
 
 @attrs.frozen(eq=False)
 class Compiled:
-    """A function of loaded machine code; the code and what it calls live as long as this."""
+    """A function of loaded machine code; ``needs`` keeps the code and the functions that it calls alive."""
 
     address: int
     needs: Any = attrs.field(repr=False)
 
 
 def _new_target() -> Any:
-    """The processor of this machine, as LLVM sees it."""
+    """LLVM's description of the processor of this machine."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.Target.from_default_triple().create_target_machine(
@@ -43,7 +43,7 @@ _target = cache(_new_target)
 
 @cache
 def processor() -> str:
-    """What machine code depends on: LLVM's version and the processor."""
+    """LLVM's version and the processor, on which machine code depends."""
     version = ".".join(map(str, binding.llvm_version_info))
     return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
@@ -53,7 +53,8 @@ def machine_code(
 ) -> bytes:
     """The contents of an object file with these functions.
 
-    The truth value says of each whether it may be fused; ``calls`` are functions of the user's.
+    The truth value of each function says whether its multiplications and additions may be fused; ``calls``
+    are functions of the user.
     """
     module = ir.Module("model")
     module.triple = binding.get_default_triple()
@@ -71,8 +72,8 @@ def machine_code(
 
 
 def load(code: bytes, names: Sequence[str], needs: Sequence[Any] = ()) -> dict[str, Compiled]:
-    """The functions of an object file, ready to be called; ``needs`` is what else must stay for them."""
-    # An engine frees its target when it is freed itself.
+    """The functions of an object file, ready to be called; ``needs`` are objects that must outlive them."""
+    # Each engine needs its own target, since it frees the target when it is freed itself.
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _new_target())
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
     engine.finalize_object()

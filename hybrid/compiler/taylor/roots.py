@@ -1,4 +1,4 @@
-"""Fractional powers of guards, which are smooth in the root of the guard."""
+"""Fractional powers of guards: smooth functions of the square root of the guard."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ HALF = sympy.Rational(1, 2)
 def singular_bases(
     field: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
 ) -> list[sympy.Expr]:
-    """The guards whose fractional powers the field has, which are singular where they vanish.
+    """The guards whose fractional powers occur in the field; these powers are singular where the guard is zero.
 
-    A series goes on through the zero of any other base, to a branch that the power has not: where the base
-    may change its sign there must be a guard.
+    A series continues through a zero of any other base to a branch that the power does not have. So a base
+    that may change its sign must be a guard.
     """
     bases: set[sympy.Expr] = set()
     for power in nodes_of(sympy.Pow, *field):
@@ -29,7 +29,9 @@ def singular_bases(
             continue
         if not any(is_multiple(power.base, guard, symbols) for guard in known):
             if not power.base.is_nonnegative:
-                raise NoSeries(f"it has the power {power.exp} of what may change its sign and is no guard")
+                raise NoSeries(
+                    f"it has the power {power.exp} of an expression that may change its sign and is not a guard"
+                )
             continue
         if not (power.exp.is_Rational and power.exp.q == 2 and power.exp.is_positive):
             raise NoSeries(f"it has the power {power.exp} of a guard")
@@ -38,7 +40,7 @@ def singular_bases(
 
 
 def is_multiple(expression: sympy.Expr, other: sympy.Expr, symbols: Symbols) -> bool:
-    """Whether an expression is another one times what depends on parameters only."""
+    """Whether an expression is a multiple of another, with a factor that depends on parameters only."""
     if other == 0 or is_larger_than(MOST_EXPANDED, expression):
         return False
     return not mentions(sympy.cancel(expression / other), symbols.variables)
@@ -54,10 +56,10 @@ class Root:
 
 
 def regular_root(field: Sequence[sympy.Expr], z: sympy.Expr, place: int, symbols: Symbols) -> Root | None:
-    """The root ``w`` of a guard whose rate is ``w`` times something smooth: ``w' = z'/(2 w)``. Else None.
+    """The root ``w`` of a guard if its rate ``w' = z'/(2 w)`` is smooth in ``w``. Else None.
 
-    A tank with ``h' = -sqrt(h)`` empties so: its root falls steadily, and is met with speed. On the clock
-    ``dt = w ds`` the tank would take for ever.
+    An example is a tank that empties with ``h' = -sqrt(h)``: the root falls at a constant rate and reaches
+    zero at nonzero speed. On the clock ``dt = w ds`` the tank would never be empty.
     """
     root = sympy.Symbol(f"w{place}", positive=True)
     states = [x for x in symbols.x if mentions(z, (x,)) and not mentions(z.diff(x), symbols.variables)]
@@ -80,7 +82,7 @@ def slope_along(field: Sequence[sympy.Expr], z: sympy.Expr, symbols: Symbols) ->
 
 
 def on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
-    """``w`` times the rate, with powers of ``z`` as powers of ``w`` and none of them negative."""
+    """``w`` times the rate, with powers of ``z`` written as nonnegative powers of ``w``."""
     terms = sympy.Add.make_args(in_roots(rate, z))
     singular = [term for term in terms if term.has(1 / ROOT)]
     regular = sympy.Add(*(term for term in terms if term not in singular))
@@ -88,11 +90,11 @@ def on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
 
 
 def in_roots(expression: sympy.Expr, z: sympy.Expr, root: sympy.Symbol = ROOT) -> sympy.Expr:
-    """Fractional powers of ``z`` as whole ones times its root, which saves the products that ``z`` is."""
+    """Fractional powers of ``z`` as integer powers times its root, which saves computing products for ``z``."""
     powers = {p for p in nodes_of(sympy.Pow, expression) if p.base == z and not p.exp.is_Integer}
     return replaced(expression, {p: sympy.Mul(*_whole_power(z, p.exp - HALF, root), root) for p in powers})
 
 
 def _whole_power(z: sympy.Expr, exponent: sympy.Integer, root: sympy.Symbol) -> tuple[sympy.Expr, ...]:
-    # Negative powers belong to those of the root: there they cancel one of a rate's.
+    # Negative powers are written as powers of the root, where they may cancel a root in the rate.
     return (z**exponent,) if exponent >= 0 else (root ** (2 * exponent),)

@@ -1,7 +1,7 @@
-"""The text of sums in which as little as possible waits for something else.
+"""The text of sums with short chains of dependent operations.
 
-A processor multiplies and adds in one instruction, several of them at once, but each takes as long as three
-or four. What a chain of them takes, from one order of a series to the next, is its length.
+A processor multiplies and adds in one instruction and runs several at once, but each result takes as long as
+three or four instructions. So the time from one order of a series to the next is the length of the chain.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 class Term(NamedTuple):
     """A term of a sum: when it is known, its text, and whether it is a product.
 
-    The time is a number of operations, and what decides between terms that are known after as many.
+    The time is a number of operations, and a second number that decides between equal ones.
     """
 
     ready: tuple[int, int]
@@ -21,7 +21,7 @@ class Term(NamedTuple):
 
 
 def added(terms: list[Term]) -> str:
-    """Text of a sum: what is known first is added first, and sums that do not need each other run on."""
+    """Text of a sum: terms known first are added first, and independent partial sums run in parallel."""
     while len(terms) > 1:
         one, other, *rest = sorted(terms, key=lambda term: term.ready)
         depth, late = max(other.ready, (one.ready[0] + one.is_product, one.ready[1]))
