@@ -23,7 +23,8 @@ from hybrid.kernels.types.codes import NARROW
 
 TRUTH = ir.IntType(1)
 LANES = vector_of(NARROW)
-# Numba's structure for an array of floats: owner, parent, sizes, data, shape and strides.
+# Numba's structure of an array of floats: memory info, parent, number of items, bytes per item, data, shape,
+# strides.
 ARRAYS = {
     axes: ir.LiteralStructType(
         [

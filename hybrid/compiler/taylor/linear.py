@@ -1,9 +1,9 @@
 """Series of modes that are linear in the state and in harmonic forcing, from a table.
 
-With ``y = (x, h, 1)``, ``h`` the sines, cosines and exponentials that drive it, such a mode is ``y' = M y``
-with a constant matrix, and its Taylor coefficients are ``M^o / o!`` times what a step starts from. These
-matrices are computed once a run, in two parts, so that each is right to its own rounding: after that no order
-waits for the one before it.
+Let ``y = (x, h, 1)``, where ``h`` are the sines, cosines and exponentials that drive the mode. Then the mode
+is ``y' = M y`` with a constant matrix ``M``, and its Taylor coefficients are ``M^o / o!`` times ``y`` at the
+start of a step. The matrices ``M^o / o!`` are computed once per run, as sums of two floats, so that each is
+accurate to its own rounding. After that, no order depends on the one before it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hybrid.symbolic.constants import Constants
 from hybrid.symbolic.nodes import degree_of, mentions, replaced
 from hybrid.symbolic.tracing import Symbols
 
-# Beyond this a table is larger than the fastest memory, and products with it cost more than recurrences.
+# A larger table does not fit into the fastest memory, and products with it cost more than recurrences.
 LARGEST = 16
 
 
@@ -30,9 +30,9 @@ class LinearForm:
     Attributes
     ----------
     starts
-        What ``y`` is at the time ``t``.
+        ``y`` at time ``t``.
     rates
-        The rows of ``M``, in the parameters.
+        The rows of ``M``, functions of the parameters.
     guards
         The rows of ``C``.
     """
@@ -42,7 +42,7 @@ class LinearForm:
     guards: list[list[sympy.Expr]]
 
     def trace(self, n: int) -> sympy.Expr:
-        """Divergence of the field."""
+        """Divergence of the vector field."""
         return sympy.Add(*(self.rates[i][i] for i in range(n)))
 
 
@@ -52,7 +52,7 @@ def linear_form(
     harmonics: dict[sympy.Expr, sympy.Symbol],
     symbols: Symbols,
 ) -> LinearForm | None:
-    """The linear form of an affine mode, if it has one; ``harmonics`` stand for what it is driven by."""
+    """The linear form of an affine mode, if it has one; ``harmonics`` are the functions that drive it."""
     variables = [*symbols.x, *harmonics.values()]
     turning = [function.diff(symbols.t) for function in harmonics]
     rows = [_row(replaced(entry, harmonics), variables, symbols.t) for entry in (*field, *turning, *guards)]
@@ -65,8 +65,8 @@ def linear_form(
 
 
 def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbol) -> list[sympy.Expr] | None:
-    """Coefficients of the variables, then the constant term; None if it is not affine in them alone."""
-    # The derivative of a sign is zero too.
+    """Coefficients of the variables, then the constant term; None if not affine in them alone."""
+    # Derivatives alone do not tell: the derivative of a sign is zero too.
     if degree_of(entry, frozenset(variables)) is None:
         return None
     slopes = [entry.diff(variable) for variable in variables]
@@ -79,10 +79,10 @@ def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbo
 def table_statements(
     form: LinearForm, n: int, constants: Constants, starts: Sequence[str]
 ) -> tuple[list[str], list[str], int, int]:
-    """Statements for the series and, behind them, for tangent vectors.
+    """Statements for the series and for tangent vectors, and numbers of columns.
 
-    Besides, the numbers of columns of their table and of four tangent vectors. ``table`` and ``vectors`` are
-    the first columns of both, ``starts`` what ``y`` starts from.
+    The two numbers are the columns of the table and of four tangent vectors. In the statements, ``table`` and
+    ``vectors`` are the first columns of the two. ``starts`` are the texts of ``y`` at the start of a step.
     """
     size, guards = len(form.starts), len(form.guards)
     front, one = padded(n + guards + 2), size - 1
@@ -99,7 +99,7 @@ def table_statements(
     step += [f"z{i}, l{i} = r{i}, m{i}" for i in range(one)]
     step.append(f"z{one}, l{one} = nothing, nothing")
     lines = [
-        # What the table was made of does not change in a run.
+        # The table depends only on parameters, which do not change during a run.
         "if out[order + 2, table] != 1.0:",
         f"    for c in range(0, {size}, {NARROW}):",
         *indented(indented([*begin, "for o in range(order + 1):", *indented([*write, *step])])),
@@ -120,7 +120,7 @@ def _entry(value: str, place: int, front: int) -> str:
 
 
 def _product(row: Sequence[sympy.Expr], by: str, constants: Constants) -> str:
-    """Text of the product of a row with ``z``, over ``by``, in two parts."""
+    """Text of the product of a row with ``z``, divided by ``by``, as a sum of two floats."""
     places = [i for i, each in enumerate(row) if each != 0]
     if not places:
         return "nothing, nothing"

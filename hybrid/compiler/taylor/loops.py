@@ -1,4 +1,4 @@
-"""The loop over orders that recurrences run in: the state, and with it four tangent vectors at a time."""
+"""The loop over orders for the recurrences of the state, and of four tangent vectors at a time."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from hybrid.kernels.types.codes import NARROW, WIDE
 
 
 def indented(statements: Iterable[str]) -> list[str]:
-    """One level deeper."""
+    """Indent statements by one level."""
     return [f"    {statement}" for statement in statements]
 
 
 def padded(width: int, whole: int = NARROW) -> int:
-    """A width filled up to whole vectors."""
+    """A width rounded up to a multiple of ``whole``."""
     return -(-width // whole) * whole
 
 
 class StateLoop:
     """Statements for the series of ``y' = rates`` from ``starts``, in the columns ``targets``.
 
-    What a sum of products needs of the orders before the last is added up an order in advance.
+    In a sum of products, the terms of the orders before the last are added one order in advance.
 
     Parameters
     ----------
     symbols
-        What the rates call the components of ``y``, None for one that they do not read.
+        Symbols of the components of ``y`` in the rates; None for a component that the rates do not read.
     """
 
     def __init__(
@@ -48,21 +48,21 @@ class StateLoop:
         self.rates = [f"{block.prefix}r{i} = {value}" for i, value in enumerate(values)]
 
     def write_front(self, width: int, others: dict[str, str]) -> None:
-        """Let the first columns be written as one vector: those of ``y``, and the texts of ``others``."""
+        """Write the first ``width`` columns as one vector: those of ``y``, and the texts of ``others``."""
         columns = self.names | others
         self.front = [columns.get(str(i), "0.0") for i in range(width)]
 
     def first(self) -> list[str]:
-        """Order zero."""
+        """Statements for order zero."""
         block = self.block
         begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
-        # Order one is read, and multiplied by what is not there yet, before it is written.
+        # Order one is read before it is written, and multiplied by factors that are still zero.
         nothing = f"store_row(out, 1, 0, ({'0.0, ' * len(self.front)}))"
         before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.before())]
         return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
 
     def higher(self) -> list[str]:
-        """Order ``o``, once ``shrink`` is 1/o."""
+        """Statements for order ``o``; ``shrink`` is 1/o."""
         block = self.block
         inner = [f"{block.prefix}s{i} = out[o, {block.prefix}b + {i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
@@ -71,12 +71,12 @@ class StateLoop:
         return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
 
     def _separate(self) -> list[str]:
-        """Columns of ``y`` that are not among the first are written one by one."""
+        """Write the columns of ``y`` that are not among the first ones, one by one."""
         behind = [target for target in self.names if int(target) >= len(self.front)]
         return [f"out[o, {target}] = {self.names[target]}" for target in behind]
 
     def _rows(self) -> list[str]:
-        """What stands side by side is written as one vector, so that it can be read as one soon."""
+        """Write adjacent columns as one vector, so that they can soon be read as one vector."""
         block, rows = self.block, [("0", self.front)]
         if block.pairs:
             rows.append((f"{block.prefix}b", list(block.pairs.values())))
@@ -95,10 +95,10 @@ class StateLoop:
 
 
 class TangentLoop:
-    """Statements for the series of four tangent vectors at a time, whose columns begin at ``vectors``.
+    """Statements for the series of four tangent vectors at a time, with columns from ``vectors`` on.
 
-    The four coefficients of a component are one vector, those of the components stand one after the other,
-    behind them what is multiplied by common factors.
+    The four coefficients of a component form one vector. The vectors of the components come one after the
+    other; the operands of products with common factors follow.
     """
 
     def __init__(self, seeds: Sequence[sympy.Symbol], block: Recurrences) -> None:
@@ -107,16 +107,16 @@ class TangentLoop:
         self.values: list[str] = []
 
     def compute(self, rates: Sequence[sympy.Expr]) -> None:
-        """Write the recurrences of the rates; what they need of the state is asked for now."""
+        """Write the recurrences of the rates; this also requests the series of the state that they need."""
         self.values = [self.block.coefficient(rate) for rate in rates]
 
     @property
     def columns(self) -> int:
-        """Columns that four tangent vectors need."""
+        """Number of columns that four tangent vectors need."""
         return NARROW * (self.components + sum(map(len, self.block.blocks.values())))
 
     def first(self) -> list[str]:
-        """Order zero, and of the vectors themselves order one."""
+        """Statements for order zero, and for order one of the vectors themselves."""
         later = self._later("1", "{}")
         return [
             f"spread_tangents(x, {self.components}, out, vectors, {self.columns})",
@@ -124,7 +124,7 @@ class TangentLoop:
         ]
 
     def higher(self) -> list[str]:
-        """Order ``o``, and of the vectors themselves order ``o + 1``."""
+        """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
         block = self.block
         sums, inner = [], []
         for i, (left, rights) in enumerate(block.blocks.items()):
@@ -144,7 +144,7 @@ class TangentLoop:
         ]
 
     def _each(self, statements: Iterable[str]) -> list[str]:
-        """The statements for all vectors, four at a time."""
+        """Repeat the statements for all vectors, four at a time."""
         bases, place = [], NARROW * self.components
         for i, rights in enumerate(self.block.blocks.values()):
             bases.append(f"{self.block.prefix}b{i} = v + {place}")

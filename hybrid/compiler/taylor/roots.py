@@ -18,7 +18,7 @@ HALF = sympy.Rational(1, 2)
 def singular_bases(
     field: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
 ) -> list[sympy.Expr]:
-    """The guards whose fractional powers occur in the field; these powers are singular where the guard is zero.
+    """The guards with fractional powers in the field; these powers are singular where the guard is zero.
 
     A series continues through a zero of any other base to a branch that the power does not have. So a base
     that may change its sign must be a guard.
@@ -30,7 +30,7 @@ def singular_bases(
         if not any(is_multiple(power.base, guard, symbols) for guard in known):
             if not power.base.is_nonnegative:
                 raise NoSeries(
-                    f"it has the power {power.exp} of an expression that may change its sign and is not a guard"
+                    f"it has the power {power.exp} of an expression that may change sign and is not a guard"
                 )
             continue
         if not (power.exp.is_Rational and power.exp.q == 2 and power.exp.is_positive):
@@ -56,7 +56,7 @@ class Root:
 
 
 def regular_root(field: Sequence[sympy.Expr], z: sympy.Expr, place: int, symbols: Symbols) -> Root | None:
-    """The root ``w`` of a guard if its rate ``w' = z'/(2 w)`` is smooth in ``w``. Else None.
+    """The root ``w`` of a guard ``z`` if ``z'/w`` is smooth, so that ``w' = z'/(2 w)`` is; else None.
 
     An example is a tank that empties with ``h' = -sqrt(h)``: the root falls at a constant rate and reaches
     zero at nonzero speed. On the clock ``dt = w ds`` the tank would never be empty.
@@ -90,7 +90,7 @@ def on_clock(rate: sympy.Expr, z: sympy.Expr) -> sympy.Expr:
 
 
 def in_roots(expression: sympy.Expr, z: sympy.Expr, root: sympy.Symbol = ROOT) -> sympy.Expr:
-    """Fractional powers of ``z`` as integer powers times its root, which saves computing products for ``z``."""
+    """Fractional powers of ``z`` as integer powers times its root, which saves products to compute ``z``."""
     powers = {p for p in nodes_of(sympy.Pow, expression) if p.base == z and not p.exp.is_Integer}
     return replaced(expression, {p: sympy.Mul(*_whole_power(z, p.exp - HALF, root), root) for p in powers})
 

@@ -1,7 +1,7 @@
 """The text of sums with short chains of dependent operations.
 
-A processor multiplies and adds in one instruction and runs several at once, but each result takes as long as
-three or four instructions. So the time from one order of a series to the next is the length of the chain.
+A processor multiplies and adds in one instruction and runs several at once, but each result takes three or
+four cycles. So the length of the chain sets the time from one order of a series to the next.
 """
 
 from __future__ import annotations
