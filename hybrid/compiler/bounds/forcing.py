@@ -1,8 +1,8 @@
-"""The parts of a field that depend on time and parameters alone, and could hide a pulse from a solver.
+"""Parts of a vector field that depend on time and parameters alone and could hide a pulse from a solver.
 
-A solver knows a field only where it looks: at the stages of a step, or in the series at its start. A pulse
-that is narrower than the step can lie between. Interval arithmetic on the expression of the pulse shows
-it, as it shows the crossings of a guard.
+A solver evaluates a field only at certain points: at the stages of a step, or at its start for the series. A
+pulse that is narrower than the step can lie between them. Interval arithmetic on the expression of the pulse
+detects it, as it detects the crossings of a guard.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from hybrid.symbolic.tracing import Symbols
 
 # Products of more harmonics than these, such as ``cos(t)**100``, are narrow pulses.
 MOST_HARMONICS = 4
-# In place of a component of the state: the forcing is multiplied by something.
+# Used instead of a component of the state if the forcing is not simply a term of the component's rate.
 NO_COMPONENT = -1
 
 
 @attrs.frozen
 class Forcing:
-    """An expression in time and parameters, and the component whose rate it is a term of, or NO_COMPONENT."""
+    """An expression in time and parameters, and the component with this term in its rate or NO_COMPONENT."""
 
     expression: sympy.Expr
     component: int
 
 
 def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forcing, ...]:
-    """The largest parts of a field in time and parameters alone, without what is harmless in them.
+    """The largest parts of a field in time and parameters alone, without their harmless terms.
 
-    Empty for a field that was not traced, of which nothing is known.
+    Empty for a field that was not traced.
     """
     if field is None:
         return ()
@@ -65,11 +65,11 @@ def _found_parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator
 
 
 def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
-    """Whether an expression in time has no pulse that is narrower than what a solver resolves of it anyway.
+    """Whether an expression in time has no pulse so narrow that a solver could miss it.
 
-    Harmless are polynomials, exponentials of linear functions of time, and products of these with a few sines
-    and cosines of polynomials: polynomials and exponentials have no pulses, and a sine is as large in every
-    period as in any other, so a solver never sees it rest. Everything else may rest and then pulse.
+    Polynomials, exponentials of linear functions of time, and products of these with a few sines and cosines
+    of polynomials are harmless. Polynomials and exponentials have no pulses. A sine has the same amplitude in
+    every period, so it is never at rest. Every other expression may be at rest and then have a pulse.
     """
     harmonics = _harmonics(expression, t)
     return harmonics is not None and harmonics <= MOST_HARMONICS
@@ -77,7 +77,7 @@ def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
 
 @once
 def _harmonics(node: sympy.Expr, t: sympy.Symbol) -> int | None:
-    """Largest number of harmonics that are multiplied with one another; None if there are other functions."""
+    """Largest number of harmonics in a product; None if there are other functions."""
     if node == t or not mentions(node, (t,)):
         return 0
     if node.is_Add or node.is_Mul:

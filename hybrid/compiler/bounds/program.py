@@ -1,8 +1,8 @@
 """The expression of a guard or of a forcing as a list of operations, which the kernels run on intervals.
 
-A program needs no compiler: it is data. ``hybrid.kernels.events.bounds`` runs it to bound the expression over
-a piece of a step. This proves where a guard has a zero and where it has none, and that no pulse of a forcing
-is hidden.
+A program is data, so it needs no compiler. ``hybrid.kernels.events.bounds`` runs a program to bound its
+expression over a piece of a step. The bounds prove where a guard has a zero and where it has none, and that
+no pulse of a forcing is hidden.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ TWO_OPERANDS: dict[type[sympy.Basic], int] = {
 
 
 class NoProgram(Exception):
-    """An expression has a function without interval arithmetic; the text names it."""
+    """An expression has a function without interval arithmetic; the message names the function."""
 
 
 def programs(
@@ -70,9 +70,9 @@ def programs(
     residues: Sequence[sympy.Expr | None],
     symbols: Symbols,
 ) -> Programs:
-    """Programs of the guards' expressions and, behind them, of the forcings and of the residues.
+    """Programs of the guards' expressions, followed by those of the forcings and of the residues.
 
-    None has no rows, and neither has an expression without interval arithmetic.
+    Where the expression is None or has no interval arithmetic, the program has no rows.
     """
     rows: list[tuple[int, int, int, int]] = []
     checked: list[int] = []
@@ -101,15 +101,15 @@ class _Writer:
         self.leaves |= {p: (op.PARAMETER, i, 0, 0) for i, p in enumerate(symbols.p)}
 
     def written(self, expression: sympy.Expr) -> list[tuple[int, int, int, int]]:
-        """All rows; the last one is the expression."""
+        """All rows; the last one computes the expression."""
         last = self.place(expression)
         if last != len(self.rows) - 1:
-            # The expression is a leaf or a part of another that came first.
+            # The row of the expression was written earlier, but the last row must compute the expression.
             self._add(op.SUM, last, self._number(0.0))
         return self.rows
 
     def checked(self) -> list[int]:
-        """By row: 1 for a subexpression that could hide a pulse, and for the last row."""
+        """One number per row: 1 for a subexpression that could hide a pulse and for the last row, else 0."""
         time = next(iter(self.leaves))
         marks = [0] * (len(self.rows) - 1) + [1]
         for expression, row in self.places.items():
@@ -194,7 +194,7 @@ class _Writer:
         return self._add(op.SELECT, self.place(condition), self.place(a), self.place(b))
 
     def _remainder(self, rounding: int, a: sympy.Expr, b: sympy.Expr) -> int:
-        """``a - b*floor(a/b)``, or with the integer next to zero."""
+        """``a - b*round(a/b)``; ``rounding`` rounds down or towards zero."""
         whole = self._add(rounding, self._add(op.QUOTIENT, self.place(a), self.place(b)))
         less = self._add(op.PRODUCT, self._number(-1.0), self._add(op.PRODUCT, self.place(b), whole))
         return self._add(op.SUM, self.place(a), less)

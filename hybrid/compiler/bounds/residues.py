@@ -1,8 +1,8 @@
-"""Rates and guards whose terms in time and parameters alone may cancel: then only their rounding is left.
+"""Rates and guards whose terms in time and parameters alone may cancel, so that only rounding errors remain.
 
-The speed of a guard that the state may rest on is such a rate: the force on a block, say, that sticks and is
-about to let go. How large its rounding is shows neither in the rate, nor in the states, nor in the Jacobian.
-Interval arithmetic on the rate shows it. The same goes for the guard at which the block lets go.
+An example is the speed of a guard on which the state may rest, such as the force on a block that sticks and
+is about to slip. The size of the rounding error cannot be found from the rate, the states or the Jacobian.
+Interval arithmetic on the rate gives it. The same holds for the guard at which the block slips.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hybrid.symbolic.tracing import Symbols
 
 @attrs.frozen
 class Residue:
-    """A rate, and the component of the state that it is the rate of."""
+    """A rate, and the component of the state that has this rate."""
 
     expression: sympy.Expr
     component: int
@@ -29,10 +29,10 @@ def residues(
     gradients: Iterable[Sequence[sympy.Expr] | None],
     symbols: Symbols,
 ) -> tuple[Residue, ...]:
-    """The rates of that kind that the guards of a mode feel, by their gradients.
+    """The rates with terms that may cancel and on which the speed of a guard of the mode depends.
 
-    A field or a guard that was not traced comes as None; nothing is known of such a field, and such a guard
-    feels every rate.
+    A field or a gradient that was not traced is None. Such a field has no residues; such a guard depends on
+    every rate.
     """
     if field is None:
         return ()
@@ -45,7 +45,7 @@ def residues(
 
 
 def residue_of_guard(guard: sympy.Expr | None, symbols: Symbols) -> sympy.Expr | None:
-    """The terms of a guard in time and parameters alone, if they may cancel and there are others."""
+    """The terms of a guard in time and parameters alone, if they may cancel and the guard has other terms."""
     if guard is None or not guard.is_Add or not _may_cancel(guard, symbols):
         return None
     free = [term for term in guard.args if not mentions(term, symbols.x)]
@@ -53,7 +53,7 @@ def residue_of_guard(guard: sympy.Expr | None, symbols: Symbols) -> sympy.Expr |
 
 
 def _may_cancel(rate: sympy.Expr, symbols: Symbols) -> bool:
-    """Whether a rate has a sum with two terms, or a function, in which the state does not occur."""
+    """Whether a rate has a sum with two terms without the state, or a function without the state."""
     for node in nodes(rate):
         if node.is_Add and sum(not mentions(term, symbols.x) for term in node.args) > 1:
             return True

@@ -1,1 +1,1 @@
-"""Recurrences of Taylor coefficients, written from the expressions of a field."""
+"""Recurrences of Taylor coefficients, generated from the expressions of a vector field."""

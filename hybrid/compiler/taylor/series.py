@@ -1,9 +1,9 @@
 """Taylor series of a mode's solutions: recurrences for their coefficients, written as code.
 
-Every expression of the field is cut into elementary operations, each with a recurrence for its normalised
-Taylor coefficients along a solution (Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904; Griewank and
-Walther, Evaluating Derivatives, 2nd ed. 2008, table 13.2). Linear operations cost one multiplication an
-order, products and functions a convolution.
+Every expression of the vector field is split into elementary operations. Each has a recurrence for its
+normalised Taylor coefficients along a solution (Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904; Griewank and
+Walther, Evaluating Derivatives, 2nd ed. 2008, table 13.2). Linear operations cost one multiplication per
+order, products and functions cost one convolution per order.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from hybrid.symbolic.constants import Constants
 from hybrid.symbolic.nodes import mentions, nodes, operations_of, symbols_of
 from hybrid.symbolic.printer import MATH_FUNCTIONS, power_text
 
-# Functions whose derivative is again made of what has a recurrence.
+# Functions whose derivatives consist of operations with recurrences.
 BY_DERIVATIVE = (
     sympy.log, log1p, log2, log10, expm1,
     sympy.asin, sympy.acos, sympy.atan, sympy.asinh, sympy.acosh, sympy.atanh,
 )  # fmt: skip
-# A pair, and the sign of the second's derivative: cos' = -sin, cosh' = sinh.
+# A pair of functions, and the sign in the derivative of the second: cos' = -sin, cosh' = sinh.
 PAIRS = {
     sympy.sin: (sympy.sin, sympy.cos, "-"),
     sympy.cos: (sympy.sin, sympy.cos, "-"),
@@ -36,12 +36,12 @@ PAIRS = {
 OWN_SQUARE = {sympy.tanh: "-", sympy.tan: ""}
 
 
-# Longer inner sums are not taken apart: others may need them too.
+# Longer inner sums are not expanded, since other expressions may need them too.
 MOST_TERMS = 4
 
 
 class NoSeries(Exception):
-    """An expression has no Taylor recurrence here; the text says which part."""
+    """An expression has no Taylor recurrence here; the message says which part."""
 
 
 class Recurrences:
@@ -49,32 +49,33 @@ class Recurrences:
 
     The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
-    ``o``. Convolutions are taken in parts: the terms at their ends hold what this order and the one before
-    bring, all those between hold lower orders only and can be summed early, all side by side: ``pairs`` lists
-    the column of the first factor and the second, with the text of its coefficient. In every sum what is
-    known last is added last: nothing waits for it twice.
+    ``o``. Convolutions are split. The terms at both ends contain coefficients of this order and the one
+    before. All terms between contain only lower orders, so they are summed early, all convolutions side by
+    side. ``pairs`` lists these convolutions: the column of the first factor and the second factor, with the
+    text of the second factor's coefficient. In every sum, the term known last is added last, so that only one
+    addition waits for it.
 
-    With ``lanes`` a coefficient is that of four tangent vectors at once, in four columns. These have been
-    written as one and are read as one, which is quick even for the order before. ``blocks`` lists, by the
-    column of a factor that is one number, what it is multiplied by.
+    With ``lanes``, a coefficient holds four numbers, one per tangent vector, in four columns. The four are
+    written and read as one vector, which is fast even right after the order before was written. ``blocks``
+    lists the factors that multiply a scalar factor, by the column of the scalar factor.
 
     Parameters
     ----------
     rows
-        Where the series of a symbol is: text of its column in ``out``.
+        By symbol: text of the column of ``out`` that holds its series.
     time
-        The symbol of time and the text of its first-order and higher coefficient; None if it is a symbol
-        among ``rows``.
+        The symbol of time and the text of its coefficient of order one and above; None if the symbol is in
+        ``rows``.
     allot
-        Called for a new column, returns its text.
+        Function that allocates a new column and returns its text.
     prefix
-        Begins the names of local variables.
+        Prefix of the names of local variables.
     known
-        Recurrences that run before these and hold the series of all that is free of the symbols in ``rows``.
+        Recurrences that run before these and hold the series of all expressions without symbols of ``rows``.
     at_start
-        Text of order zero of expressions for which there is a better one than their operations give.
+        By expression: a text for order zero that is better than the text from its operations.
     lanes
-        Whether the symbols in ``rows`` stand for four numbers each.
+        Whether each symbol in ``rows`` represents four numbers.
     """
 
     def __init__(
@@ -110,10 +111,10 @@ class Recurrences:
             self.own |= {time[0]}
 
     def expect(self, symbols: Iterable[sympy.Symbol | None], rates: Sequence[sympy.Expr]) -> None:
-        """Look at the rates of symbols that are to come.
+        """Analyse the rates of symbols before their recurrences are written.
 
-        The factors of products are counted: one that many share goes into their common block. And what takes
-        long to compute is known late: its symbol is added last in every sum.
+        This counts the factors of products: a factor that many products share becomes the first factor of
+        all. A symbol with a long rate is known late, so it is added last in every sum.
         """
         self.readiness.clear()
         for symbol, rate in zip(symbols, rates, strict=True):
@@ -153,7 +154,7 @@ class Recurrences:
         return f"load(out, {order}, {column})" if self.lanes else f"out[{order}, {column}]"
 
     def put(self, order: str, column: str, value: str) -> str:
-        """Statement that writes there."""
+        """Statement that writes an entry of a column of these recurrences."""
         if self.lanes:
             return f"store(out, {order}, {column}, {value})"
         return f"out[{order}, {column}] = {value}"
@@ -176,7 +177,7 @@ class Recurrences:
         self.higher.append(statement)
 
     def _bind(self, expression: sympy.Expr, first: str, *higher: str, name: str | None = None) -> str:
-        """A variable for the expression: its value at order zero, and statements or a value above that."""
+        """A variable for the expression: its value at order zero; above, its value and further statements."""
         name = name or self._name(expression)
         self.first.append(f"{name} = {self.at_start.get(expression, first)}")
         value, *more = higher
@@ -196,7 +197,7 @@ class Recurrences:
             self._both(self.put("o", self.rows[expression], self.variables[expression]))
 
     def _place(self, left: str, right: sympy.Expr) -> tuple[str, str]:
-        """A convolution with the column ``left`` but for its ends, and the column for its other factor."""
+        """A convolution with the column ``left``, without both ends, and the column of the other factor."""
         if self.lanes:
             rights = self.blocks.setdefault(left, [])
             if right not in rights:
@@ -206,44 +207,44 @@ class Recurrences:
         self.pairs.setdefault((left, right), "")
         place = list(self.pairs).index((left, right))
         column = f"{self.prefix}b + {place}"
-        # The second factor is often made of the first, and known later.
+        # The second factor often depends on the first and is known later, so its term is added last.
         inner = f"{self.prefix}s{place} + {self._left_before(left)}*out[1, {column}]"
         return f"({inner} + out[1, {left}]*{self.prefix}p{place})", column
 
     def _left_before(self, left: str) -> str:
-        """Name of the last coefficient but one of a first factor."""
+        """Name of the coefficient of a first factor in the order before."""
         return f"{self.prefix}q{[each for each, _ in self.pairs].index(left)}"
 
     def before(self) -> dict[str, str]:
-        """Names of the last coefficients but one of all factors, and what they are once an order is done.
+        """Names of all factors' coefficients in the order before, with their values at the end of an order.
 
-        For the first order there are none, for the second both terms with them would be the same.
+        Order one has no terms with them. In order two, both terms are the same, so one is set to zero.
         """
         lefts = {self._left_before(left): f"out[o, {left}] if o > 1 else 0.0" for left, _ in self.pairs}
         return lefts | {f"{self.prefix}p{i}": value for i, value in enumerate(self.pairs.values())}
 
     @property
     def common_left(self) -> str | None:
-        """The column of the first factor of all pairs, if they have one in common."""
+        """The column of the first factor, if all pairs have the same one."""
         lefts = {left for left, _ in self.pairs}
         return lefts.pop() if len(lefts) == 1 else None
 
     def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
-        """``_place``, and the coefficient of the other factor, which is written there."""
+        """The results of ``_place``, and the coefficient of the other factor, which is written to its column."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
         self._enter(left, right, column, value)
         return inner, column, value
 
     def _enter(self, left: str, right: sympy.Expr, column: str, value: str) -> None:
-        """Give a convolution the coefficient of its other factor. All of them are written together."""
+        """Give a convolution the coefficient of its other factor; all pairs are written together."""
         if self.lanes:
             self._both(self.put("o", column, value))
         else:
             self.pairs[left, right] = value
 
     def _slope(self, u: sympy.Expr) -> str:
-        """Column of ``o`` times the coefficients of ``u``: those of its derivative, one order late."""
+        """Column of ``o`` times the coefficients of ``u``: those of the derivative, shifted by one order."""
         if u not in self.slopes:
             value = self.coefficient(u)
             self.slopes[u] = self.allot()
@@ -288,10 +289,10 @@ class Recurrences:
         return self._bind(expression, first, added([self._higher_times(*term) for term in moving]))
 
     def _terms(self, expression: sympy.Expr) -> list[tuple[sympy.Expr, sympy.Expr]]:
-        """The terms of a sum as constant factors and what moves; inner sums are taken apart.
+        """The terms of a sum as pairs of a constant factor and a varying factor; inner sums are expanded.
 
-        Each level of a sum of sums would wait for the one before. But a difference of states, whose digits
-        may cancel, is left as it is.
+        Otherwise each level of nested sums would wait for the level below. A difference of states, whose
+        digits may cancel, is not expanded.
         """
         found = []
         for factor, rest in map(self._split, sympy.Add.make_args(expression)):
@@ -312,7 +313,7 @@ class Recurrences:
         return rest.is_Symbol and factor in (1, -1)
 
     def _split(self, term: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
-        """The constant factors of a term, and the others."""
+        """The product of the constant factors of a term, and that of the others."""
         factors = sympy.Mul.make_args(term)
         constant = [factor for factor in factors if self._is_constant(factor)]
         return sympy.Mul(*constant), sympy.Mul(*(factor for factor in factors if factor not in constant))
@@ -324,7 +325,7 @@ class Recurrences:
         return Term(self._ready(rest), text, constant != 1)
 
     def _higher_times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
-        """The same above order zero, where a sum with one moving term is a multiple of that."""
+        """``_times`` above order zero, where a sum with one varying term is a multiple of that term."""
         self.coefficient(rest)
         while rest.is_Add or rest.is_Mul:
             moving = [each for each in sympy.Add.make_args(rest) if not self._is_constant(each)]
@@ -335,7 +336,7 @@ class Recurrences:
         return self._times(constant, rest)
 
     def _ready(self, expression: sympy.Expr) -> tuple[int, int]:
-        """When a coefficient is known: how many operations after those of the states, and theirs."""
+        """When a coefficient is known: the number of operations after the states, and theirs."""
         if expression.is_Symbol:
             return 1, self.lateness.get(expression, 0)
         if expression not in self.readiness:
@@ -353,14 +354,14 @@ class Recurrences:
             term = self._split(expression)
             return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
         below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
-        # A divisor that is known has its reciprocal kept, and is multiplied by.
+        # For a known divisor, the reciprocal has a series already: its product needs no division.
         below = [f for f in below if self.known is None or mentions(f, self.own)]
         if below and len(below) < len(factors):
             above = sympy.Mul(*(f for f in factors if f not in below))
             return self._quotient(expression, above, sympy.Mul(*(1 / f for f in below)))
         if len(below) > 1:
             return self._quotient(expression, None, sympy.Mul(*(1 / f for f in below)))
-        # What is known goes first, then what most products share.
+        # The first factor is a known one, or else the one that most products share.
         *others, last = sorted(factors, key=lambda factor: (-mentions(factor, self.own), self.shared[factor]))
         return self._convolution(expression, last, sympy.Mul(*others))
 
@@ -380,7 +381,7 @@ class Recurrences:
         divisor, value = self.row(below), self.coefficient(below)
         inner, column = self._place(divisor, expression)
         name, column = self._kept(expression, column)
-        # Of one sign, so that nothing has to be taken from zero.
+        # The minus sign is included here, so that no term has to be negated.
         self.first.append(f"{name}d = -1.0/{value}")
         inner = inner if text is None else f"({inner} - {text})"
         self._bind(
@@ -418,7 +419,7 @@ class Recurrences:
         return name
 
     def _rate(self, u: sympy.Expr) -> str | None:
-        """The constant rate of an argument that is linear in time, None for others."""
+        """The constant rate of an argument that is linear in time; None for other arguments."""
         if self.time is None or self.time[1] != ONE_THEN_ZERO:
             return None
         if symbols_of(u) & self.own - {self.time[0]}:
