@@ -69,7 +69,7 @@ def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
 
     Polynomials, exponentials of linear functions of time, and products of these with a few sines and cosines
     of polynomials are harmless. Polynomials and exponentials have no pulses. A sine has the same amplitude in
-    every period, so it is never at rest. Every other expression may be at rest and then have a pulse.
+    every period, so a solver never finds it at rest. Every other expression may rest and then have a pulse.
     """
     harmonics = _harmonics(expression, t)
     return harmonics is not None and harmonics <= MOST_HARMONICS

@@ -47,7 +47,7 @@ def _reference(value: Any) -> str:
 def _arithmetic(operation: str) -> Callable[..., Line]:
     def write(self: Builder, a: Any, b: Any, name: str = "", flags: Sequence[str] = ()) -> Line:
         if a.type != b.type:
-            raise ValueError(f"{operation} of {a.type} and {b.type}")
+            raise ValueError(f"{operation} of {a.type} and {b.type}: the types must be equal")
         words = " ".join((operation, *flags, _text(a.type)))
         return self.written(a.type, f"{words} {_reference(a)}, {_reference(b)}")
 

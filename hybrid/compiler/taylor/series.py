@@ -1,9 +1,9 @@
 """Taylor series of a mode's solutions: recurrences for their coefficients, written as code.
 
 Every expression of the vector field is split into elementary operations. Each has a recurrence for its
-normalised Taylor coefficients along a solution (Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904; Griewank and
-Walther, Evaluating Derivatives, 2nd ed. 2008, table 13.2). Linear operations cost one multiplication per
-order, products and functions cost one convolution per order.
+normalised Taylor coefficients along a solution (Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904;
+Griewank and Walther, Evaluating Derivatives, 2nd ed. 2008, table 13.2). Linear operations cost one
+multiplication per order, products and functions cost one convolution per order.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ class Recurrences:
     def expect(self, symbols: Iterable[sympy.Symbol | None], rates: Sequence[sympy.Expr]) -> None:
         """Analyse the rates of symbols before their recurrences are written.
 
-        This counts the factors of products: a factor that many products share becomes the first factor of
-        all. A symbol with a long rate is known late, so it is added last in every sum.
+        This counts the factors of products: a factor that many products share becomes their common
+        first factor. A symbol with a long rate is known late, so it is added last in every sum.
         """
         self.readiness.clear()
         for symbol, rate in zip(symbols, rates, strict=True):
@@ -230,7 +230,7 @@ class Recurrences:
         return lefts.pop() if len(lefts) == 1 else None
 
     def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
-        """The results of ``_place``, and the coefficient of the other factor, which is written to its column."""
+        """The results of ``_place`` and the coefficient of the other factor, written to its column."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
         self._enter(left, right, column, value)
@@ -336,7 +336,7 @@ class Recurrences:
         return self._times(constant, rest)
 
     def _ready(self, expression: sympy.Expr) -> tuple[int, int]:
-        """When a coefficient is known: the number of operations after the states, and theirs."""
+        """When a coefficient is known: the number of operations after the states, and the lateness of the states."""
         if expression.is_Symbol:
             return 1, self.lateness.get(expression, 0)
         if expression not in self.readiness:
@@ -354,7 +354,7 @@ class Recurrences:
             term = self._split(expression)
             return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
         below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
-        # For a known divisor, the reciprocal has a series already: its product needs no division.
+        # A known divisor becomes a factor: the series of its reciprocal is stored.
         below = [f for f in below if self.known is None or mentions(f, self.own)]
         if below and len(below) < len(factors):
             above = sympy.Mul(*(f for f in factors if f not in below))
