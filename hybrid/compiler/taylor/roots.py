@@ -56,7 +56,7 @@ class Root:
 
 
 def regular_root(field: Sequence[sympy.Expr], z: sympy.Expr, place: int, symbols: Symbols) -> Root | None:
-    """The root ``w`` of a guard ``z`` if ``z'/w`` is smooth, so that ``w' = z'/(2 w)`` is; else None.
+    """The root ``w`` of a guard ``z`` if ``w' = z'/(2 w)`` is smooth in ``w``; else None.
 
     An example is a tank that empties with ``h' = -sqrt(h)``: the root falls at a constant rate and reaches
     zero at nonzero speed. On the clock ``dt = w ds`` the tank would never be empty.

@@ -336,7 +336,7 @@ class Recurrences:
         return self._times(constant, rest)
 
     def _ready(self, expression: sympy.Expr) -> tuple[int, int]:
-        """When a coefficient is known: the number of operations after the states, and the lateness of the states."""
+        """When a coefficient is known: operations after the states, and lateness of the states."""
         if expression.is_Symbol:
             return 1, self.lateness.get(expression, 0)
         if expression not in self.readiness:
