@@ -199,7 +199,7 @@ class _Body:
 
     def _if(self, node: ast.If) -> None:
         """A chain of branches, without recursion: functions have one branch per mode or transition."""
-        builder, before, made = self.builder, dict(self.variables), dict(self.variables)
+        builder, before = self.builder, dict(self.variables)
         end = builder.append_basic_block("end")
         rest: list[ast.stmt] = [node]
         while len(rest) == 1 and isinstance(each := rest[0], ast.If):
@@ -209,13 +209,12 @@ class _Body:
             self.block(each.body)
             builder.branch(end)
             builder.position_at_end(otherwise)
-            # A variable first assigned in a branch must not be read after it: each branch allocates its own.
-            made |= self.variables
+            # A variable first assigned in a branch is unknown after it: the other branches have not set it.
             self.variables, rest = dict(before), each.orelse
         self.block(rest)
         builder.branch(end)
         builder.position_at_end(end)
-        self.variables |= made
+        self.variables = before
 
     def _for(self, node: ast.For) -> None:
         assert isinstance(node.iter, ast.Call)
