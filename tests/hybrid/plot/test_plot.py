@@ -159,7 +159,7 @@ def test_each_result_has_its_picture():
     np.testing.assert_allclose(ends, spectrum.exponents)
     with pytest.raises(ArgumentError, match="result must be a system, an arc"):
         plot(3)
-    with pytest.raises(ArgumentError, match="no history"):
+    with pytest.raises(ArgumentError, match="must have a history"):
         plot(lyapunov.lyapunov_spectrum(oscillator, (0.0, 0.0), intervals=5, history=False))
 
 

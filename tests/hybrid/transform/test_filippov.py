@@ -472,8 +472,8 @@ class TestModel:
         ("functions", "text"),
         [
             ({"below": 3}, "filippov: below must be a function"),
-            ({"switching": lambda t, x, p: (x.x, x.y)}, "switching must return 1 values; it returns 2"),
-            ({"above": lambda t, x, p: (1.0,)}, "above must return 2 values; it returns 1"),
+            ({"switching": lambda t, x, p: (x.x, x.y)}, "switching must return 1 values; got 2"),
+            ({"above": lambda t, x, p: (1.0,)}, "above must return 2 values; got 1"),
             ({"above": lambda t, x, p: (1.0, x.q)}, "above: State component 'q' does not exist"),
             ({"below": lambda t, x, p: (1.0, math.sin(x.x))}, "below cannot be traced"),
             ({"switching": lambda t, x, p: x.x if x.y > 0 else x.y}, "switching cannot be traced"),
