@@ -1,1 +1,1 @@
-"""Arithmetic on numbers, vectors, polynomials and intervals, which knows nothing of a model."""
+"""Arithmetic on numbers, vectors, polynomials and intervals, independent of any model."""

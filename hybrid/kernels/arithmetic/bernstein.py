@@ -1,8 +1,9 @@
 """Real roots of a polynomial in Bernstein form by Descartes' rule: none missed, none counted twice.
 
 The number of sign variations of the Bernstein coefficients bounds the number of roots in the open interval
-and has its parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081), so 0 and 1 are proofs and anything
-else is cut in two. The coefficients' hull makes "no root" the cheap case, which nearly every step is.
+and has the same parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081). So 0 or 1 variations prove 0 or 1
+roots, and an interval with more is halved. The hull of the coefficients makes "no root" cheap to prove, and
+nearly every step has no root.
 """
 
 from numba import njit
@@ -10,9 +11,9 @@ from numba import njit
 from hybrid.kernels.types.layout import INLINE, KERNEL
 
 NO_ROOT = 2.0
-# Roots closer than this on the unit interval are one root: the coefficients' own rounding merges them.
+# Roots closer than this on the unit interval count as one root: rounding of the coefficients merges them.
 CLUSTER = 1e-14
-# A Newton step this short has entered the quadratic convergence to a root that is simple to rounding.
+# A relative Newton step below this is in the range of quadratic convergence to a numerically simple root.
 SETTLED = 1e-8
 
 
@@ -20,9 +21,9 @@ SETTLED = 1e-8
 def value_and_slope(coefficients, degree, theta):
     """Value and derivative at ``theta`` on [0, 1]; ``coefficients (degree + 1,)``.
 
-    After one step of de Casteljau's what is left is of one degree less, and its basis, with only positive
-    members, is summed as it stands. From the nearer end on, each member is the one before times a ratio of
-    at most the degree.
+    One step of de Casteljau's algorithm lowers the degree by one. The rest is summed in its Bernstein basis,
+    whose members are all positive. The sum starts from the nearer end, so that each member is the previous
+    member times a ratio of at most the degree.
     """
     if degree == 0:
         return coefficients[0], 0.0
@@ -42,9 +43,9 @@ def value_and_slope(coefficients, degree, theta):
 
 @njit(**KERNEL)
 def simple_root(coefficients, degree, sign_left):
-    """The one root in (0, 1) of a polynomial with one sign variation: Newton, kept inside its bracket."""
+    """The only root in (0, 1) of a polynomial with one sign variation: Newton's method in a bracket."""
     low, high, last = 0.0, 1.0, 1.0
-    # The secant's root, unless an end is a root too: that one is not in the open interval.
+    # Start at the root of the secant, unless an end is a root: that root is not in the open interval.
     theta = coefficients[0] / (coefficients[0] - coefficients[degree])
     if not (low < theta < high):
         theta = 0.5
@@ -58,7 +59,7 @@ def simple_root(coefficients, degree, sign_left):
             high = theta
         newton = theta - value / slope if slope != 0.0 else -1.0
         change = abs(newton - theta)
-        # Newton's steps shrink quadratically here; one that does not is the rounding of the value.
+        # Newton steps shrink quadratically here: a step that does not comes from rounding of the value.
         if change <= 2e-16 * theta or (last < SETTLED * theta and change > 0.25 * last):
             return theta
         if not (low < newton < high):
@@ -74,11 +75,11 @@ def simple_root(coefficients, degree, sign_left):
 def first_crossing(coefficients, degree, side, direction, stack):
     """First zero crossing in ``direction`` on [0, 1], and the side the polynomial is on after it.
 
-    ``coefficients (degree + 1,)`` may be longer; ``side`` is the sign before the interval, so that a sign
-    that differs at once is a crossing at 0, or 0 if there was none, and then roots that cannot be told from 0
-    are no crossings; ``stack (depth, >= degree + 3)`` is scratch. Returns ``(NO_ROOT, side at the end)``
-    where nothing crosses in that direction. A zero at 1 exactly counts as crossed if the slope there leads
-    across.
+    ``coefficients (degree + 1,)`` may be longer. ``side`` is the sign before the interval: if the polynomial
+    starts with the other sign, it crosses at 0. ``side = 0`` stands for an unknown sign: then roots that
+    rounding cannot tell from 0 are no crossings. ``stack (depth, >= degree + 3)`` is scratch. Returns
+    ``(NO_ROOT, side at the end)`` if there is no crossing in that direction. A zero exactly at 1 counts as a
+    crossing if the slope there leads across.
     """
     start, end, top, side = bracket_crossing(coefficients, degree, side, direction, stack)
     if start == end:
@@ -88,13 +89,13 @@ def first_crossing(coefficients, degree, side, direction, stack):
 
 @njit(**INLINE)
 def crosses_towards(direction, side):
-    """Whether a transition fires on a crossing to that side."""
+    """Whether a transition with this ``direction`` fires on a crossing to ``side``."""
     return direction == 0 or direction == side
 
 
 @njit(**INLINE)
 def halve(stack, top, degree):
-    """Cut the part in a row of the stack in two: the left half, to be looked at first, goes on top."""
+    """Halve the interval in row ``top`` of the stack; the left half, searched first, goes on top."""
     row, left = stack[top], stack[top + 1]
     middle = 0.5 * (row[0] + row[1])
     left[0], left[1] = row[0], middle
@@ -107,9 +108,10 @@ def halve(stack, top, degree):
 
 @njit(**KERNEL)
 def bracket_crossing(coefficients, degree, side, direction, stack):
-    """Where ``first_crossing`` is: ``(start, end, row, side after it)``, a place if the ends agree.
+    """Bracket of ``first_crossing``: ``(start, end, row, side after it)``.
 
-    Else it is the one root in between, and ``stack[row, 2:]`` the polynomial there.
+    If ``start == end``, the crossing is there. Otherwise it is the only root in between, and
+    ``stack[row, 2:]`` holds the polynomial on the bracket.
     """
     top, unknown = 0, side == 0
     stack[0, 0] = 0.0
@@ -148,7 +150,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
                 return start, start if variations > 1 else end, top, side
         top -= 1
     if coefficients[degree] == 0.0:
-        # Odd or even multiplicity at 1 cannot be told from the sign before it alone: look at the slope.
+        # The sign before 1 alone does not show whether the root at 1 is odd or even: use the slope.
         slope = -coefficients[degree - 1]
         after = 1 if slope > 0.0 else (-1 if slope < 0.0 else side)
         if after != side:
@@ -160,7 +162,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
 
 @njit(**INLINE)
 def stays(coefficients, degree, side, band):
-    """Whether all coefficients lie beyond ``band`` on one side: the proof that serves nearly every step."""
+    """Whether all coefficients lie beyond ``band`` on ``side``: enough to prove nearly every step."""
     for i in range(degree + 1):  # noqa: SIM110 (no generators in kernels)
         if not coefficients[i] * side > band:
             return False
@@ -184,7 +186,7 @@ def lowest(coefficients, degree, side, stack):
     slope = stack[stack.shape[0] - 2]
     best, depth = NO_ROOT, 0.0
     start = 0.0
-    # The derivative has fewer roots than the polynomial; what lies before ``start`` has been looked at.
+    # The derivative has fewer roots than the polynomial. The part before ``start`` has been searched.
     for _ in range(2 * degree):
         for i in range(degree):
             slope[i] = side * (coefficients[i + 1] - coefficients[i])
@@ -208,8 +210,8 @@ def lowest(coefficients, degree, side, stack):
 def divide_by_theta(coefficients, degree):
     """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree.
 
-    A known root at the start of a step is taken out exactly, so that it can be neither found again nor
-    hide a second root near it.
+    This removes a known root at the start of a step exactly: the root cannot be found again, nor hide a
+    second root near it.
     """
     for i in range(degree):
         coefficients[i] = coefficients[i + 1] * degree / (i + 1)

@@ -1,8 +1,8 @@
-"""The clock of a run: whole periods counted, and the phase in the present one.
+"""The clock of a run: the number of whole periods, and the phase in the current period.
 
-The phase has two parts, the number itself and what its rounding lost. The time between two events, which is
-all that a system without forcing knows of time, then has as many digits after a million units of time as at
-the start.
+The phase has two parts: the rounded number and its rounding error. So the time between two events keeps as
+many digits after a million units of time as at the start. A system without forcing depends on time only
+through the time between events.
 """
 
 import math
@@ -11,13 +11,13 @@ from numba import njit
 
 from hybrid.kernels.types.layout import INLINE, KERNEL
 
-# What a sum loses is found by sums in the order in which they are written.
+# The rounding error of a sum is found only if the compiler keeps the order of the operations.
 IN_ORDER = KERNEL | {"fastmath": False}
 
 
 @njit(**IN_ORDER)
 def sum_in_two_parts(a, b):
-    """``a + b``, rounded, and what the rounding lost (Knuth)."""
+    """``a + b``, rounded, and its rounding error (Knuth)."""
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
@@ -25,7 +25,7 @@ def sum_in_two_parts(a, b):
 
 @njit(**IN_ORDER)
 def time_left(model, run, stop_cycle, stop_phase):
-    """Time until the stop; periods are counted, not measured, so that none of their digits is lost."""
+    """Time until the stop; whole periods are counted, so that they lose no digits."""
     if not stop_phase < math.inf:
         return stop_phase
     left, lost = sum_in_two_parts(stop_phase, -run.phase)
@@ -34,7 +34,7 @@ def time_left(model, run, stop_cycle, stop_phase):
 
 @njit(**IN_ORDER)
 def forward(run, period, span):
-    """Move the clock of a run on, keeping the phase below the period."""
+    """Advance the clock of a run by ``span``; the phase stays below the period."""
     phase, lost = sum_in_two_parts(run.phase, span)
     phase, low = sum_in_two_parts(phase, lost + run.phase_low)
     while period > 0.0 and phase >= period:
@@ -45,7 +45,7 @@ def forward(run, period, span):
 
 @njit(**KERNEL)
 def set_clock(run, cycle, phase):
-    """Put the clock of a run to a number of whole periods and a phase."""
+    """Set the clock of a run to a number of whole periods and a phase."""
     run.cycle = cycle
     run.phase, run.phase_low = phase, 0.0
 
@@ -54,7 +54,7 @@ def set_clock(run, cycle, phase):
 def measured_time(model, run, mode):
     """The time whose rounding limits the steps of a mode.
 
-    It is the phase where the field of the mode or one of its guards depends on time. Where they do not, it is
-    the time since the last jump.
+    It is the phase if the vector field of the mode or one of its guards depends on time. Otherwise it is the
+    time since the last jump.
     """
     return abs(run.phase) if model.timed[mode] == 1 else run.since_entry

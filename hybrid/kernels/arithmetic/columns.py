@@ -1,9 +1,9 @@
-"""Arithmetic on many series side by side in vector registers, which the compiler does not find by itself.
+"""Arithmetic on many series side by side in vector registers: the compiler does not vectorise it by itself.
 
-A matrix of series ``(orders, columns)`` has its columns next to one another in memory. What is done to all of
-them alike, order after order, takes whole vectors of columns at a time. A processor has to wait for memory
-when it reads as one vector what it has just written as several: those of the state are read as wide as
-``store_row`` writes them, and those of tangent vectors four columns at a time.
+A matrix of series ``(orders, columns)`` stores the columns of an order next to one another. An operation on
+all columns, order after order, takes whole vectors of columns at a time. A processor stalls when it reads as
+one vector data that it has just written as several. So the columns of the state are read as wide as
+``store_row`` writes them, and the columns of tangent vectors four at a time.
 """
 
 import numpy as np
@@ -24,16 +24,16 @@ from hybrid.kernels.arithmetic.lanes import (
 )
 from hybrid.kernels.types.codes import NARROW, WIDE
 
-# Sums that grow side by side: each term waits for the one before it in the same sum.
+# Number of partial sums: in one sum, each term waits for the previous term.
 AT_ONCE = 4
 
 
 def convolve(series, order, inset, left, first, width, widest):
     """Sums of ``series[j, left] * series[order - j, c]`` over ``inset <= j <= order - inset``.
 
-    They go into ``series[order, c]``; the columns ``c`` are ``width``, a multiple of 4, from ``first`` on. No
-    register is wider than ``widest``; both are known to the compiler. The terms left out at both ends are
-    those with the coefficients of the highest orders.
+    The sums go into ``series[order, c]`` for ``width`` columns ``c`` from ``first`` on; ``width`` is a
+    multiple of 4. No register is wider than ``widest``. ``width`` and ``widest`` are known at compile time.
+    The terms left out at both ends have the coefficients of the highest orders.
     """
     sums = np.zeros(width)
     for j in range(inset, order - inset + 1):
@@ -42,7 +42,7 @@ def convolve(series, order, inset, left, first, width, widest):
 
 
 def convolve_pairs(series, order, inset, left, first, width, widest):
-    """As ``convolve``, but each column has a factor of its own: these begin at ``left``."""
+    """As ``convolve``, but each column has its own factor: the factors begin at column ``left``."""
     sums = np.zeros(width)
     for j in range(inset, order - inset + 1):
         sums += series[j, left : left + width] * series[order - j, first : first + width]
@@ -50,9 +50,9 @@ def convolve_pairs(series, order, inset, left, first, width, widest):
 
 
 def evaluate(series, order, s, first, width):
-    """Values at ``s`` of ``width`` series, a multiple of 4, from ``first`` on, into ``series[order + 1]``.
+    """Values at ``s`` of ``width`` series from column ``first`` on, into ``series[order + 1]``.
 
-    The order is at least 1.
+    ``width`` is a multiple of 4, and the order is at least 1.
     """
     total = series[order, first : first + width].copy()
     for o in range(order - 1, -1, -1):
@@ -61,7 +61,7 @@ def evaluate(series, order, s, first, width):
 
 
 def evaluate_with_sizes(series, order, s, first, width):
-    """As ``evaluate``, and the sums of the magnitudes of all terms into ``series[order + 2]``; ``s >= 0``."""
+    """As ``evaluate``; the sums of the terms' magnitudes go into ``series[order + 2]``; ``s >= 0``."""
     evaluate(series, order, s, first, width)
     total = abs(series[order, first : first + width])
     for o in range(order - 1, -1, -1):
@@ -70,16 +70,16 @@ def evaluate_with_sizes(series, order, s, first, width):
 
 
 def combine(series, order, table, width, numbers):
-    """Every order of the first ``width`` columns as a combination of blocks of as many columns of that order.
+    """Every order of the first ``width`` columns as a combination of blocks of ``width`` columns.
 
-    The blocks begin at the column ``table``, one for each of the tuple ``numbers``.
+    The blocks begin at column ``table``. Each number of the tuple ``numbers`` is the weight of one block.
     """
     rows = series[: order + 1, table : table + width * len(numbers)]
     series[: order + 1, :width] = np.tensordot(rows.reshape(order + 1, -1, width), numbers, (1, 0))
 
 
 def combine_tangents(series, order, table, width, first, n):
-    """Every order but zero of four tangent vectors from order zero and the first ``n`` blocks of a table."""
+    """Orders 1 and up of four tangent vectors from order 0 and the first ``n`` blocks of a table."""
     rows = series[1 : order + 1, table : table + width * n].reshape(order, n, width)[:, :, :n]
     vectors = series[0, first : first + NARROW * n].reshape(n, NARROW)
     series[1 : order + 1, first : first + NARROW * n] = np.einsum("oji,jl->oil", rows, vectors).reshape(
@@ -88,9 +88,10 @@ def combine_tangents(series, order, table, width, first, n):
 
 
 def spread_tangents(y, n, series, first, stride):
-    """Tangent vectors from ``y (n (1 + k),)`` into order zero of their series: four at a time, by component.
+    """Copy tangent vectors from ``y (n (1 + k),)`` into order 0 of their series.
 
-    Those of four vectors begin at ``first``, those of the next four ``stride`` columns further.
+    A block holds four vectors, component by component. The first block begins at column ``first``, the next
+    block ``stride`` columns further.
     """
     count = len(y) // n - 1
     for vector in range(whole_registers(count, NARROW)):
@@ -101,7 +102,7 @@ def spread_tangents(y, n, series, first, stride):
 
 @register_jitable
 def gather_tangents(series, order, n, first, stride, y):
-    """The inverse of ``spread_tangents`` from row ``order``."""
+    """The inverse of ``spread_tangents``, from row ``order``."""
     for vector in range(len(y) // n - 1):
         column = first + vector // NARROW * stride + vector % NARROW
         for i in range(n):
@@ -111,7 +112,7 @@ def gather_tangents(series, order, n, first, stride, y):
 @overload(evaluate, jit_options=HERE)
 def _overload_evaluate(series, order, s, first, width):
     def in_registers(series, order, s, first, width):
-        # Sums in one loop do not wait for each other.
+        # The sums in one loop are independent, so they run in parallel.
         four = width // (4 * NARROW) * 4 * NARROW
         _evaluate_in_registers(series, order, s, first, four, NARROW, 4, False)
         two = (width - four) // (2 * NARROW) * 2 * NARROW
@@ -132,16 +133,17 @@ def _overload_evaluate_with_sizes(series, order, s, first, width):
 
 
 def _registers(width, widest):
-    """First column and width of each register, the widest first."""
+    """First column and width of each register, the widest registers first."""
     whole = width // widest * widest
     wide = [(place, widest) for place in range(0, whole, widest)]
     return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
 
 
 def _as_known(*kinds):
-    """The types of numbers that instructions are written for: what the compiler knows stays known.
+    """Types of the integer arguments of an intrinsic; literals stay literals.
 
-    Numba looks for what it has written by these types alone. It would take one width for another.
+    Numba looks up compiled code by these types alone: without literals, it would take the code for another
+    width.
     """
     return tuple(kind if isinstance(kind, types.Literal) else types.intp for kind in kinds)
 
@@ -151,7 +153,7 @@ def write_convolution(builder, rows, order, inset, left, first, width, widest, p
     registers = _registers(width, widest)
     sums_at_once = max(1, AT_ONCE // len(registers))
     number = order.type
-    # The lowest orders of the columns come first: what was written last is the slowest to read.
+    # Start with the lowest orders of the columns: the orders written last are the slowest to read.
     factor = rows.walker(builder.sub(order, inset), left)
     other = rows.walker(inset, first)
     totals = [
@@ -187,9 +189,10 @@ def write_convolution(builder, rows, order, inset, left, first, width, widest, p
 
 @intrinsic(prefer_literal=True)
 def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes, at_once, sizes):
-    """Horner's scheme in ``s**2`` for even and for odd terms, on turns of ``at_once`` registers.
+    """Horner's scheme in ``s**2``, for even and odd terms separately.
 
-    Each has ``lanes`` columns. Every step of the scheme waits for the one before: so there are half as many.
+    Each turn of the loop works on ``at_once`` registers of ``lanes`` columns each. Every step of Horner's
+    scheme waits for the previous step: in ``s**2`` there are half as many steps.
     """
     known = _as_known(first, width, lanes, at_once, sizes)
     lanes, at_once, with_sizes = (each.literal_value for each in (lanes, at_once, sizes))
@@ -211,7 +214,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
 
         def one_turn(column):
             walker = rows.walker(order, column)
-            # The sums that begin with the last term, and those that begin with the one before it.
+            # One sum begins with the last term, the other with the last but one.
             last, other = (
                 [cgutils.alloca_once_value(builder, term) for term in terms_of(rows.walk(walker, -1))]
                 for _ in range(2)
@@ -279,7 +282,7 @@ def write_combination_of_tangents(builder, rows, order, table, width, first, n):
 
 
 def write_spread(builder, y, length, n, rows, first, stride):
-    """The instructions of ``spread_tangents``: lanes without a vector are zero."""
+    """The instructions of ``spread_tangents``; lanes without a vector are zero."""
     number = first.type
     count = builder.sub(builder.sdiv(length, number(n)), number(1))
     groups = builder.sdiv(builder.add(count, number(NARROW - 1)), number(NARROW))
