@@ -1,7 +1,7 @@
-"""Four numbers in two parts each, what is rounded and what it lacks: twice the digits of one number.
+"""Arithmetic on four numbers in two parts each, rounded value and rounding error: twice the digits.
 
-What a product and a sum lose in rounding are numbers again (Dekker 1971, doi:10.1007/BF01397083; Ogita, Rump
-and Oishi 2005, doi:10.1137/030601818).
+The rounding error of a product or a sum is itself a floating-point number (Dekker 1971,
+doi:10.1007/BF01397083; Ogita, Rump and Oishi 2005, doi:10.1137/030601818).
 """
 
 import numpy as np
@@ -9,14 +9,14 @@ import numpy as np
 from hybrid.kernels.arithmetic.lanes import built_in, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
 
-# Times this, less the number itself, is a number with the upper half of its digits.
+# Factor ``U`` that splits a number ``x``: ``U x - (U x - x)`` has the upper half of the digits of ``x``.
 UPPER_HALF = 2.0**27 + 1.0
 
 
 def divided_dot_product(factors, highs, lows, by):
-    """The sum of ``factors[i] (highs[i] + lows[i])`` over ``by`` in two parts, the first the whole, rounded.
+    """The sum of ``factors[i] (highs[i] + lows[i])``, divided by ``by``: rounded value and rounding error.
 
-    The factors and ``by`` are numbers, all else is four numbers at once.
+    The factors and ``by`` are single numbers; all else is four numbers at once.
     """
     total, rest = np.zeros(NARROW), np.zeros(NARROW)
     for factor, high, low in zip(factors, highs, lows, strict=True):
@@ -33,7 +33,7 @@ def divided_dot_product(factors, highs, lows, by):
 
 
 def _lost(factor, lanes, product):
-    """What ``factor * lanes`` is beyond ``product``, to which it was rounded."""
+    """Rounding error of ``product``, which is ``factor * lanes`` rounded."""
     (a, b), (c, d) = _halves(factor), _halves(lanes)
     return (a * c - product) + a * d + b * c + b * d
 

@@ -1,8 +1,8 @@
 """Interval arithmetic: bounds for a range and for a slope, rounded outwards.
 
-An interval is two numbers, its ends. The whole line stands for a value that is undefined somewhere, and for
-the slope of a function that may jump. Zero times infinity is zero here: an infinite end stands for numbers
-without a bound, and all of them times zero are zero.
+An interval is two numbers: its ends. The whole line stands for a value that is undefined somewhere on the
+interval, and for the slope of a function that may jump. Zero times infinity is zero here: an infinite end
+means that the numbers have no bound, but each of them is finite and gives zero.
 """
 
 import math
@@ -13,19 +13,19 @@ from numba import njit
 from hybrid.kernels.arithmetic import operations as op
 from hybrid.kernels.types.layout import INLINE, KERNEL
 
-# Relative error of an operation or of a function of the C library, with room to spare.
+# Relative error of an operation or of a function of the C library, with a margin.
 ROUNDING = 4.5e-16
 # A cube root is a power with a rounded exponent.
 ROUNDING_OF_CUBE_ROOT = 2e-14
 HUGE = 1.7976931348623157e308
 PI = math.pi
-# Beyond this a sine has no digits left.
+# The sine of an argument beyond this has no digits left.
 FAR = 1e14
 
 
 @njit(**INLINE)
 def widened(low, high, share):
-    """The interval with its ends moved outwards by a share of themselves. Exact zeros stay."""
+    """The interval with each end moved outwards by a share of itself; exact zeros stay."""
     if not low <= high:
         return -math.inf, math.inf
     low, high = min(low, HUGE), max(high, -HUGE)
@@ -70,7 +70,7 @@ def quotient(a, b, c, d):
 
 @njit(**INLINE)
 def hull(a, b, c, d):
-    """The interval around both."""
+    """The smallest interval that contains both."""
     return min(a, c), max(b, d)
 
 
@@ -85,7 +85,7 @@ def whole_power(low, high, exponent):
 
 @njit(**KERNEL)
 def whole_power_of_positive(low, high, exponent):
-    """The same for an exponent that is not negative."""
+    """As ``whole_power``, for an exponent that is not negative."""
     if exponent == 0:
         return 1.0, 1.0
     one, other = low ** float(exponent), high ** float(exponent)
@@ -99,7 +99,7 @@ def whole_power_of_positive(low, high, exponent):
 
 @njit(**KERNEL)
 def fixed_power(low, high, exponent):
-    """``[low, high] ** exponent`` where the base is not negative; a base below zero is left out."""
+    """``[low, high] ** exponent`` for bases that are not negative; the part below zero is left out."""
     if high < 0.0:
         return -math.inf, math.inf
     low = max(low, 0.0)
@@ -174,7 +174,7 @@ def angle(a, b, c, d):
 
 @njit(**KERNEL)
 def truth(low, high):
-    """1 or 0 where all numbers of the interval are true or false, else 0.5."""
+    """1 if all numbers of the interval are true, 0 if all are false, else 0.5."""
     if low == 0.0 == high:
         return 0.0
     return 1.0 if low > 0.0 or high < 0.0 else 0.5
@@ -182,7 +182,7 @@ def truth(low, high):
 
 @njit(**INLINE)
 def _certain(value):
-    """The interval of a truth value; 0.5 is an unknown one."""
+    """The interval of a truth value; 0.5 stands for an unknown truth value."""
     if value == 0.5:
         return 0.0, 1.0
     return value, value
@@ -246,7 +246,7 @@ def range_of(code, low, high):
 
 @njit(**KERNEL)
 def range_of_rare(code, low, high):
-    """The same for functions that are seldom in guards."""
+    """As ``range_of``, for functions that are rare in guards."""
     if code == op.TAN:
         return tangent_of(low, high)
     if code == op.FLOOR:
@@ -265,7 +265,7 @@ def range_of_rare(code, low, high):
         if high < 1.0:
             return -math.inf, math.inf
         return widened(math.acosh(max(low, 1.0)), math.acosh(high), 2.0 * ROUNDING)
-    # The others are defined between -1 and 1.
+    # The remaining functions are defined between -1 and 1.
     if high < -1.0 or low > 1.0:
         return -math.inf, math.inf
     low, high = max(low, -1.0), min(high, 1.0)
@@ -279,7 +279,7 @@ def range_of_rare(code, low, high):
 
 @njit(**KERNEL)
 def slope_of(code, low, high, least, most):
-    """Bounds for the slope of a function of one operand, whose range is ``[least, most]``.
+    """Bounds for the slope of a function of one operand; its range there is ``[least, most]``.
 
     A function that jumps upwards inside the interval has slopes from zero to infinity.
     """
@@ -323,10 +323,10 @@ def slope_of(code, low, high, least, most):
 
 @njit(**KERNEL)
 def slope_of_rare(code, low, high, least, most):
-    """The same for functions that are seldom in guards."""
+    """As ``slope_of``, for functions that are rare in guards."""
     if code == op.TAN:
         if least == -math.inf:
-            # It jumps down at its pole.
+            # The tangent jumps down at its pole.
             return -math.inf, math.inf
         below, above = whole_power(least, most, 2)
         return 1.0 + below, 1.0 + above

@@ -1,6 +1,6 @@
 """Four numbers in one vector register, as a type of the compiler: arithmetic on four tangent vectors at once.
 
-In plain Python ``Lanes`` are arrays ``(4,)``, so that what is written for one runs as the other.
+In plain Python ``Lanes`` are arrays ``(4,)``, so the same code runs compiled and in plain Python.
 """
 
 import operator
@@ -15,7 +15,7 @@ from hybrid.kernels.types.codes import NARROW, WIDE
 from hybrid.kernels.types.options import PartCompiler
 
 FUSED = ("contract",)
-# Small and called at every order: the call would cost as much as the work.
+# These functions are small and run at every order: without inlining, the call would cost as much as the work.
 HERE = {"_nrt": False, "forceinline": True, "pipeline_class": PartCompiler}
 
 
@@ -30,7 +30,7 @@ LANES = LanesType()
 
 
 def vector_of(width):
-    """The type of a register of that many numbers."""
+    """The type of a register of ``width`` numbers."""
     return ir.VectorType(ir.DoubleType(), width)
 
 
@@ -49,7 +49,7 @@ def everywhere(builder, number, width):
 
 
 def built_in(builder, name, width, *arguments):
-    """Call of a function that the compiler has for vectors, ``fabs`` for one."""
+    """Call a function that the compiler provides for vectors, such as ``fabs``."""
     kind = vector_of(width)
     function = ir.FunctionType(kind, [kind] * len(arguments))
     return builder.call(
@@ -63,7 +63,7 @@ def multiply_add(builder, a, b, c):
 
 
 class Matrix:
-    """Writes the instructions that find the entries of a matrix: where its data begin, and its columns."""
+    """Writes the instructions that address entries of a matrix with this data pointer and column count."""
 
     def __init__(self, builder, data, columns):
         self.builder, self.data, self.columns = builder, data, columns
@@ -78,19 +78,19 @@ class Matrix:
         return cgutils.alloca_once_value(self.builder, self.address(row, column))
 
     def walk(self, walker, rows):
-        """Move on by a number of rows; returns where it was."""
+        """Move a walker on by a number of rows; returns the address that it held."""
         builder = self.builder
         here = builder.load(walker)
         builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
         return here
 
     def beside(self, address, columns):
-        """Address of an entry that many columns further."""
+        """Address of the entry ``columns`` further in the same row."""
         return self.builder.gep(address, [self.columns.type(columns)])
 
 
 def matrix_of(context, builder, kind, matrix):
-    """A matrix of numba's."""
+    """The ``Matrix`` of a numba array."""
     array = context.make_array(kind)(context, builder, matrix)
     return Matrix(builder, array.data, cgutils.unpack_tuple(builder, array.shape)[1])
 
@@ -101,13 +101,13 @@ def read(builder, address, width):
 
 
 def write(builder, vector, address):
-    """Put a vector where it belongs."""
+    """Store a vector at an address."""
     builder.store(vector, builder.bitcast(address, vector.type.as_pointer()), align=8)
 
 
 @register_jitable
 def whole_registers(width, register):
-    """The least number of columns, no less than ``width``, that fill vector registers."""
+    """``width`` columns, rounded up to whole vector registers of ``register`` columns."""
     return (width + register - 1) // register * register
 
 
@@ -117,7 +117,7 @@ def load(matrix, row, column):
 
 
 def store(matrix, row, column, lanes):
-    """Write four entries of a row, from a register or all from one number."""
+    """Write four entries of a row, from a register or from one number for all."""
     matrix[row, column : column + NARROW] = lanes
 
 
@@ -127,13 +127,13 @@ def store_down(matrix, row, column, stride, lanes):
 
 
 def store_row(matrix, row, column, numbers):
-    """Write a tuple of numbers side by side, in registers that are filled up with zeros."""
+    """Write a tuple of numbers side by side, in registers padded with zeros."""
     filled = sum(_widths(len(numbers)))
     matrix[row, column : column + filled] = [*numbers, *[0.0] * (filled - len(numbers))]
 
 
 def _widths(count):
-    """The registers that a row of that many numbers is written in."""
+    """Widths of the registers in which a row of ``count`` numbers is written."""
     rest = count % WIDE
     return [WIDE] * (count // WIDE) + ([] if rest == 0 else [NARROW if rest <= NARROW else WIDE])
 
@@ -190,12 +190,12 @@ def write_row(builder, matrix, row, column, numbers):
 
 
 def square_root(lanes):
-    """Square root of each."""
+    """Square root of each number."""
     return np.sqrt(lanes)
 
 
 def magnitude(lanes):
-    """Absolute value of each."""
+    """Absolute value of each number."""
     return abs(lanes)
 
 
@@ -205,12 +205,12 @@ def four_times(number):
 
 
 def larger(a, b):
-    """The larger of each two; ``b`` where they cannot be compared."""
+    """The larger number in each lane; ``b`` where one is nan."""
     return np.where(a > b, a, b)
 
 
 def largest(lanes):
-    """The largest of the four."""
+    """The largest of the four numbers."""
     return max(lanes)
 
 
@@ -234,7 +234,7 @@ def _operation(instruction):
 
 
 def _function_of_each(name):
-    """An intrinsic for a function that the compiler has for vectors."""
+    """An intrinsic for a function that the compiler provides for vectors."""
 
     @intrinsic
     def call(typing_context, lanes):

@@ -9,7 +9,7 @@ from hybrid.kernels.types.layout import KERNEL
 def factorise(matrix, pivots, n):
     """Replace the leading ``(n, n)`` of ``matrix`` by its LU factors; false if it is singular or not finite.
 
-    ``pivots (n,)`` receives the row each column's pivot came from.
+    ``pivots (n,)`` receives the row from which the pivot of each column came.
     """
     for column in range(n):
         pivot = column

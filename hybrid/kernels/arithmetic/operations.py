@@ -4,13 +4,13 @@ A row of a program is ``(operation, a, b, c)``. The operands ``a``, ``b`` and ``
 from the start of the program, unless the operation says otherwise.
 """
 
-# Leaves: ``a`` is the index of a number, a parameter or a state.
+# Leaves: ``a`` is the index of a number, a parameter or a component of the state.
 NUMBER = 0
 PARAMETER = 1
 STATE = 2
 TIME = 3
 
-# Arithmetic. The exponent of WHOLE_POWER is ``b`` itself, that of FIXED_POWER is the number with index ``b``.
+# Arithmetic. The exponent of WHOLE_POWER is ``b`` itself; for FIXED_POWER it is the number with index ``b``.
 SUM = 4
 PRODUCT = 5
 QUOTIENT = 6
@@ -26,7 +26,7 @@ LESS_EQUAL = 13
 EQUAL = 14
 AND = 15
 OR = 16
-# ``b`` where ``a`` holds, else ``c``.
+# ``b`` if ``a`` holds, else ``c``.
 SELECT = 17
 
 # Functions of one operand.

@@ -1,4 +1,4 @@
-"""Logarithms and powers to base two, to half a percent, without a call: enough for the length of a step."""
+"""Logarithms and powers to base two, to half a percent, inline: accurate enough for step lengths."""
 
 from llvmlite import ir
 from numba import njit, types
@@ -8,7 +8,7 @@ from hybrid.kernels.arithmetic.lanes import LANES, vector_of
 from hybrid.kernels.types.codes import NARROW
 from hybrid.kernels.types.layout import INLINE
 
-# A float is ``2 ** (exponent - BIAS)`` times its mantissa, whose bits are the lower ones.
+# A float is ``2 ** (exponent - BIAS)`` times its mantissa; the mantissa is in the lower bits.
 BIAS = 1023
 BITS_OF_MANTISSA = 52
 MANTISSA = 2.0**BITS_OF_MANTISSA
@@ -18,7 +18,7 @@ BULGE = 0.346
 
 @intrinsic
 def _exponent_and_mantissa(typing_context, lanes):
-    """The exponents of four positive numbers, and what their mantissas are above 1."""
+    """The exponents of four positive numbers, and their mantissas minus 1."""
 
     def generate(context, builder, signature, arguments):
         whole = ir.VectorType(ir.IntType(64), NARROW)
@@ -31,7 +31,7 @@ def _exponent_and_mantissa(typing_context, lanes):
 
         bits = builder.bitcast(arguments[0], whole)
         exponent = builder.lshr(bits, everywhere(BITS_OF_MANTISSA))
-        # A small integer in the last bits of 2**52 is that much more than 2**52.
+        # A small integer in the last bits of the float 2**52 adds its value to the float.
         large = int(BIAS + BITS_OF_MANTISSA) << BITS_OF_MANTISSA
         exponent = builder.fsub(
             as_numbers(builder.or_(exponent, everywhere(large))),
@@ -55,14 +55,14 @@ def _from_bits(typing_context, bits):
 
 @njit(**INLINE)
 def binary_logarithms(lanes):
-    """About ``log2`` of four numbers; -1023 for zero, 1024 or more for what is not finite."""
+    """About ``log2`` of four numbers; -1023 for zero, 1024 or more for infinity and nan."""
     exponent, mantissa = _exponent_and_mantissa(lanes)
     return exponent + mantissa + BULGE * mantissa * (1.0 - mantissa)
 
 
 @njit(**INLINE)
 def power_of_two(x):
-    """About ``2 ** x``; what would not fit is cut off."""
+    """About ``2 ** x``; ``x`` is limited to -1000 to 1000."""
     x = min(max(x, -1000.0), 1000.0) + BIAS
     whole = int(x)
     rest = x - whole

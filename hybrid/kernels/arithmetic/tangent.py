@@ -13,22 +13,22 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import KERNEL
 
-# Below this length a unit vector's image is rounding: the map that produced it is singular.
+# The image of a unit vector below this length is only rounding: the map that produced it is singular.
 COLLAPSED = 1e-13
-# Strain of all jumps since the tangent vectors were last orthonormalised from which on it is done again: a
-# condition number of a thousand costs three digits of the vectors that grow less.
+# Tangent vectors are orthonormalised once the strain of all jumps since the last orthonormalisation reaches
+# this limit. A condition number of a thousand costs three digits of the vectors that grow less.
 STRAINED = math.log(1e3)
 # Tangent vectors are orthonormalised between steps as soon as the product of their sines (see
-# ``independence``) is below one of these, squared here. The solver's error is relative to a whole vector, and
-# what counts is the vector's part orthogonal to the vectors before it: that part loses as many digits as the
-# product has. An exact step has an error of rounding alone; the step of a Runge-Kutta method has to evaluate
-# the rates once more afterwards.
+# ``independence``) is below the limit of the propagator. These limits are squared. The solver's error is
+# relative to a whole vector, but only the part orthogonal to the previous vectors counts: a product of
+# ``10**-d`` costs ``d`` digits of that part. An exact step has rounding errors only. A Runge-Kutta method has
+# to evaluate the rates once more after orthonormalisation.
 CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-3**2, 1e-1**2, 1e-2**2
-# They are looked at after so many steps: an exact one brings them no closer than a factor of a few thousand.
-# A stiff contact stretches all of them along the speed, and shrinks them again before it ends, which is no
-# sign of exponents that are far apart.
+# Steps between two checks. An exact step brings the vectors closer by a factor of a few thousand at most. A
+# stiff contact stretches all vectors along the speed and shrinks them again before it ends: such stretching
+# is no sign of exponents that are far apart.
 STEPS_IN_EXACT, STEPS_IN_CONTACT = 2, 16
-# Tangent vectors are also orthonormalised where a square of their length leaves this range.
+# Tangent vectors are also orthonormalised when the square of a length leaves this range.
 SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 
 
@@ -36,10 +36,10 @@ SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 def orthonormalise(y, n, k, growth, threshold):
     """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``.
 
-    The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt, twice, which
-    is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold`` times the longest image
-    has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of vectors
-    of which only rounding is left, though none had to collapse.
+    The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt runs twice,
+    which is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold`` times the longest
+    image has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of
+    vectors that have not collapsed by this threshold although only rounding is left of them.
     """
     indistinct = 0
     longest = 0.0
@@ -75,12 +75,12 @@ def orthonormalise(y, n, k, growth, threshold):
 
 @njit(**KERNEL)
 def independence(y, n, k, gram):
-    """Square of the product of the sines between each of ``k`` tangent vectors and the span of those before.
+    """Squared product of the sines between each of ``k`` tangent vectors and the span of the previous ones.
 
-    It is 1 if they are orthogonal, 0 if they are linearly dependent, and -1 if the length of one is near the
-    limits of floating-point numbers. Zero vectors count for nothing. ``gram``, at least ``(k, k)``, is
-    scratch for the Cholesky factorisation of the Gram matrix, without square roots: the quotients are below
-    its diagonal, the numerators above.
+    The result is 1 if the vectors are orthogonal, 0 if they are linearly dependent, and -1 if the length of
+    one of them is near the limits of floating-point numbers. Zero vectors are skipped. ``gram``, at least
+    ``(k, k)``, is scratch for the Cholesky factorisation of the Gram matrix without square roots: the
+    quotients are below the diagonal, the numerators above.
     """
     product = 1.0
     for c in range(k):
@@ -109,7 +109,7 @@ def independence(y, n, k, gram):
 
 @njit(**KERNEL)
 def keep_apart(model, run, mode, tangents, gram):
-    """After a step: orthonormalise the tangent vectors if they have come too close for its propagator."""
+    """After a step, orthonormalise the tangent vectors if they are too close for the mode's propagator."""
     kind, closest, steps = model.propagator[mode], CLOSE_IN_TAYLOR, 1
     if kind == EXACT:
         closest, steps = CLOSE_IN_EXACT, STEPS_IN_EXACT
@@ -145,10 +145,10 @@ def multiply(matrix, y, n, tangents, image):
 
 @njit(**KERNEL)
 def strain(matrix, n, log_determinant):
-    """How far a matrix is from one that keeps all angles: 0 for those, infinite if it is singular.
+    """How much a matrix distorts angles: 0 if it keeps all angles, infinite if it is singular.
 
-    ``n log(|Xi|_F / sqrt(n)) - log|det Xi|``: its condition number is at most 2 times the exponential of that
-    (Guggenheimer, Edelman and Johnson 1995, College Mathematics Journal 26, 2-5).
+    The strain is ``n log(|Xi|_F / sqrt(n)) - log|det Xi|``. The condition number is at most 2 times its
+    exponential (Guggenheimer, Edelman and Johnson 1995, College Mathematics Journal 26, 2-5).
     """
     square = 0.0
     for i in range(n):
@@ -159,9 +159,10 @@ def strain(matrix, n, log_determinant):
 
 @njit(**KERNEL)
 def solve(system, n, out):
-    """Solve the linear equations in the rows of ``system (n, n + 1)``, overwritten; the last column is known.
+    """Solve the linear equations in the rows of ``system (n, n + 1)``.
 
-    Where they are singular to rounding some unknowns are zero, and equations that contradict are left.
+    The last column is the right-hand side. ``system`` is overwritten. If it is singular to rounding, some
+    unknowns are set to zero and contradictory equations are ignored.
     """
     for column in range(n):
         out[column] = 0.0
@@ -194,10 +195,11 @@ def solve(system, n, out):
 
 @njit(**KERNEL)
 def log_abs_determinant(matrix, magnitude, n):
-    """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if singular to rounding.
+    """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if it is singular to rounding.
 
-    ``magnitude``, scratch of at least that shape, follows the size of the terms that each entry was made of:
-    a pivot that is only their rounding is a zero, while one that is merely small (as near a grazing) is not.
+    ``magnitude``, scratch of at least that shape, holds the size of the terms that made up each entry. A
+    pivot within the rounding of these terms counts as zero; a pivot that is merely small, as near a grazing,
+    does not.
     """
     total = 0.0
     for i in range(n):

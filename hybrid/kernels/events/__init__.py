@@ -1,1 +1,1 @@
-"""Where guards cross zero on a step, and on which side of them a state is."""
+"""Where guards cross zero on a step, and on which side of each guard a state is."""

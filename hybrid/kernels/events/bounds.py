@@ -1,10 +1,11 @@
 """Bounds for a guard and for its slope over a piece of a step, from the guard's own expression.
 
 A *program* is the expression of a guard as a list of operations, written by
-``hybrid.compiler.bounds.program``. It runs on intervals here, forwards: each row gives the range of a
-subexpression over the piece, the range of its derivative along the step, and an interval for its value in
-the middle of the piece. The mean value theorem makes the first from the other two where that is narrower.
-The state along the step is a *path*: a polynomial in the step's variable, one column per component.
+``hybrid.compiler.bounds.program``. The program runs on intervals here, from the first row to the last: each
+row gives the range of a subexpression over the piece, the range of its derivative along the step, and an
+interval for its value in the middle of the piece. The mean value theorem derives a range from the other two
+intervals; where that range is narrower, it is used. The state along the step is a *path*: a polynomial in the
+step's variable, one column per component.
 """
 
 import math
@@ -28,13 +29,13 @@ from hybrid.kernels.arithmetic.intervals import (
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, MATRIX, PART, PROGRAMS, VECTOR
 
-# A radius over which no slope makes a range narrower.
+# Over a radius this large the mean value theorem makes no range narrower.
 FAR = 1e300
 
 
 @njit(**INLINE)
 def _narrowed(row, radius):
-    """Intersect a row's range with what its value in the middle and its slope say of it."""
+    """Intersect a row's range with the range that follows from its slope and its value in the middle."""
     reach = radius * max(abs(row[LEAST_SLOPE]), abs(row[MOST_SLOPE])) if radius > 0.0 else 0.0
     reach += 2.0 * EPSILON * reach
     low, high = row[LOW_MIDDLE] - reach, row[HIGH_MIDDLE] + reach
@@ -42,7 +43,7 @@ def _narrowed(row, radius):
         row[LOW] = low
     if high < row[HIGH]:
         row[HIGH] = high
-    # Rounding alone may cross the ends of two enclosures of one point.
+    # By rounding alone, two enclosures of one point may not overlap.
     if not row[LOW] <= row[HIGH]:
         row[LOW], row[HIGH] = min(row[LOW_MIDDLE], row[HIGH]), max(row[HIGH_MIDDLE], row[LOW])
     if math.isnan(row[LOW]) or math.isnan(row[HIGH]):
@@ -51,14 +52,14 @@ def _narrowed(row, radius):
 
 @njit(**INLINE)
 def _whole_line(row):
-    """A subexpression of which nothing is known."""
+    """Set range and slope of a subexpression to the whole line: nothing is known about them."""
     row[LOW], row[HIGH] = -math.inf, math.inf
     row[LEAST_SLOPE], row[MOST_SLOPE] = -math.inf, math.inf
 
 
 @njit(**KERNEL)
 def _bound_state(path, column, order, middle, radius, row):
-    """A component of the path around ``middle``: a parabola, and bounds for what it leaves out.
+    """Bound a component of the path around ``middle`` by a parabola and its remainder.
 
     The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``.
     """
@@ -90,7 +91,7 @@ def _bound_state(path, column, order, middle, radius, row):
 
 @njit(**KERNEL)
 def _bound_time(path, clock, order, start, pace, middle, radius, row):
-    """Time along the step: ``start`` plus ``pace`` times the variable, or plus the column of a clock."""
+    """Bound the time along the step: ``start`` plus ``pace`` times the variable, or plus a clock's column."""
     if clock >= 0:
         _bound_state(path, clock, order, middle, radius, row)
     else:
@@ -155,7 +156,7 @@ def _bound_fixed_power(row, a, exponent):
 
 @njit(**KERNEL)
 def _bound_larger(row, a, b):
-    """The larger of two; where neither wins throughout, its slope is that of one or the other."""
+    """Bound the larger of two; if neither is larger throughout, the slope is that of either."""
     row[LOW], row[HIGH] = max(a[LOW], b[LOW]), max(a[HIGH], b[HIGH])
     row[LOW_MIDDLE], row[HIGH_MIDDLE] = (
         max(a[LOW_MIDDLE], b[LOW_MIDDLE]),
@@ -257,7 +258,7 @@ def _bound_binary(code, row, a, b):
 
 @njit(**KERNEL)
 def _run(programs, transition, registers, radius):
-    """Run the operations of a guard's program, whose leaves are in place; returns the index of the last."""
+    """Run the operations of a guard's program, whose leaves are set; returns the index of its last row."""
     first, stop = programs.first[transition], programs.first[transition + 1]
     for place in range(first, stop):
         code = programs.rows[place, 0]
@@ -288,7 +289,7 @@ def _bound_constant(row, value):
 
 @njit(**INLINE)
 def _constant_leaf(programs, place, row):
-    """Put a number or a parameter into its row; says whether the leaf is one of these."""
+    """Set the row of a number or a parameter; returns whether the leaf is a number or a parameter."""
     code, a = programs.rows[place, 0], programs.rows[place, 1]
     if code == op.NUMBER:
         _bound_constant(row, programs.numbers[a])
@@ -302,11 +303,11 @@ def _constant_leaf(programs, place, row):
     **PART,
 )
 def bound_guard(programs, transition, path, order, clock, start, pace, middle, radius, registers):
-    """Bounds of a guard over ``middle +- radius`` on a path, in the row of ``registers`` that it returns.
+    """Bounds of a guard over ``middle +- radius`` on a path; returns their row in ``registers``.
 
-    ``path (>= order + 1, columns)`` holds the coefficients of the state's components as powers of the step's
-    variable. Time is ``start`` plus ``pace`` times the variable; or plus the column ``clock`` of the path,
-    unless that is negative. The slope is that in the variable.
+    ``path (>= order + 1, columns)`` holds the coefficients of the state's components in powers of the step's
+    variable. Time is ``start`` plus ``pace`` times the variable if ``clock`` is negative; otherwise it is
+    ``start`` plus the column ``clock`` of the path. The slope is the derivative by the step's variable.
     """
     first = programs.first[transition]
     for place in range(first, programs.first[transition + 1]):
@@ -325,8 +326,8 @@ def bound_guard(programs, transition, path, order, clock, start, pace, middle, r
 def spread_by_rounding(programs, transition, t, x, scale, share, registers):
     """How far a guard may be from its value at ``(t, x)`` when each argument is off by its rounding.
 
-    That is ``share`` of the sizes in ``scale (n,)`` for the state, and of the time for the time. The distance
-    has a minus sign where the guard may jump within that.
+    A component of the state may be off by ``share`` times its size in ``scale (n,)``, the time by ``share``
+    times itself. The returned distance is negative if the guard may jump within this rounding.
     """
     first = programs.first[transition]
     for place in range(first, programs.first[transition + 1]):

@@ -1,9 +1,9 @@
 """The first change of sign of a guard on a step, proved by bounds on the guard itself.
 
 The step is halved until on each piece the guard has no zero, or its slope keeps its sign, or the piece is as
-short as rounding allows. A slope that keeps its sign leaves room for one change of sign at most, which the
-signs at the ends of the piece decide. This holds for roots of any order, for kinks and for jumps: where a
-guard jumps across zero the change of sign is the jump.
+short as rounding allows. If the slope keeps its sign, the guard changes sign at most once, and the signs at
+the ends of the piece decide whether it does. This holds for roots of any order, for kinks and for jumps: if a
+guard jumps across zero, the change of sign is at the jump.
 """
 
 import math
@@ -24,33 +24,33 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
-# Instead of a place on the step.
+# Returned instead of a place on the step if there is none.
 NOWHERE = -1.0
-# After so many pieces the step is cut to what has been proved of it, if that is more than a small share. If
-# not, the signs at the ends of the pieces decide, and the run says so.
+# After this many pieces the step is cut to its proved part, if that is more than a small share of the step.
+# Otherwise the signs at the ends of the pieces decide, and the run counts them as unproved.
 MOST_PIECES = 3000
 SMALL_SHARE = 1e-2
-# Pieces longer than this share of the step are not asked whether they lie within the tolerances.
+# Pieces longer than this share of the step are not tested for lying within the tolerances.
 SHORT_PIECE = 1e-2
-# A guard that comes closer to zero than this share of its largest value on a piece may be a touch.
+# A guard that comes closer to zero than this share of its largest value on a piece may touch zero.
 CLOSE = 1e-4
-# A piece lies within rounding if nowhere on it the guard is farther from zero than this many times the
+# A piece lies within rounding if, all over it, the guard is no farther from zero than this many times the
 # rounding in its middle.
 WITHIN_ROUNDING = 4.0
-# A range is no wider than that of the middle if it is not wider by more than this factor.
+# A range up to this factor wider than the range in the middle counts as no wider.
 NO_BETTER = 1.01
 MOST_ROOT_STEPS = 200
-# A guard that is zero at the start of the step is not looked at before this share of the step.
+# A guard that is zero at the start of the step is searched from this share of the step on.
 SETTLED = 64.0 * EPSILON
-# Parts of a step at whose ends a guard that could not be traced is looked at.
+# Number of parts of a step; a guard that could not be traced is evaluated at their ends.
 SAMPLES = 32
-# In how many places of a step a guard is looked at whose speed and acceleration are zero too.
+# Number of places at which a guard is evaluated whose speed and acceleration are zero too.
 PLACES_AT_REST = 8
 
 
 @njit(**INLINE)
 def _shifted(row, base, tilt, low, high):
-    """Take ``base + tilt * place`` out of the bounds over the places from ``low`` to ``high``."""
+    """Subtract ``base + tilt * place`` from the bounds over the places from ``low`` to ``high``."""
     middle = 0.5 * (low + high)
     row[LOW] -= base + max(tilt * low, tilt * high)
     row[HIGH] -= base + min(tilt * low, tilt * high)
@@ -62,9 +62,9 @@ def _shifted(row, base, tilt, low, high):
 
 @njit(**INLINE)
 def _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work):
-    """Row of ``work.registers`` with the bounds of a guard at one place: what rounding leaves unknown.
+    """Row of ``work.registers`` with the bounds of a guard at one place, as wide as its rounding.
 
-    The guard is looked at without ``base + tilt * place``, its ``onset.known_part``.
+    ``base + tilt * place``, the ``onset.known_part`` of the guard, is subtracted.
     """
     last = model.bound(
         model.programs, transition, path, order, clock, start, pace, place, 0.0, work.registers
@@ -86,7 +86,8 @@ def _sample(model, transition, path, order, clock, start, pace, place, work):
 def _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work):
     """Value of a guard at one place, where ``row`` has its bounds.
 
-    Within rounding of a jump or of a vertical tangent the bounds know nothing: the function itself does.
+    Within rounding of a jump or of a vertical tangent the bounds are useless: the compiled function is
+    evaluated instead.
     """
     unbounded = not (row[MOST_SLOPE] < math.inf and row[LEAST_SLOPE] > -math.inf)
     if unbounded and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
@@ -96,7 +97,7 @@ def _value_at(model, transition, path, order, clock, start, pace, place, row, ba
 
 @njit(**INLINE)
 def _least_slope(row):
-    """The flattest slope that the bounds leave a guard at a place; nan if they do not know its sign.
+    """The flattest slope of a guard at a place that its bounds allow; nan if they leave its sign open.
 
     Near a vertical tangent the bounds are wide: a steeper slope would end Newton's method before the root.
     """
@@ -107,16 +108,17 @@ def _least_slope(row):
 
 @njit(**KERNEL)
 def certain_sign(model, transition, path, order, clock, start, pace, place, base, tilt, work):
-    """Sign of a guard at a place of the step, 0 if rounding could have made it."""
+    """Sign of a guard at a place of the step, 0 if rounding leaves it open."""
     row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)]
     return 1 if row[LOW] > 0.0 else (-1 if row[HIGH] < 0.0 else 0)
 
 
 @njit(**KERNEL)
 def _still_hidden(model, transition, path, order, clock, start, pace, place, side, base, tilt, work):
-    """What is taken out of a guard from a place on: nothing once the whole guard is on its side for certain.
+    """The base and tilt to subtract from a guard from a place on.
 
-    Its later roots, which may be flat, are those of the guard itself.
+    Both are zero once the whole guard is certain to be on its side: later roots, which may be flat, are those
+    of the whole guard.
     """
     whole = certain_sign(model, transition, path, order, clock, start, pace, place, 0.0, 0.0, work)
     if whole == side:
@@ -130,9 +132,9 @@ def root_in_bracket(
 ):
     """Where a guard changes its sign between two places; it is on ``side`` at ``low`` and not at ``high``.
 
-    Newton's method on the guard, kept in the bracket; halving where it does not settle. The place returned is
-    the end of the bracket beyond the change of sign, or the root. At the start of the step the guard may be
-    on the other side already: that is where it crosses.
+    Newton's method on the guard is kept in the bracket, and replaced by halving where it does not converge.
+    The place returned is the end of the bracket beyond the change of sign, or the root. If the guard is on
+    the other side already at the start of the step, it crosses there.
     """
     if low == 0.0:
         row = work.registers[
@@ -162,7 +164,7 @@ def root_in_bracket(
         change = abs(closer - place)
         if change <= EPSILON * high:
             return place
-        # Newton's method halves its steps, or is replaced by halving.
+        # If Newton's method does not halve its steps, the bracket is halved instead.
         if not low < closer < high or (trial > 2 and change > 0.5 * last):
             closer = 0.5 * (low + high)
             change = high - low
@@ -174,7 +176,7 @@ def root_in_bracket(
 
 @njit(**KERNEL)
 def _turn_between(model, transition, path, order, clock, start, pace, low, high, side, base, tilt, work):
-    """Where a guard on ``side`` comes closest to zero between two places, or NOWHERE if that is an end."""
+    """Where a guard on ``side`` comes closest to zero between two places; NOWHERE if at an end."""
     for place, towards in ((low, True), (high, False)):
         row = work.registers[
             _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)
@@ -198,7 +200,7 @@ def _turn_between(model, transition, path, order, clock, start, pace, low, high,
 
 @njit(**KERNEL)
 def _tolerated(model, method, run, transition, path, order, clock, start, pace, place, work):
-    """How far from zero the tolerances of the state can leave a guard, at a place of the step."""
+    """How far from zero the tolerances of the state can leave a guard at a place of the step."""
     state_at(path, order, model.dimension, place, work.state)
     t = time_at(path, order, clock, start, pace, place)
     model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
@@ -215,7 +217,7 @@ def _note_touch(run, transition, place, value, length):
 
 @njit(**KERNEL)
 def _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work):
-    """Whether the rounding of a jump has left the guard beyond zero, where the step starts."""
+    """Whether the rounding of a jump has left the guard beyond zero at the start of the step."""
     if on_guard > 0:
         return False
     row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
@@ -229,13 +231,13 @@ def first_change(
 ):
     """First change of sign of a guard in its transition's direction, for variables in ``[0, length]``.
 
-    ``side`` is the sign before; a guard that is zero at the start has the sign it takes from there. Returns
-    ``(place, side after, proved)``: ``NOWHERE`` where the guard does not change its sign before ``proved``,
-    to which the step is to be cut.
+    ``side`` is the sign before; for a guard that is zero at the start, it is the sign that the guard takes
+    from there. Returns ``(place, side after, proved)``. The place is ``NOWHERE`` if the guard does not change
+    its sign before ``proved``; the step is to be cut to ``proved``.
     """
     direction = model.direction[transition]
     pieces, top = 0, 0
-    # The last place where the guard was on its side, beyond rounding, and where it came closest to zero.
+    # The last place where the guard was certain to be on its side, and where it came closest to zero.
     sure = 0.0
     touch, depth = NOWHERE, math.inf
     base, tilt = 0.0, 0.0
@@ -276,7 +278,7 @@ def first_change(
                 model, method, run, transition, path, order, clock, start, pace, middle, work
             )
         shallow = smooth and not monotone and farthest <= max(rounding, tolerated)
-        # Halves of a piece on which the guard is no less certain than in its middle would tell no more.
+        # If the guard's range on the piece is no wider than in its middle, halving the piece does not help.
         tells = not row[HIGH] - row[LOW] <= NO_BETTER * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
         splits = low < middle < high and high - low > EPSILON * length and tells
         if splits and not (clear or monotone or shallow):
@@ -300,7 +302,7 @@ def first_change(
             value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE]) * side
             within = value <= max(tolerated, 0.5 * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]))
             if shallow and low < turn < high and row[LOW] * side < 0.0 and row[HIGH] * side < 0.0:
-                # Down to the turn and up again: two pieces with one change of sign each.
+                # The guard crosses zero and turns back: each side of the turn has one change of sign.
                 stack[top, 0], high = turn, turn
                 top += 1
             elif within and value < depth and on_guard == 0:
@@ -312,7 +314,7 @@ def first_change(
         if after == 0:
             continue
         if after != side and side != 0:
-            # Behind a jump at the start the guard may be on its side for certain from this piece on.
+            # After a jump of the guard at the start, it may be certain of its side from this piece on only.
             if (
                 sure < low
                 and certain_sign(model, transition, path, order, clock, start, pace, low, base, tilt, work)
@@ -336,7 +338,7 @@ def first_change(
                 work,
             )
             touch, depth = NOWHERE, math.inf
-            # Where it has just fired, the step only shows to which side the guard leaves zero.
+            # If the transition has just fired, the step only shows to which side its guard leaves zero.
             again = place <= SETTLED * length and (
                 has_just_fired(run, transition, on_guard)
                 or _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work)
@@ -356,7 +358,7 @@ def first_change(
 
 @njit(**KERNEL)
 def sampled_change(model, run, transition, path, order, clock, start, pace, length, side, on_guard, work):
-    """As ``first_change`` for a guard that could not be traced: it is looked at in some places only."""
+    """As ``first_change``, for a guard that could not be traced: it is evaluated at some places only."""
     run.unproved += 1
     direction, low = model.direction[transition], 0.0
     for i in range(1, SAMPLES + 1):
@@ -391,7 +393,7 @@ def sampled_change(model, run, transition, path, order, clock, start, pace, leng
 def rests(model, run, transition, path, order, clock, start, pace, length, work):
     """Whether the state rests on a guard: it started there without speed, and the guard stays zero.
 
-    Zero at the end of the step alone says nothing: a guard may come back.
+    A guard that is zero at the end of the step may have left zero and come back, so more places are checked.
     """
     if run.on_guard[transition] != BY_STEP:
         return False
@@ -407,10 +409,10 @@ def rests(model, run, transition, path, order, clock, start, pace, length, work)
 
 @njit(**KERNEL)
 def crossing_on_path(model, method, run, transition, path, order, clock, start, pace, length, exact, work):
-    """``first_change`` from the side that the run knows, or samples where a guard has no program.
+    """``first_change`` from the side that the run knows; ``sampled_change`` if the guard has no program.
 
-    Returns the share of the step at which the guard crosses, its side after that or at the end, and the share
-    of the step that is proved.
+    Returns the share of the step at which the guard crosses, its side after the crossing or at the end, and
+    the share of the step that is proved.
     """
     side, on_guard = run.side[transition], run.on_guard[transition]
     if not has_program(model, transition):

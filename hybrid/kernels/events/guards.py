@@ -1,4 +1,4 @@
-"""Guards at a point: their value, their speed and acceleration, and what rounding can do to them."""
+"""Guards at a point: value, speed and acceleration, and how far rounding can move each of them."""
 
 import math
 
@@ -7,9 +7,9 @@ from numba import njit
 from hybrid.kernels.arithmetic.bernstein import lowest
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
-# Share of a component's size, in units of rounding, that rounding may have changed it by.
+# Rounding error that a component of the state may have, as a multiple of EPSILON times its size.
 ROUNDING_OF_STATE = 16
-# A jump may leave a guard that far from zero, in units of what rounding alone makes of it.
+# How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
 
 
@@ -22,14 +22,14 @@ def guard_value(model, transition, t, x, scalar):
 
 @njit(**KERNEL)
 def allowed(model, transition, t, x, scalar):
-    """Whether the condition of a transition holds; one without a condition always does."""
+    """Whether the condition of a transition holds; a transition without a condition is always allowed."""
     scalar[0] = 1.0
     return guard_value(model, transition + model.target.shape[0], t, x, scalar) > 0.0
 
 
 @njit(**INLINE)
 def guard_speed(model, transition, t, x, field, gradient):
-    """Transversality ``D_t g + D_x g f``; leaves ``(D_x g, D_t g)`` in ``gradient (n + 1,)``."""
+    """Transversality ``D_t g + D_x g f``; writes ``(D_x g, D_t g)`` into ``gradient (n + 1,)``."""
     model.guard_gradient(transition, t, x, model.parameters, gradient)
     speed = gradient[model.dimension]
     for i in range(model.dimension):
@@ -39,13 +39,13 @@ def guard_speed(model, transition, t, x, field, gradient):
 
 @njit(**INLINE)
 def has_program(model, transition):
-    """Whether a guard is bounded by its program: it is neither affine nor opaque."""
+    """Whether a guard has a program that bounds it: the guard is then neither affine nor opaque."""
     return model.programs.first[transition + 1] > model.programs.first[transition]
 
 
 @njit(**INLINE)
 def is_forced(model, mode):
-    """Whether the field of a mode has parts in time alone that are bounded over each step."""
+    """Whether the vector field of a mode has terms in time alone that are bounded over each step."""
     return model.first_forcing[mode + 1] > model.first_forcing[mode]
 
 
@@ -53,8 +53,9 @@ def is_forced(model, mode):
 def rounding_band(model, run, transition, t, x, work):
     """How far from zero rounding alone can leave a guard at ``(t, x)``; ``work.gradient`` is current.
 
-    The state has the sizes in ``run.scale``. Near a flat root, a kink or a jump the gradient says nothing of
-    this: a guard that has a program is bounded over the states that rounding cannot tell from ``x``.
+    ``run.scale`` holds the sizes of the state's components. Near a flat root, a kink or a jump the gradient
+    is no measure of this distance: a guard that has a program is bounded over the states that rounding cannot
+    tell from ``x``.
     """
     if has_program(model, transition):
         share = ROUNDING_OF_STATE * EPSILON
@@ -76,7 +77,7 @@ def may_jump(model, run, transition, t, x, work):
 def was_left_behind(model, run, transition, t, x, speed, side, work):
     """Whether the rounding of a jump has left a guard beyond zero that moves back to the known ``side``.
 
-    It has not been passed then. Rounding has not left a guard there that jumps.
+    Such a guard has not been crossed. A guard that jumps is never left beyond zero by rounding.
     """
     if not speed * side > 0.0:
         return False
@@ -86,7 +87,7 @@ def was_left_behind(model, run, transition, t, x, speed, side, work):
 
 @njit(**INLINE)
 def smooth_band(model, run, transition, t, x, work):
-    """``rounding_band`` from the gradient, which is ``work.gradient``, and from terms that may cancel."""
+    """``rounding_band`` from the gradient in ``work.gradient`` and from terms that may cancel."""
     n = model.dimension
     size = abs(work.gradient[n] * t)
     for i in range(n):
@@ -97,7 +98,7 @@ def smooth_band(model, run, transition, t, x, work):
 
 @njit(**KERNEL)
 def _spread_of_terms(model, run, program, t, x, work):
-    """How far rounding can leave terms from their value; 0 if they have no program, or where they jump."""
+    """How far rounding can move terms from their value; 0 if they have no program or may jump."""
     if not has_program(model, program):
         return 0.0
     share = ROUNDING_OF_STATE * EPSILON
@@ -107,10 +108,10 @@ def _spread_of_terms(model, run, program, t, x, work):
 
 @njit(**KERNEL)
 def widen_scale(model, run, work):
-    """Judge rounding at the start and the end of a run alike, whatever steps lead there.
+    """Make rounding bands alike at the start and the end of a run, whatever steps lead there.
 
-    Each component is taken to be at least as large as it becomes while the state changes by its own size;
-    ``work.field`` is current. A run that ends on a guard and the run that starts there then agree on that.
+    The scale of each component is at least its change while the state changes by its own size; ``work.field``
+    is current. Then a run that ends on a guard and a run that starts there agree that the guard is zero.
     """
     size, pace = 0.0, 0.0
     for i in range(model.dimension):
@@ -121,10 +122,10 @@ def widen_scale(model, run, work):
 
 @njit(**KERNEL)
 def sides_at(model, run, t, work):
-    """Bring the sides of the mode's guards to the state of the run, which it has at the time ``t``.
+    """Update the sides of the mode's guards to the state of the run at the time ``t``.
 
-    A guard that is zero there has not been crossed yet: it keeps the side it had before, and has none if the
-    next step has to show it.
+    A guard that is zero there counts as not yet crossed: it keeps the side before the crossing. It stays
+    without a side if the next step has to show the side.
     """
     mode = run.mode
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -140,7 +141,7 @@ def sides_at(model, run, t, work):
 
 @njit(**KERNEL)
 def speed_rounding(model, run, mode, t, work):
-    """How far from zero rounding of state and time can leave the speed of the guard in ``work.gradient``."""
+    """How far rounding of state and time can move the speed of the guard in ``work.gradient``."""
     n = model.dimension
     model.field_jacobian(mode, t, run.y, model.parameters, work.jacobian)
     size = abs(work.gradient[n])
@@ -154,7 +155,7 @@ def speed_rounding(model, run, mode, t, work):
 
 @njit(**KERNEL)
 def _rounding_of_residues(model, run, mode, t, work):
-    """What rounding of terms in time and parameters alone does to the speed of the guard."""
+    """How far rounding of terms in time and parameters alone can move the speed of the guard."""
     size = 0.0
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
@@ -166,9 +167,9 @@ def _rounding_of_residues(model, run, mode, t, work):
 
 @njit(**KERNEL)
 def acceleration_rounding(model, run, t, work):
-    """How far from zero rounding of state and time alone can leave the acceleration of the same guard.
+    """How far rounding of state and time alone can move the acceleration of the same guard.
 
-    Its Jacobian and field are current: ``guard_acceleration`` has just been called.
+    ``work.jacobian`` and ``work.field`` are current: ``guard_acceleration`` has just been called.
     """
     n = model.dimension
     size = 0.0
@@ -185,7 +186,7 @@ def acceleration_rounding(model, run, t, work):
 
 @njit(**INLINE)
 def error_band(method, run, gradient, n):
-    """How far the tolerances can move a guard with this gradient: closer to zero than that is a grazing."""
+    """How far the tolerances can move a guard with this gradient; a turn closer to zero is a grazing."""
     size = 0.0
     for i in range(n):
         size += abs(gradient[i]) * (method.atol + method.rtol * run.scale[i])
@@ -196,7 +197,7 @@ def error_band(method, run, gradient, n):
 def note_grazing(run, transition, degree, side, band, work):
     """Keep the earliest place of the step where a guard comes within ``band`` of zero and turns back.
 
-    ``work.polynomial`` is the guard on the step.
+    ``work.polynomial`` holds the guard on the step.
     """
     theta, value = lowest(work.polynomial, degree, side, work.stack)
     if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.grazing_place:
@@ -208,8 +209,8 @@ def note_grazing(run, transition, degree, side, band, work):
 def guard_acceleration(model, run, transition, mode, t, x, work):
     """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
 
-    ``D_x g (D_x f f + D_t f)`` is exact; the curvature of the guard itself is a difference of its gradient
-    along the flow.
+    ``D_x g (D_x f f + D_t f)`` is exact. The curvature of the guard itself is the difference quotient of its
+    speed along the frozen vector field.
     """
     n = model.dimension
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
@@ -236,7 +237,7 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
 
 @njit(**KERNEL)
 def keep_grazing(model, run, record, transition, t, x, value, work):
-    """Count a touch of a guard at the state ``x (n,)``, and write it into the record if that keeps any."""
+    """Count a touch of a guard at the state ``x (n,)``, and record it if the record has room."""
     run.grazings += 1
     slot, mode = record.grazings, run.mode
     if slot == record.grazing_phase.shape[0]:

@@ -1,4 +1,4 @@
-"""What the guards of modes say of the start of a run."""
+"""The verdicts of guards on the modes in which a run could start."""
 
 import math
 
@@ -11,10 +11,11 @@ from hybrid.kernels.types.layout import ENTRY, INDICES, MODEL, PARTS, RUN, WORK
 
 @njit(int64(PARTS, MODEL, RUN, WORK, int64, int64, INDICES), **ENTRY)
 def try_modes(parts, model, run, work, first, stop, verdicts):
-    """Enter the modes from ``first`` to before ``stop`` at the start of a run, one after the other.
+    """Enter the modes ``first`` to ``stop - 1`` at the start of a run, one after another.
 
-    What each of their guards says of it goes to ``verdicts (transitions,)``, which is zero before. Returns
-    the first transition whose guard is not finite, its value in ``work.scalar``, or NO_TRANSITION.
+    The verdict of each of their guards goes into ``verdicts (transitions,)``, which must be zero before.
+    Returns the first transition whose guard is not finite, with its value in ``work.scalar``; otherwise
+    NO_TRANSITION.
     """
     t = run.phase
     for mode in range(first, stop):

@@ -1,4 +1,4 @@
-"""What a run is asked to remember, written down as it goes."""
+"""Writes the record of a run: its steps and grazings."""
 
 from numba import njit
 
@@ -8,7 +8,7 @@ from hybrid.kernels.types.layout import KERNEL
 
 @njit(**KERNEL)
 def start_record(run, record, t, span):
-    """Write the place of a step into the record, and return its slot: the polynomial is still missing."""
+    """Write time and mode of a step into the record; returns its slot, which still lacks the polynomial."""
     slot = record.steps
     record.step_phase[slot] = t
     record.step_low[slot] = run.phase_low
@@ -22,7 +22,7 @@ def start_record(run, record, t, span):
 
 @njit(**KERNEL)
 def remember_grazing(model, run, record, time, work):
-    """Keep the grazing found on a step, at ``work.state``, if its transition might have fired there."""
+    """Record the grazing found on a step, at ``work.state``, if its transition is allowed there."""
     transition = run.grazing_guard
     if allowed(model, transition, time, work.state, work.scalar):
         keep_grazing(model, run, record, transition, time, work.state, run.grazing_value, work)

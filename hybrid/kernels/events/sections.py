@@ -1,4 +1,4 @@
-"""Stroboscopic points of a run, taken without leaving the compiled code."""
+"""Stroboscopic points of a run, computed without leaving the compiled code."""
 
 from numba import float64, int64, njit, types
 
@@ -20,7 +20,7 @@ from hybrid.kernels.types.layout import (
 def strobe(advance, parts, task, phase, max_steps, max_jumps, states, places):
     """State ``(N, n)``, and cycle, mode and jump count ``(N, 3)``, at ``phase`` of the next N cycles.
 
-    Returns how many were reached, and the driver's code.
+    Returns the number of points reached, and the driver's code.
     """
     model, run = task.model, task.run
     for done in range(states.shape[0]):

@@ -1,4 +1,4 @@
-"""On which side of its guards a state is, and which of them it has crossed at this instant."""
+"""On which side of each guard a state is, and which guards it has crossed at this instant."""
 
 from numba import njit
 
@@ -18,19 +18,19 @@ from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMP
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
 from hybrid.kernels.types.layout import KERNEL
 
-# How the state came to the point: a run starts there, the flow led there, or a reset put it there.
+# How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
 STARTED, FLOWED, LANDED = range(3)
-# A guard larger than this many times what rounding makes of it through its gradient jumps.
+# A guard within rounding of zero jumps if it exceeds this many times the rounding that its gradient predicts.
 SMOOTH = 4.0
-# A reset that keeps less than this share of a guard's speed holds a state that is pushed through the guard.
+# A reset that keeps less than this share of a guard's speed holds a state that the flow pushes through it.
 KEPT = 1e-3
 
 
 @njit(**KERNEL)
 def inherit(model, left, transition, side, due, zero):
-    """Take over what the mode just left knew of the guard of a transition; says whether it knew the guard.
+    """Take over what the mode just left knew of a transition's guard; returns whether that mode has the guard.
 
-    A crossing is still due only if no transition on that guard and in that direction has fired for it.
+    A crossing is still due only if no transition on that guard in that direction has fired for it.
     """
     known, pending, now, order = False, -1, 0, 0
     for slot in range(model.first_outgoing[left], model.first_outgoing[left + 1]):
@@ -50,12 +50,13 @@ def inherit(model, left, transition, side, due, zero):
 
 @njit(**KERNEL)
 def side_of(model, run, mode, transition, t, x, before, was_on, work):
-    """Side of a guard, 0 if the next step has to show it, and by which derivative the state leaves zero.
+    """Side of a guard, 0 if the next step has to show it, and the order of the derivative that decides.
 
-    That order is 0 off the guard, 1 where its speed decides, 2 where the speed is zero up to rounding and the
-    acceleration decides, 3 where that is zero too: then nothing has changed since the guard was last looked
-    at, if it was zero before, and else it counts as not yet crossed. It is ``JUMPING`` where the guard jumps
-    across zero within the rounding of the state: its derivatives say nothing then. ``work.field`` is current.
+    The order is 0 off the guard, 1 if the guard's speed decides, and 2 if the speed is zero up to rounding
+    and the acceleration decides. It is 3 if the acceleration is zero too: then the side is unchanged if the
+    guard was zero before, and otherwise the guard counts as not yet crossed. It is ``JUMPING`` if the guard
+    jumps across zero within the rounding of the state: then its derivatives are no guide. ``work.field`` is
+    current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
@@ -70,7 +71,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
         trend, order = speed, BY_SPEED
         if abs(speed) <= speed_rounding(model, run, mode, t, work):
             if may_jump(model, run, transition, t, x, work):
-                # In the middle of the jump, where neither side is.
+                # The state is in the middle of the jump, on neither side.
                 if was_on and before != 0:
                     return before, JUMPING
                 trend, order = 0.0, BY_STEP
@@ -90,8 +91,8 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
 def crossed_by_landing(model, transition, known, own, was_on, before, now, order):
     """Whether a reset has taken a guard from its near side to its far side.
 
-    A guard on which the reset has put the state is on its near side until the state moves off. The reset of
-    its own transition fires a guard again in that case only.
+    If the reset has put the state on the guard, the guard is on its near side until the state moves off. Only
+    in that case can the reset of a guard's own transition fire the guard again.
     """
     direction = model.direction[transition]
     if direction == 0:
@@ -109,9 +110,9 @@ def crossed_by_landing(model, transition, known, own, was_on, before, now, order
 
 @njit(**KERNEL)
 def is_held(model, run, transition, mode, t, x, work):
-    """Whether a reset takes, or turns round, the speed with which a state at rest is pushed through a guard.
+    """Whether a reset removes or reverses the speed that pushes a state at rest through a guard.
 
-    Judged a moment after ``t``; ``work.field`` is current.
+    The speed is evaluated a moment after ``t``; ``work.field`` is current.
     """
     n = model.dimension
     size, pace = 0.0, 0.0
@@ -133,11 +134,12 @@ def is_held(model, run, transition, mode, t, x, work):
 def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work):
     """Take sides at every guard of a mode; return the transition that must fire now, if any.
 
-    ``side``, ``due`` and ``zero (transitions,)`` hold the side of each guard, whether it has been crossed at
-    this instant without having fired, and the order from ``side_of``: from the point before, of the mode
-    ``left``, and then from this one. ``fired`` is the transition whose reset led here. A guard that has been
-    crossed stays due while the state is beyond it. Of those whose condition holds the one listed first fires;
-    ``RESTING`` instead if none does and the state rests on the guard that has just fired, pushed against it.
+    ``side``, ``due`` and ``zero (transitions,)`` hold the side of each guard, whether the guard has been
+    crossed at this instant without having fired, and its order from ``side_of``. On entry they belong to the
+    previous point, in the mode ``left``; on return they belong to this point. ``fired`` is the transition
+    whose reset led here. A guard that has been crossed stays due while the state is beyond it. Of the due
+    transitions whose condition holds, the first in the list fires. If none fires and the state rests on the
+    guard that has just fired, pushed against it, the result is ``RESTING``.
     """
     model.field(mode, t, x, model.parameters, work.field)
     chosen, rests = NO_TRANSITION, False
@@ -157,7 +159,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             crossed = order in (BY_SPEED, JUMPING) and before == -now and (direction == 0 or now == direction)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
-            # A guard that fires both ways and has been crossed has been taken back.
+            # A guard that fires both ways and was due already: this crossing takes the first one back.
             crossed = crossed and not (direction == 0 and due[transition] == 1)
         beyond = now == (direction if direction != 0 else before)
         pushed = (
@@ -165,14 +167,15 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         )
         if pushed and due[transition] == 0 and model.marker[transition] == 0:
             pushed = is_held(model, run, transition, mode, t, x, work)
-            # Another's reset has left the state where it rests: its own has to hold it once more.
+            # The reset of another transition has left the state at rest here: its own reset must hold it again.
             crossed = pushed and not own
             rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
         pending = came == LANDED and due[transition] == 1 and beyond
         if model.marker[transition] == 1 and came != FLOWED:
-            # It marks what the flow crosses: at most what was reached together with the first jump.
+            # A marker fires where the flow crosses it. After a jump it fires only if the flow has reached it
+            # together with the first jump.
             crossed, pending = False, pending and was_on and order > 0
-        # A root of third order that was crossed without speed: the next step shows the side.
+        # A root of third order, crossed without speed: the next step shows the side.
         flat = (
             own
             and order == BY_STEP
@@ -189,7 +192,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
 
 @njit(**KERNEL)
 def beyond_at_start(model, run, mode, t, work):
-    """A transition that only the start of a run fires, if the state lies beyond its guard; else none."""
+    """A transition that fires only at the start of a run, if the state lies beyond its guard; else none."""
     for slot in range(model.first_at_start[mode], model.first_at_start[mode + 1]):
         transition = model.at_start[slot]
         value = guard_value(model, transition, t, run.y, work.scalar)
@@ -201,6 +204,6 @@ def beyond_at_start(model, run, mode, t, work):
 
 @njit(**KERNEL)
 def end_instant(model, mode, due):
-    """Nothing fires any more: what is still due has been refused, and is passed as if there were no guard."""
+    """End an instant: guards still due were refused, and are passed as if they did not exist."""
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         due[model.outgoing[slot]] = 0
