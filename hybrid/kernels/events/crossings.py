@@ -97,7 +97,7 @@ def _value_at(model, transition, path, order, clock, start, pace, place, row, ba
 
 @njit(**INLINE)
 def _least_slope(row):
-    """The flattest slope of a guard at a place that its bounds allow; nan if they leave its sign open.
+    """The flattest slope that the bounds allow a guard at a place; nan if they leave its sign open.
 
     Near a vertical tangent the bounds are wide: a steeper slope would end Newton's method before the root.
     """

@@ -28,7 +28,7 @@ KEPT = 1e-3
 
 @njit(**KERNEL)
 def inherit(model, left, transition, side, due, zero):
-    """Take over what the mode just left knew of a transition's guard; returns whether that mode has the guard.
+    """Take over what the mode just left knew of a transition's guard; returns whether it has the guard.
 
     A crossing is still due only if no transition on that guard in that direction has fired for it.
     """
@@ -167,7 +167,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         )
         if pushed and due[transition] == 0 and model.marker[transition] == 0:
             pushed = is_held(model, run, transition, mode, t, x, work)
-            # The reset of another transition has left the state at rest here: its own reset must hold it again.
+            # Another transition's reset left the state at rest here: the guard's own reset must hold it again.
             crossed = pushed and not own
             rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
         pending = came == LANDED and due[transition] == 1 and beyond
