@@ -167,7 +167,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         )
         if pushed and due[transition] == 0 and model.marker[transition] == 0:
             pushed = is_held(model, run, transition, mode, t, x, work)
-            # Another transition's reset left the state at rest here: the guard's own reset must hold it again.
+            # Another transition's reset left the state at rest: the guard's own reset must hold it again.
             crossed = pushed and not own
             rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
         pending = came == LANDED and due[transition] == 1 and beyond
