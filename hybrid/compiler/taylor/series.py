@@ -35,7 +35,6 @@ PAIRS = {
 # ``y' = (1 -+ y^2) u'``.
 OWN_SQUARE = {sympy.tanh: "-", sympy.tan: ""}
 
-
 # Longer inner sums are not expanded, since other expressions may need them too.
 MOST_TERMS = 4
 

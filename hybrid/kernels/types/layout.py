@@ -210,7 +210,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``y (n (1 + k),)``: the state, then the tangent vectors one after another.
     - ``side (transitions,)``: the sign that each guard of the mode last had.
     - ``on_guard (transitions,)``: 1 if the guard vanishes at the last event or entry and has not been left
-      since; 2 if its speed vanishes too, 3 if its acceleration does as well.
+      since; 2 if its speed vanishes too, 3 if its acceleration does as well, 4 if it jumps across zero there.
     - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
     - ``recent``: the last transitions that fired; jump ``j`` is at ``j`` modulo the length.
     - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
