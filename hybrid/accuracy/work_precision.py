@@ -38,7 +38,7 @@ Method = Solver | Callable[[float], Any]
 
 @attrs.frozen(eq=False, repr=False)
 class WorkPrecision:
-    """Errors and times of several methods, a row a method and tolerance; ``print`` shows them as a table.
+    """Errors and times of several methods, one row per method and tolerance; ``print`` shows a table.
 
     Attributes
     ----------

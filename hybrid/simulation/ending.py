@@ -26,17 +26,17 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
 
 
 def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
-    """What is to be said of guards that the start lies beyond."""
+    """A note on guards that the start lies beyond."""
     if trajectory.beyond:
         names = ", ".join(map(repr, trajectory.beyond))
         yield (
-            f"The start lies beyond the guard of {names}, which counts as crossed: only the next crossing "
-            "fires."
+            f"The start lies beyond the guard of {names}. This guard counts as crossed, so only its next "
+            "crossing fires."
         )
 
 
 def _unproved(trajectory: Trajectory) -> Iterator[str]:
-    """What is to be said of guards whose crossings are not proved."""
+    """A note on guards whose crossings are not proved."""
     steps = trajectory.run.unproved
     if not steps:
         return
@@ -49,13 +49,13 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
         )
     else:
         yield (
-            f"On {steps} steps the crossings of a guard are not proved: it is too close to zero for too "
-            "long, so its signs at the ends of pieces of the step decided."
+            f"On {steps} steps the crossings of a guard are not proved: the guard stays too close to zero, "
+            "so its signs at the ends of pieces of the step decided."
         )
 
 
 def _unresolved(trajectory: Trajectory) -> Iterator[str]:
-    """What is to be said of steps on which the forcing could not be resolved."""
+    """A note on steps on which the forcing could not be resolved."""
     run = trajectory.run
     steps = run.unresolved + run.coarse
     if steps:
@@ -77,7 +77,7 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             StatusCode.SINGULAR_SALTATION,
             f"{singular} of {jumps} jumps had no saltation matrix: they grazed exactly, or were the limit of "
             "several transitions that accumulate in turn.",
-            "The tangent vectors mean nothing beyond them; move the parameters away from the grazing.",
+            "The tangent vectors are not valid after these jumps. Move the parameters away from the grazing.",
         )
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
         jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
@@ -85,8 +85,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if trajectory.tangents and code == codes.DONE and run.indistinct:
         return Status(
             StatusCode.INDISTINCT_TANGENTS,
-            f"{run.indistinct} times only rounding was left of what tells the tangent vectors "
-            "apart; the exponents after the first are not known.",
+            f"{run.indistinct} times the tangent vectors became parallel to rounding; the exponents after "
+            "the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
     if code == codes.DONE and ambiguous:
@@ -116,13 +116,14 @@ def _grazed(trajectory: Trajectory, grazed: int) -> Status:
     return Status(
         StatusCode.SUCCESS,
         f"Reached the end. {grazed} of {trajectory.jumps} jumps grazed within the tolerances: their "
-        f"saltation matrices, with entries up to {largest:.2g}, stand for a square root.",
+        f"saltation matrices, with entries up to {largest:.2g}, are unreliable, because grazing makes the "
+        "map non-differentiable.",
         "Tighten the tolerances to resolve them, or move the parameters away.",
     )
 
 
 def _recent(trajectory: Trajectory, number: int) -> list[int]:
-    """The last transitions that fired, in order, as far as they are remembered."""
+    """The last transitions that fired, in order, as far as the run remembers them."""
     jumps, recent = trajectory.jumps, trajectory.run.recent
     number = min(number, jumps, len(recent))
     return [int(recent[j % len(recent)]) for j in range(jumps - number, jumps)]

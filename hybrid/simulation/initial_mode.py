@@ -18,12 +18,12 @@ def choose_mode(
 ) -> tuple[int, tuple[str, ...]]:
     """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
 
-    With it come the transitions of a named mode whose guards the state lies beyond.
+    If the mode is named, the transitions whose guards the state lies beyond are returned too.
 
     Raises
     ------
     ModelError
-        If the name is unknown; if the state violates every mode, or more than one allows it.
+        If the name is unknown, no mode allows the state, or more than one does.
     """
     if mode is not None:
         index = system.mode_index(mode)
@@ -40,8 +40,8 @@ def choose_mode(
         return modes.index(allowed[0]), ()
     if not allowed:
         raise ArgumentError(
-            f"{_place(system, run)} violates every mode: {_faults(system, verdicts)}. Start on the other "
-            "side of a guard, or name the mode with mode= if that side is meant."
+            f"{_place(system, run)} is allowed in no mode: {_faults(system, verdicts)}. Start on the other "
+            "side of a guard, or choose a mode with mode= to start beyond its guard."
         )
     candidates = ", ".join(allowed)
     raise ArgumentError(
@@ -50,7 +50,7 @@ def choose_mode(
 
 
 def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: range) -> list[int]:
-    """What each transition that leaves one of the modes says of the start of the run, a code each."""
+    """One code per transition that leaves one of the modes: whether its guard allows the start of the run."""
     verdicts = np.zeros(len(system.transitions), dtype=np.int64)
     kernel = entry(load_kernels("hybrid.kernels.events.initial_mode").try_modes)
     undefined = kernel(parts, model, run, work, modes.start, modes.stop, verdicts)
@@ -64,13 +64,13 @@ def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any,
 
 
 def _against(system: HybridSystem, verdicts: list[int]) -> list[Transition]:
-    """Transitions whose guards object to the start."""
+    """The transitions whose guards do not allow the start."""
     said = zip(system.transitions, verdicts, strict=True)
     return [transition for transition, verdict in said if verdict != codes.NO_OBJECTION]
 
 
 def _faults(system: HybridSystem, verdicts: list[int]) -> str:
-    """The guards against each mode."""
+    """For each mode, the transitions whose guards do not allow the start."""
     against = _against(system, verdicts)
     return "; ".join(
         f"mode {name!r} is left through {', '.join(repr(tr.name) for tr in against if tr.source == name)}"

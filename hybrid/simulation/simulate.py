@@ -45,7 +45,7 @@ def simulate(
     system
         The model.
     x0
-        State ``(n,)`` at the start.
+        State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``.
     t_span
         ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
     mode
@@ -58,15 +58,15 @@ def simulate(
         True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is
         controlled with the state's.
     samples
-        Increasing times at which to keep the state; nothing else is then kept but the jumps.
+        Increasing times at which to store the state; only these states and the jumps are then stored.
     max_jumps
         The run ends with a status at this many jumps.
 
     Returns
     -------
     HybridArc
-        With a status; a run that ends early keeps what it has. Ctrl-C ends a run that takes longer than some
-        milliseconds with the status ``INTERRUPTED``.
+        With a status; a run that ends early keeps its results up to there. Ctrl-C ends a run that takes
+        longer than a few milliseconds with the status ``INTERRUPTED``.
 
     Raises
     ------

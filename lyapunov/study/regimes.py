@@ -61,7 +61,7 @@ def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, 
     for row in axes:
         for ax in row[1:]:
             ax.set_ylabel("")
-    for ax, title in zip(axes[1:, 0], ("Section, once a period", "First exponent"), strict=True):
+    for ax, title in zip(axes[1:, 0], ("Section, once per period", "First exponent"), strict=True):
         ax.set_title(title)
     return figure
 

@@ -381,7 +381,7 @@ def test_vectors_that_only_rounding_tells_apart_are_reported():
     trajectory.run.indistinct = 2
     status = status_of(trajectory, hybrid.kernels.types.codes.DONE)
     assert status.code == hybrid.StatusCode.INDISTINCT_TANGENTS
-    assert "2 times only rounding was left" in status.message
+    assert "2 times the tangent vectors became parallel" in status.message
 
 
 def test_steps_and_jumps_are_counted_per_interval():
