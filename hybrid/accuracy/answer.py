@@ -1,4 +1,4 @@
-"""What a method answered or what is true, and how far the one is from the other."""
+"""The results of a method, or the exact ones, and the differences between the two."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from hybrid.simulation.arc import HybridArc
 
 QUANTITIES = ("state", "times", "saltation", "fundamental", "exponents")
 EPSILON = float(np.finfo(float).eps)
-# A singular value with less than this of the largest is rounding, and so is its exponent.
+# A singular value below this share of the largest is rounding, and so is its exponent.
 NEGLIGIBLE = 1e-12
 
 
 @attrs.frozen(eq=False)
 class Answer:
-    """What a method found, or what is known exactly: the state at the end and whatever else there is.
+    """The results of a method, or the exact ones: the state at the end, and other quantities if known.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Answer:
     steps
         Steps of the method.
     seconds
-        Time of the run where the method takes it itself, being a process of its own, for one.
+        Time of the run, if the method measures it itself, for instance because it is another process.
     """
 
     state: np.ndarray = attrs.field()
@@ -61,10 +61,10 @@ class Answer:
 
 
 def as_answer(name: str, result: Any, n: int, span: float) -> Answer:
-    """Whatever a method returned as an answer, its exponents filled in."""
+    """The value that a method returned as an Answer, with its exponents."""
     if isinstance(result, HybridArc):
         result = Answer(
-            # Without a state at the end the run did not arrive there.
+            # A run without a state at the end did not reach it.
             result.x[-1] if len(result.x) else np.full(n, np.nan),
             times=result.jumps.t,
             saltation=result.jumps.saltation,

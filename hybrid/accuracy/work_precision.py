@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 METHODS: Mapping[str, Solver] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5()}
-# The default reference, and the run of another method that its own error is taken from.
+# The default reference, and the run of another method from which the error of the reference is estimated.
 REFERENCE = Taylor(rtol=1e-14, atol=1e-16)
 CHECK = DOP853(rtol=1e-13, atol=1e-15)
-# Seconds after which the time of short runs no longer depends on what ran before them.
+# Short runs are repeated for this many seconds: the first ones depend on what ran before them.
 SETTLED = 0.05
 MOST_REPEATS = 1000
 
@@ -45,19 +45,18 @@ class WorkPrecision:
     method, tolerance
         Names and tolerances, ``(rows,)``.
     error
-        Columns ``(rows,)`` by quantity: of the ``state`` the largest difference of a component, of the event
-        ``times`` the largest of one, infinite if their number differs; of the ``saltation`` matrices and
-        the ``fundamental`` matrix the largest difference relative to the largest entry of the true one; of
-        the ``exponents`` the largest. nan where a method does not have the quantity or did not arrive.
+        Columns ``(rows,)`` by quantity. For the ``state``, the event ``times`` and the ``exponents``: the
+        largest difference of a component, infinite if the numbers of events differ. For the ``saltation``
+        matrices and the ``fundamental`` matrix: the largest difference relative to the largest entry of the
+        exact matrix. nan if a method lacks the quantity or did not reach the end.
     seconds, compile_seconds
-        Median time of a run, until it was given up where it was, and what the first run took more,
-        ``(rows,)``.
+        Median time of a run, and the additional time of the first run, ``(rows,)``.
     steps, events
         Steps and events of a run, nan where unknown, ``(rows,)``.
     status
-        ``"SUCCESS"``, the name of another status code, or the first line of what was raised, ``(rows,)``.
+        ``"SUCCESS"``, the name of another status code, or the first line of an exception, ``(rows,)``.
     reference_error
-        Error of the reference itself, by quantity: nothing below it was measured.
+        Error of the reference itself, by quantity. Errors below it are not resolved.
     """
 
     method: np.ndarray
@@ -184,33 +183,34 @@ def work_precision(
 ) -> WorkPrecision:
     """Error against time of methods over a range of tolerances, on one run of one system.
 
-    Every method runs once to get ready at each tolerance, then at least ``repeats`` times; its time is the
-    median. The library's own solvers keep the end of the run and its jumps, no steps.
+    At each tolerance every method runs once to compile, then at least ``repeats`` times; the time is the
+    median of these runs. The library's own solvers store the end of the run and its jumps, not its steps.
 
     Parameters
     ----------
     system, x0, t_span, mode, parameters
         The run, as for :func:`simulate`.
     methods
-        Name to method: a solver, whose ``rtol`` the tolerance replaces and, in the same proportion, ``atol``;
-        or any function of the tolerance that solves the problem its own way and returns the state at the
-        end, an :class:`Answer` or a :class:`HybridArc`. By default ``Taylor``, ``DOP853`` and ``Tsit5``.
+        Methods by name. A method is a solver, whose ``rtol`` is replaced by the tolerance and whose ``atol``
+        changes in proportion; or any function of the tolerance that solves the problem and returns the state
+        at the end, an :class:`Answer` or a :class:`HybridArc`. By default ``Taylor``, ``DOP853``, ``Tsit5``.
     tolerances
-        Tolerances, each of which every method runs at.
+        Tolerances at which every method runs.
     reference
-        What is true: a state ``(n,)``, an :class:`Answer` or an arc. By default the arc of ``Taylor`` at
-        ``rtol = 1e-14``, and what ``DOP853`` at 1e-13 differs from it is taken for its error.
+        The exact result: a state ``(n,)``, an :class:`Answer` or an arc. By default the arc of ``Taylor`` at
+        ``rtol = 1e-14``; its error is estimated by the difference from ``DOP853`` at 1e-13.
     reference_error
         Error of a given reference, by quantity; by default the rounding of its largest value.
     tangent
         Whether the solvers carry the fundamental matrix, whose error and exponents are then measured too.
     repeats
-        Runs that the median is taken of, at least: short ones go on for a twentieth of a second, since what
-        ran before them is still in the processor's memories when they begin. With 1 there is one.
+        Smallest number of runs for the median. Short runs are repeated for a twentieth of a second, because
+        the processor's caches still hold the data of earlier work when they begin. With 1 there is one run.
     longest
-        Seconds beyond which a run is not repeated, and the method's finer tolerances are left out.
+        A run that takes more seconds than this is not repeated, and finer tolerances of its method are
+        skipped.
     clock
-        Counts seconds: ``time.process_time`` where other work shares the processor.
+        A function that returns seconds; ``time.process_time`` if other work shares the processor.
 
     Returns
     -------

@@ -24,19 +24,19 @@ from hybrid.solvers import DOP853, Solver
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
-# Newton steps are halved down to this part before they are taken as they are.
+# Newton steps are halved at most to this share; then the full step is taken.
 SHORTEST_STEP = 1 / 64
-# A shorter period, as a share of the guess, is no orbit.
+# A period below this share of the guess is a point, not an orbit.
 SHORTEST_PERIOD = 1e-3
-# Jumps of a guess that are looked at in the search for a point away from them.
+# Most jumps of the guess that are examined to find a point away from jumps.
 MOST_JUMPS_LOOKED_AT = 10_000
-# Points at which an orbit is looked at to see how far it moves, besides the solver's own.
+# Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
 EPSILON = float(np.finfo(float).eps)
-# Rounding of the end of an orbit, in units in the last place of its largest states: what Newton's method can
-# hope for, and what is accepted where it can do no better.
+# Rounding of the end of an orbit, in units in the last place of its largest states: the smallest gap that
+# Newton's method can reach, and the largest gap accepted when the method makes no more progress.
 FINEST_GAP, ROUNDING_OF_GAP = 4, 100
-# An autonomous orbit moves by more than this many times what is accepted as rounding.
+# An autonomous orbit moves by more than this many times the accepted rounding.
 LEAST_MOTION = 1e3
 # Share of its states by which a point that hardly moves may still be wrong.
 POINT_ERROR = 1e-8
@@ -48,7 +48,7 @@ FARTHEST = 1e3
 
 @attrs.frozen(eq=False, repr=False)
 class PeriodicOrbit:
-    """A periodic orbit, or the best that Newton's method came to.
+    """A periodic orbit, or the best point that Newton's method reached.
 
     Attributes
     ----------
@@ -121,8 +121,8 @@ def periodic_orbit(
     """Periodic orbit near a guess, stable or not.
 
     A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An
-    autonomous one closes after an unknown time near the guess ``period``; the point returned is the one
-    nearest to the guess among the solver's own.
+    autonomous system closes after an unknown time near the guess ``period``; the returned point is the
+    solver's own point that is nearest to the guess.
 
     Parameters
     ----------
@@ -137,21 +137,23 @@ def periodic_orbit(
     solver
         By default ``DOP853(rtol=1e-12, atol=1e-14)``.
     tolerance
-        Newton's method stops where the residual of each component is below ``tolerance`` times how far that
-        component moves over the period, or is rounding.
+        Newton's method stops when the residual of each component is below ``tolerance`` times the distance
+        that this component moves over the period, or is at the level of rounding.
     max_iterations
-        Most Newton steps.
+        Largest number of Newton steps.
 
     Returns
     -------
     PeriodicOrbit
-        With a status that says how far it got if it did not converge. An equilibrium is no orbit of an
-        autonomous system; of a forced one it is, since it repeats after each forcing period.
+        With a status that says how far the method came if it did not converge. An equilibrium of a forced
+        system counts as an orbit, because it repeats after each forcing period; an equilibrium of an
+        autonomous system does not.
 
     Raises
     ------
     ArgumentError
-        If a forced system is given ``period``, an autonomous one is not, or another argument does not fit.
+        If ``period`` is given for a forced system, missing for an autonomous one, or another argument does
+        not fit the system.
 
     References
     ----------

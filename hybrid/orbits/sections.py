@@ -44,7 +44,7 @@ class Section:
     mode
         Names of the modes ``(N,)``.
     jumps
-        Jumps since the point before ``(N,)``, crossings of the section not counted.
+        Jumps since the previous point ``(N,)``, without the crossings of the section.
     status
         How the run ended.
     """
@@ -76,14 +76,14 @@ def stroboscopic_section(
     solver: Solver | None = None,
     progress: bool = False,
 ) -> Section:
-    """State once a forcing period, at the phase of ``t0``.
+    """State once per forcing period, at the phase of ``t0``.
 
     Parameters
     ----------
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`; the system must declare a period.
     periods, transient
-        Points to take, and forcing periods to run before the first of them counts.
+        Number of points, and number of forcing periods to run before the first point.
     t0
         Time at the start; its phase is that of the section.
     progress
@@ -162,7 +162,7 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
         total += done
         code = bursts.judged(code)
         if code == codes.GO_ON:
-            # The burst has ended within a period, which the kernel would begin anew.
+            # The burst ended within a period; the kernel would begin the next one.
             code = plain.advance_to(first + total, trajectory.phase0, record)
             if code == codes.DONE:
                 run = trajectory.run
@@ -195,7 +195,7 @@ def poincare_section(
     section
         Guard whose zeros are the surface; its direction says which crossings count.
     points, transient
-        Points to take, and crossings to let pass before.
+        Number of points, and number of crossings to skip before the first point.
     t0
         Time at the start.
     progress
@@ -204,7 +204,7 @@ def poincare_section(
     Returns
     -------
     Section
-        With fewer points and a status if the surface is no longer met.
+        With fewer points and a status if the orbit no longer meets the surface.
 
     Raises
     ------

@@ -57,16 +57,16 @@ class Jump:
     def saltation(self) -> np.ndarray:
         """Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
 
-        Where a jump sets off others at once, by landing beyond their guards, their time is that of its own
-        guard: the product of the matrices is then the tangent map of all of them, if those before the last
-        can be inverted.
+        If a jump triggers others at the same instant, by landing beyond their guards, all of them happen at
+        the time of its own guard. The product of the matrices is the tangent map of all these jumps, provided
+        that the matrices before the last one can be inverted.
         """
         return self._all.saltation[self.j]
 
 
 @attrs.frozen(eq=False)
 class Grazing:
-    """A guard that comes closer to zero than the tolerances can tell, and turns back: a touch, not a jump.
+    """A touch: a guard that comes so close to zero that the tolerances cannot tell the sides, and turns back.
 
     Attributes
     ----------
@@ -201,17 +201,18 @@ class Jumps(Sequence[Jump]):
 
 @attrs.frozen(eq=False)
 class Pieces:
-    """The smooth steps of a run: ``S`` polynomials, each of its place on ``[0, 1]``.
+    """The smooth steps of a run: ``S`` polynomials, each in a variable on ``[0, 1]``.
 
     Attributes
     ----------
     t, low, h
-        Start of each step, what the start has lost in rounding, and length, ``(S,)``.
+        Start of each step, the rounding error of that start, and the length of the step, ``(S,)``.
     mode, j
         Mode index and jump count of each, ``(S,)``.
     coefficients
-        ``(S, d + 1, n + 1)`` of the powers ``1, theta, theta^2, ...``, of the state and, last, of the time
-        since the start of the step. The variable of a desingularised mode is not proportional to time.
+        ``(S, d + 1, n + 1)``: coefficients of ``1, theta, theta^2, ...`` of the state and, in the last column,
+        of the time since the start of the step. In a desingularised mode the time is not proportional to
+        ``theta``.
     """
 
     t: np.ndarray
@@ -222,7 +223,7 @@ class Pieces:
     coefficients: np.ndarray
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States ``(len(times), n)`` and the index of the step each was taken from; at a jump, after it."""
+        """States ``(len(times), n)``, and the steps they are taken from; at a jump, the state after it."""
         states = np.empty((len(times), self.coefficients.shape[2] - 1))
         index = np.empty(len(times), dtype=np.int64)
         kernel = entry(load_kernels("hybrid.kernels.steps.dense").states_at)
@@ -235,7 +236,7 @@ class HybridArc:
     """A solution over hybrid time ``(t, j)``; ``arc["q"]`` is one component of the state over it.
 
     Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step.
-    With ``samples`` they are the states at those times, at a jump the state after it.
+    With ``samples`` the points are at those times; at a jump, the state is the one after it.
 
     Attributes
     ----------
@@ -248,16 +249,16 @@ class HybridArc:
     grazings
         Each :class:`Grazing`, in order.
     status
-        How the run ended; what was computed is here even where it ended early.
+        How the run ended. A run that ended early keeps its results up to there.
     fundamental
-        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices,
-        if they were asked for.
+        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices;
+        None if the run had none.
     propagators
         How each mode was advanced, by its name: ``"exact"``, ``"Taylor series"``, ``"Taylor series,
-        desingularised"``, ``"Taylor series, with the root of a guard"`` or ``"Runge-Kutta pair"``. Where
-        every mode is exact no crossing was missed that rounding does not hide.
+        desingularised"``, ``"Taylor series, with the root of a guard"`` or ``"Runge-Kutta pair"``. If
+        every mode is exact, a crossing can only be missed if rounding hides it.
     steps, rejected
-        Steps tried, and how many of them the error control rejected.
+        Number of attempted steps, and how many of them the error control rejected.
     """
 
     system: HybridSystem

@@ -30,10 +30,10 @@ def saltation_matrix(
 ) -> np.ndarray:
     """Saltation matrix ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``.
 
-    It carries a perturbation of the state just before the jump, at the unperturbed jump's time, to the
-    perturbation just after. The time terms serve moving guards and time-dependent resets. A jump that another
-    sets off at once, by landing beyond its guard, does not happen at the time of that guard: its
-    ``saltation`` in a run is another matrix.
+    The matrix maps a perturbation of the state just before the jump to the perturbation just after it, both
+    at the time of the unperturbed jump. The terms in time are for moving guards and time-dependent resets. A
+    jump that another jump triggers, by landing beyond its guard, happens at the time of that other jump: its
+    ``saltation`` in a run is a different matrix.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ def saltation_matrix(
     Raises
     ------
     ArgumentError
-        If the crossing is not transverse (``D_t g + D_x g f_minus`` is zero): the matrix does not exist
-        there.
+        If the crossing is not transverse (``D_t g + D_x g f_minus`` is zero), so that the matrix does not
+        exist.
     ModelError
         If the transition does not exist.
 
