@@ -210,9 +210,9 @@ class Pieces:
     mode, j
         Mode index and jump count of each, ``(S,)``.
     coefficients
-        ``(S, d + 1, n + 1)``: coefficients of ``1, theta, theta^2, ...`` of the state and, in the last column,
-        of the time since the start of the step. In a desingularised mode the time is not proportional to
-        ``theta``.
+        ``(S, d + 1, n + 1)``: coefficients of ``1, theta, theta^2, ...`` of the state and, in the last
+        column, of the time since the start of the step. In a desingularised mode the time is not
+        proportional to ``theta``.
     """
 
     t: np.ndarray
