@@ -1,4 +1,4 @@
-"""The compiled functions of a model beside the Python functions that they were made from."""
+"""Comparison of the compiled functions of a model with the Python functions they were made from."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from hybrid.system.graph import HybridSystem, functions_of
 EPSILON = float(np.finfo(float).eps)
 # Sizes of state and time at which functions are compared, besides those near 1.
 SIZES = (1e-3, 30.0, 1e3)
-# Values that differ by less than this, relative to them, are the same without a closer look.
+# Values whose relative difference is below this are equal without a closer look.
 SAME_VALUE = 16 * EPSILON
-# How often a function is computed with roundings made up by chance, to see what they do to it.
+# Number of evaluations with random roundings, which show the effect of rounding on a function.
 SHAKES = 8
 # The compiler's elementary functions are not NumPy's. What is traced can be shaken at each operation.
 ROUNDED = {True: 1e-13, False: 1e-8}
-# Share of the largest state that rounding of terms may leave of their difference.
+# Rounding error of a difference of terms, as a share of the largest state.
 HIDDEN = 1e-12
 
 
 class Compiled(Protocol):
-    """What is compared: a compiled system."""
+    """A compiled system, as far as the comparison needs it."""
 
     @property
     def system(self) -> HybridSystem:
@@ -38,7 +38,7 @@ class Compiled(Protocol):
 
     @property
     def emitted(self) -> Emitted:
-        """What it was compiled from."""
+        """The generated code and the facts found by tracing."""
         ...
 
     def value(
@@ -104,7 +104,7 @@ def disagreement(
     values: np.ndarray,
     value: Value = compiled_value,
 ) -> str | None:
-    """Where a compiled function, or its derivative if Python has one, is not Python's; None if nowhere.
+    """The difference between a compiled function, or its derivative, and Python's, in words; None if equal.
 
     ``value`` is what evaluates the compiled function.
     """
@@ -160,8 +160,8 @@ def _difference(
     if np.all(apart <= SAME_VALUE * np.abs(wanted)):
         return None
     band = rounding_band(system, function, t, x, values, wanted)
-    # What is nothing but rounding in Python may be a quotient of zeros in other operations. An opaque
-    # function tells of its errors by nan.
+    # A result that is pure rounding in Python may be 0/0 in another order of operations. An opaque function
+    # reports errors as nan.
     lost = ~np.isfinite(found) & (not opaque)
     wrong = ~(apart <= band) & ~lost
     if not np.any(wrong):
@@ -198,16 +198,6 @@ def _told(
     )
 
 
-def place_told(system: HybridSystem, t: float, x: np.ndarray, values: np.ndarray) -> str:
-    """A point in words, with the parameters that are not as declared."""
-    changed = "".join(
-        f", {name} = {value:.10g}"
-        for (name, declared), value in zip(system.parameters.items(), values, strict=True)
-        if value != declared
-    )
-    return f"at t = {t:.6g}, x = ({', '.join(f'{value:.6g}' for value in x)}){changed}"
-
-
 def rounding_band(
     system: HybridSystem,
     function: Callable[..., Any],
@@ -216,7 +206,7 @@ def rounding_band(
     values: np.ndarray,
     value: np.ndarray,
 ) -> np.ndarray:
-    """How far apart two ways to compute a function may come out by rounding alone.
+    """Largest difference that rounding alone can make between two ways to compute a function.
 
     It is computed several times with every result of an operation moved by a few units in the last place
     (Monte Carlo arithmetic), or only its arguments if its operations cannot be seen.
@@ -255,7 +245,7 @@ def _shaken_operations(
 
 
 class _Shaken:
-    """Traced numbers as floats, every result of an operation rounded by chance."""
+    """Traced numbers as floats, with a random rounding after every operation."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
@@ -265,7 +255,7 @@ class _Shaken:
         return np.float64(value)
 
     def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
-        """The function's value, its last digits by chance."""
+        """The value of the function with random last digits."""
         value = np.where(*contents)[()] if name == WHERE else getattr(np, name)(*contents)
         return _shake(value, self.rng) if isinstance(value, np.floating) else value
 

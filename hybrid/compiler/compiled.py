@@ -1,4 +1,4 @@
-"""From a model to machine code: a few small functions each, called by kernels that all models share."""
+"""From a model to machine code: a few small functions per model, which the shared kernels call."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 FUNCTION_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
 GRADIENT = 3
 UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
-# Parameter vectors to remember.
+# Number of parameter vectors to remember.
 REMEMBERED = 10_000
 UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
 
@@ -96,7 +96,7 @@ class CompiledSystem:
     def derivative(
         self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
     ) -> np.ndarray:
-        """Its derivative ``(rows, n + 1)``, that in time last."""
+        """The derivative ``(rows, n + 1)`` of a function; the last column is the derivative in time."""
         out = np.full((function.rows, self.system.dimension + 1), np.nan)
         if function.size is None:
             self._call("vector_function", GRADIENT, index, t, x, parameters, out[0])
@@ -129,7 +129,7 @@ class CompiledSystem:
             If a function that tracing could not follow cannot be compiled as it is.
         """
         if part not in self.parts:
-            # What imports LLVM waits until a model is compiled.
+            # LLVM is imported only when a model is compiled.
             from hybrid.compiler.llvm.functions import compiled_part
 
             with announced(f"hybrid: compiling {self.system.name or 'the model'} ..."):
@@ -154,17 +154,17 @@ class CompiledSystem:
         return needed
 
     def series_columns(self, tangents: int) -> int:
-        """Columns that the series of any mode need."""
+        """Number of columns that the series of all modes need together."""
         groups = -(-arguments.count("tangents", tangents, 0) // NARROW)
         widest = max(each.series.tangent_columns for each in self.emitted.propagators)
         return self.emitted.tangent_start + groups * widest
 
     def model(self, parameters: Mapping[str, float] | None = None) -> Any:
-        """What the kernels are given: functions at a point, parameter values, graph."""
+        """The model as kernels get it: functions at a point, parameter values, graph."""
         return self.at(parameters, self._model)
 
     def moved_by(self, moving: Mapping[str, Any], propagator: np.ndarray) -> Any:
-        """A model at its default parameters, with what ``moving`` returned, and with these propagators."""
+        """A model at its default parameters, with the functions from ``moving`` and these propagators."""
         return self.at(None, self._model.replace(**moving, propagator=propagator))
 
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
@@ -181,7 +181,7 @@ class CompiledSystem:
         return model.replace(**changes)
 
     def _check_period(self, values: np.ndarray, period: float) -> None:
-        """ArgumentError if the period is none at these values; they are remembered if it is one."""
+        """ArgumentError unless the functions have the period at these values, which are remembered."""
         key = values.tobytes()
         if key in self.periodic_at:
             return
@@ -259,7 +259,7 @@ class CompiledSystem:
 
 
 def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.ndarray]:
-    """First places, and the indices of the transitions that leave each mode, whose guards are of one kind."""
+    """The transitions that leave each mode, of guards of one kind: first places, and indices."""
     indices: list[int] = []
     first = [0]
     for name in system.mode_names:
@@ -273,7 +273,7 @@ def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.nd
 
 
 def _program_runners(needed: bool) -> dict[str, Any]:
-    """The kernels that run programs; they are not loaded where there are none."""
+    """The kernels that run interval programs; they are loaded only if there are programs."""
     if not needed:
         return {"bound": Absent(), "spread": Absent()}
     bounds = load_kernels("hybrid.kernels.events.bounds")
@@ -289,7 +289,7 @@ def _indices(values: Any) -> np.ndarray:
 
 
 def compile_system(system: HybridSystem) -> CompiledSystem:
-    """Trace, differentiate and compile a model; repeated calls return what the first one made.
+    """Trace, differentiate and compile a model; repeated calls return the first result.
 
     Raises
     ------
@@ -310,7 +310,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
 
 
 def emitted_of(system: HybridSystem) -> Emitted:
-    """What `emit` makes of a system, or what it made of the same one before."""
+    """The result of `emit` for a system, computed now or stored by an earlier process."""
     operations = operations_of(system)
     found = None if operations is None else store.read(operations)
     if found is not None:

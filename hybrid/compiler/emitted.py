@@ -1,4 +1,4 @@
-"""What tracing has found out about a system, apart from SymPy, which found it."""
+"""The facts and the code that tracing found for a system; plain data, without SymPy."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Propagator:
 
 @attrs.frozen
 class Programs:
-    """The programs of all guards of a system, behind them those of its forcings, and of its residues.
+    """The interval programs of a system: of all guards, then of the forcings, then of the residues.
 
     Attributes
     ----------
@@ -158,16 +158,16 @@ class Emitted:
     tangent_start: int
 
     def is_sampled(self, transition: int) -> bool:
-        """Whether the crossings of a guard are only sampled: tracing could not follow it."""
+        """Whether the crossings of a guard are only sampled, because the guard could not be traced."""
         first = self.programs.first
         return not self.affine_guard[transition] and first[transition] == first[transition + 1]
 
     def has_forcing(self, mode: int) -> bool:
-        """Whether the field of a mode has parts in time alone that are bounded over each step."""
+        """Whether the field of a mode has parts that depend on time alone and are bounded over each step."""
         return self.first_forcing[mode] < self.first_forcing[mode + 1]
 
     def pulses_excluded(self, mode: int) -> bool:
-        """Whether no pulse in time alone can be stepped over in a mode: all of its forcing can be bounded."""
+        """Whether all forcing of a mode can be bounded, so that no pulse in time is stepped over."""
         first, guards = self.programs.first, len(self.affine_guard)
         forcings = range(self.first_forcing[mode], self.first_forcing[mode + 1])
         return self.traced_field[mode] and all(first[guards + i] < first[guards + i + 1] for i in forcings)

@@ -1,4 +1,4 @@
-"""Model functions that could not be traced: compiled as they are, on terms that keep them what they are."""
+"""Model functions that could not be traced: compiled unchanged, with checks that they stay correct."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class OpaqueFunction:
 
     @property
     def size(self) -> int:
-        """How many numbers it returns."""
+        """Number of values that the function returns."""
         return math.prod(self.shape)
 
 
@@ -152,7 +152,7 @@ def _indices(place: int, shape: tuple[int, ...]) -> list[int]:
 
 
 def _own_copy(function: Callable[..., Any]) -> FunctionType:
-    """The function with defaults that are floats where they are large whole numbers."""
+    """The function with large whole numbers among its defaults replaced by floats."""
     from hybrid.compiler.whole_numbers import LARGEST_INDEX
 
     assert isinstance(function, FunctionType)
@@ -168,7 +168,7 @@ def _own_copy(function: Callable[..., Any]) -> FunctionType:
 
 
 def _refusal(opaque: OpaqueFunction, scope: Mapping[str, Any], error: Exception) -> ModelError:
-    """What to tell of an error of the compiler: which function, what was met, what to write instead."""
+    """The text for an error of the compiler: the function, the problem, and what to write instead."""
     alone = _error_alone(opaque, scope)
     if alone is None:
         return ModelError(
@@ -200,7 +200,7 @@ def _error_alone(opaque: OpaqueFunction, scope: Mapping[str, Any]) -> Exception 
 
 
 def _short(error: Exception) -> str:
-    """The line of a compiler's text that says what it met."""
+    """The line of the compiler's text that names the problem."""
     lines = [line.strip(" |>") for line in str(error).splitlines()]
     empty = ("Failed in", "During", "File", "There are", "Overload", "- Of", "raised from", "<source", "^")
     telling = [line for line in lines if line and not line.startswith(empty)]

@@ -1,4 +1,4 @@
-"""Which guards are the same function, up to a constant factor: the sides of their zero set are the same."""
+"""Guards that are the same function up to a constant factor, and therefore have the same zero set."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
     from hybrid.system.graph import HybridSystem
 
-# Longer expressions are compared as they are, still longer ones not term by term.
+# Expressions with more terms are not expanded; expressions with more nodes are compared as a whole.
 MOST_TERMS = 200
 MOST_SHOWN = 5000
 # Digits to which quotients of coefficients are compared.
@@ -21,7 +21,7 @@ DIGITS = 12
 def surfaces(
     functions: Iterable[Callable[..., Any]], expressions: Iterable[sympy.Expr | None]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Number of the zero set of each guard, and the sign of its factor.
+    """The number of the zero set of each guard, and the sign of the guard's factor.
 
     ``expressions`` are None for functions that could not be traced: these are compared as objects. A guard
     that is constant has no zero set that another could share.
@@ -36,7 +36,7 @@ def surfaces(
 
 
 def _without_factor(expression: sympy.Expr) -> tuple[Any, int]:
-    """What is left of an expression when its leading coefficient is divided out, and the coefficient's sign.
+    """An expression divided by its leading coefficient, and the sign of that coefficient.
 
     None instead if it is a constant.
     """
@@ -45,7 +45,7 @@ def _without_factor(expression: sympy.Expr) -> tuple[Any, int]:
     if not symbols_of(expression):
         return None, 1
     if is_larger_than(MOST_SHOWN, expression):
-        # As it stands: to write it out would take for ever.
+        # The expression itself: expanding it would take too long.
         return expression, 1
     if not is_larger_than(MOST_TERMS, expression):
         expression = expression.expand()
@@ -57,7 +57,7 @@ def _without_factor(expression: sympy.Expr) -> tuple[Any, int]:
 
 
 def is_paired(system: HybridSystem, emitted: Emitted, index: int) -> bool:
-    """Whether others fire the other way, or both ways, across the guard of a transition in its mode."""
+    """Whether the mode of a transition has another one across the same surface in another direction."""
     own = system.transitions[index]
     towards = own.guard.direction * emitted.orientation[index]
     return any(

@@ -4,7 +4,7 @@ Python's whole numbers have no largest one, numba's have 64 bits. Here a result 
 error; a number too large for an index is a float from the start, and so is every power of whole numbers.
 """
 
-# Numba compares the signatures of what it overloads, annotations included, so there are none.
+# Numba compares signatures with annotations when it overloads a function, so there are no annotations here.
 # mypy: allow-untyped-defs, allow-untyped-calls, allow-untyped-decorators, allow-incomplete-defs
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from numba.core.ir_utils import build_definitions, guard
 from numba.core.untyped_passes import IRProcessing
 from numba.extending import intrinsic, overload
 
-# Whole numbers beyond this are no indices.
+# Whole numbers above this are not used as indices.
 LARGEST_INDEX = 2**31
-# No whole number of 64 bits is as large as this.
+# Larger than any whole number of 64 bits.
 TOO_LARGE = 9.2e18
-# Powers up to this one are products in Python too.
+# Python computes powers up to this one as products, too.
 MOST_FACTORS = 100
 TEXT = "a whole number beyond 2**63"
 
 
 def _fits(a, b):
-    """Whether two numbers are whole and of Python's kind, so that their result may not fit."""
+    """Whether two numbers are Python integers, so that their result may not fit into 64 bits."""
     return isinstance(a, types.Integer) and isinstance(b, types.Integer) and types.uint64 not in (a, b)
 
 
 def _checked(name, whole, other):
-    """A function of two numbers that is ``whole`` of whole ones and ``other`` of any others."""
+    """A function of two numbers: ``whole`` for two integers, ``other`` for all other numbers."""
 
     def stub(a, b):
         return other(a, b)
@@ -130,7 +130,7 @@ for _name, _of_whole in WHOLE.items():
 
 
 def _rounding(function):
-    """A function that makes a whole number of a float."""
+    """A function that converts a float to a whole number."""
 
     def stub(a):
         return function(a)
@@ -152,7 +152,7 @@ ROUNDINGS = {function: _rounding(function) for function in (int, math.floor, mat
 
 @intrinsic
 def readonly(typing_context, array):
-    """The array, which what is called with it cannot write into."""
+    """The array as a read-only array."""
 
     def same(context, builder, signature, arguments):
         return impl_ret_borrowed(context, builder, signature.return_type, arguments[0])
@@ -162,7 +162,7 @@ def readonly(typing_context, array):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _CheckWholeNumbers(FunctionPass):
-    """Replace what could wrap around."""
+    """Replace operations that could wrap around."""
 
     _name = "check_whole_numbers"
 
@@ -170,7 +170,7 @@ class _CheckWholeNumbers(FunctionPass):
         super().__init__()
 
     def run_pass(self, state):
-        """Whether anything was replaced."""
+        """Whether an operation was replaced."""
         func_ir, changed = state.func_ir, False
         for block in func_ir.blocks.values():
             body: list[object] = []
@@ -217,7 +217,7 @@ def _replace_rounding(statement, function):
 
 
 class WholeNumberCompiler(CompilerBase):
-    """Numba's passes, and one that replaces arithmetic on whole numbers."""
+    """Numba's passes and one more, which replaces arithmetic on whole numbers."""
 
     def define_pipelines(self):
         """The one pipeline."""

@@ -1,4 +1,4 @@
-"""Which propagator fits a mode: the first in the list that applies, else the pair of the solver."""
+"""The propagator of a mode: the first in the list that applies, else the steps of the solver."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hybrid.compiler.taylor.series import NoSeries
 from hybrid.kernels.types.codes import RUNGE_KUTTA
 from hybrid.symbolic.tracing import Symbols
 
-# Each returns the propagator of a mode, or the reason why it does not apply. NoSeries says that none can.
+# Each strategy returns a propagator, or the reason why it does not apply. NoSeries means that none applies.
 Strategy = Callable[[Equations], Propagator | str]
 STRATEGIES: list[Strategy] = [rooted, desingularised, polynomial, affine, taylor]
 

@@ -47,7 +47,7 @@ def _write_desingularised(
     """
     harmonics = harmonics_of(field, symbols)
     field = [replaced(rate, harmonics) for rate in field]
-    # The time since the start comes behind the states among what is advanced.
+    # The time since the start is advanced too, in the column after the states.
     body = Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()
     seeds = seeds_of(symbols)
@@ -55,7 +55,7 @@ def _write_desingularised(
     rates = [on_clock(rate, z) for rate in field]
     tangents = [on_clock(along, z) for along in directional(field, seeds)]
     trace = on_clock(divergence(field, symbols.x), z)
-    # Where z is zero its root crosses zero, with a slope.
+    # Where z vanishes, its root crosses zero with a nonzero slope.
     roots = in_terms_of_root(boundaries, z, ROOT, symbols)
     crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)

@@ -32,19 +32,19 @@ class Boundary:
 
 
 def known_positive(boundaries: Iterable[Boundary]) -> list[sympy.Expr]:
-    """What is positive or zero in the whole mode, since it ends where its guards say."""
+    """Expressions that are positive or zero in the whole mode, because the mode ends at its guards."""
     return [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
 
 
 def columns_of_guards(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy.Expr]:
-    """What the columns of the guards hold; zero for a guard that is bounded by its program instead."""
+    """The expressions in the columns of the guards; zero for a guard that its interval program bounds."""
     pairs = zip(boundaries, held, strict=True)
     return [b.guard if is_held and b.guard is not None else ZERO for b, is_held in pairs]
 
 
 @attrs.frozen
 class Equations:
-    """A mode: its field, its guards, and what a series of it needs to know of them.
+    """A mode: its field, its guards, and the facts about them that a series needs.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Equations:
 
     @cached_property
     def guards(self) -> list[sympy.Expr]:
-        """What the columns of the guards hold."""
+        """The expressions in the columns of the guards."""
         return columns_of_guards(self.boundaries, self.held)
 
     @cached_property
@@ -103,7 +103,7 @@ def equations_of(field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], sy
 
 
 def _is_held(boundary: Boundary, bases: Sequence[sympy.Expr], symbols: Symbols) -> bool:
-    """Whether the series of a mode hold the guard: an affine one, and one whose root they may hold."""
+    """Whether the series of a mode hold the guard: it is affine, or the series may hold its root."""
     guard = boundary.guard
     if guard is None:
         return False
@@ -113,7 +113,7 @@ def _is_held(boundary: Boundary, bases: Sequence[sympy.Expr], symbols: Symbols) 
 def in_terms_of_root(
     boundaries: Sequence[Boundary], z: sympy.Expr, root: sympy.Symbol, symbols: Symbols
 ) -> dict[int, sympy.Expr]:
-    """By place, the guards that are multiples of ``z``: the root with the sign of the guard in the mode."""
+    """Guards that are multiples of ``z``, by place: the root with the sign of the guard inside the mode."""
     return {
         place: (boundary.inside or sign_of(boundary.guard, [z]) or 1) * root
         for place, boundary in enumerate(boundaries)
@@ -122,7 +122,7 @@ def in_terms_of_root(
 
 
 def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
-    """Whether it depends on time by polynomials and by harmonics and exponentials of linear functions."""
+    """Whether time enters only through polynomials and through harmonics and exponentials of linear terms."""
     for node in nodes(entry):
         if not mentions(node, (symbols.t,)) or node.is_Symbol or node.is_Add or node.is_Mul:
             continue

@@ -14,7 +14,7 @@ from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER
 from hybrid.symbolic.nodes import contains, degree_of, mentions, replaced, symbols_of
 from hybrid.symbolic.tracing import Symbols
 
-# No matrix is scaled up by more than its inverse.
+# Matrices are scaled up by at most the inverse of this.
 SMALLEST = 1e-300
 # Powers of a scaled matrix below this are zero but for rounding.
 VANISHED = 1e-13
@@ -27,7 +27,7 @@ def polynomial(mode: Equations) -> Propagator | str:
     of_state = _degree(mode.field, mode.jacobian, mode.symbols)
     if not 0 < of_state <= HIGHEST_ORDER:
         return "its solutions are no polynomials in time"
-    # A quadratic guard is a polynomial in time here; of higher ones flat roots drown in rounding.
+    # A quadratic guard is a polynomial in time here. Flat roots of higher ones are lost in rounding.
     powers = [0 if b.guard is None else _polynomial(b.guard, mode.symbols) for b in mode.boundaries]
     held = [0 < power <= 2 and of_state * power <= HIGHEST_ORDER for power in powers]
     degree = of_state * max([1, *(power for power, is_held in zip(powers, held, strict=True) if is_held)])
@@ -61,7 +61,7 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
 
 
 def _may_be_nilpotent(matrix: Sequence[Sequence[sympy.Expr]]) -> bool:
-    """Whether a matrix in the parameters vanishes in its own powers, as far as one set of values can tell."""
+    """Whether a matrix of parameters may be nilpotent, tested at one random set of values."""
     names = sorted({name for row in matrix for entry in row for name in symbols_of(entry)}, key=str)
     drawn = np.random.default_rng(1).uniform(1.0, 2.0, len(names))
     values = dict(zip(names, map(sympy.Float, drawn), strict=True))

@@ -34,7 +34,7 @@ def _write_rooted(
     roots: Sequence[Root],
     symbols: Symbols,
 ) -> Series:
-    """Series in time of the states and of the roots of guards, whose half-integer powers are theirs."""
+    """Series in time of the states and of the roots; powers of the roots replace half-integer powers."""
     body = Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
 

@@ -1,4 +1,4 @@
-"""The statements of a series: columns, loops over the orders, and how they are put one into the other."""
+"""The statements of a series: columns, loops over the orders, and the nesting of these loops."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from hybrid.symbolic.nodes import mentions, nodes_of
 from hybrid.symbolic.printer import assignments
 from hybrid.symbolic.tracing import Symbols
 
-# Columns behind those of the guards: the time since the step's start, the integral of div f. All these are
-# written and evaluated as whole vectors; the others follow, the root of a desingularised mode first.
+# Columns after those of the guards: the time since the start of the step, the integral of div f. All columns
+# up to here are written and evaluated as whole vectors. The root of a desingularised mode comes next.
 CLOCK, DIVERGENCE, OTHERS = range(3)
-# The square root of a guard is started from no less than this share of the sizes it is a difference of.
+# Smallest start of the square root of a guard, as a share of the sizes of the terms of the guard.
 FLOOR = 1e-17
-# Share of those sizes below which the guard and the square of a root differ by rounding.
+# As a share of these sizes: smaller differences between the guard and the square of the root are rounding.
 SAME_ROOT = 1e-13
 
 
@@ -56,13 +56,13 @@ def seeds_of(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:
 
 
 def names_of_state(symbols: Symbols) -> tuple[list[str], list[str]]:
-    """Columns of the state, and what its components start from, as text."""
+    """Columns of the state, and the initial values of its components, as text."""
     n = len(symbols.x)
     return [str(i) for i in range(n)], [f"x[{i}]" for i in range(n)]
 
 
 class Body:
-    """The body of one mode: allots columns, and puts the loops one into the other.
+    """The body of one mode: allots columns and nests the loops.
 
     Parameters
     ----------
@@ -85,17 +85,17 @@ class Body:
         self.at_start: dict[sympy.Expr, str] = {}
 
     def column(self, place: int) -> str:
-        """A column behind those of the guards."""
+        """A column after those of the guards."""
         return str(self.behind_guards + place)
 
     def start_root(self, name: str, z: sympy.Expr, place: int) -> None:
-        """Statements for the value ``name`` that the root of ``z``, the guard in a place, starts from."""
+        """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place."""
         size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
         self.at_start[z] = f"{name}*{name}"
         self.preamble += [
             *assignments(["z", "size"], [z, size]),
             f"last = abs(out[order + 1, {self.n + place}])",
-            # Anything as close to the root as this is one, whoever left it there.
+            # A stored value this close to the root is taken as the root, whichever step stored it.
             f"same = abs(last*last - z) <= {SAME_ROOT}*size < z",
             f"{name} = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
         ]
@@ -154,7 +154,7 @@ class Body:
         rates: Sequence[sympy.Expr],
         guards: Sequence[sympy.Expr],
     ) -> StateLoop:
-        """The loop of the state, and of what else there are ``rates`` for; local names have a prefix."""
+        """The loop of the state and of all other quantities in ``rates``; local names have a prefix."""
         state = {x: str(i) for i, x in enumerate(self.symbols.x)}
         time = self.symbols.t, self.time.format(prefix)
         block = Recurrences(
@@ -174,7 +174,7 @@ class Body:
 
 
 def groups(n: int) -> str:
-    """The statement that counts the groups of tangent vectors that are worked on at once."""
+    """The statement that computes the number of groups of tangent vectors."""
     return f"groups = (len(x)//{n} + {NARROW - 2})//{NARROW}"
 
 
