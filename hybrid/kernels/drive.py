@@ -37,14 +37,14 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import ENTRY, KERNEL, PARTS, TASK
 
-# More jumps than this at one instant, in all or per transition, are not going to end.
+# More jumps than this at one instant, in total or per transition, count as endless.
 MOST_JUMPS_AT_ONCE = 1000
 MOST_JUMPS_EACH = 100
 
 
 @njit(**KERNEL)
 def arrived(model, run, work):
-    """Transition whose guard is reached or passed at the end of a run: it belongs to this run.
+    """The transition whose guard is reached or passed at the end of a run; it still belongs to this run.
 
     Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
     and takes a guard that it starts beyond as crossed; but the steps of Runge-Kutta methods can pass a guard
@@ -64,7 +64,7 @@ def arrived(model, run, work):
             continue
         now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
         if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
-            # An event at a jump lies beyond its near side.
+            # An event at a jump of the guard lies beyond the near side.
             now = -before
         elif now == -before and order == 0:
             speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)

@@ -9,31 +9,32 @@ from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_
 from hybrid.kernels.jumps.rounds import fired_before
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
-# Rows of Run.trail: what the jump before left behind. The last column holds a time or a speed.
+# Rows of Run.trail, written by the previous jump. The last column holds a time or a speed.
 BEFORE = 0
 LIMIT = 1
 IMPULSE = 2
-# No limit is taken before this many jumps, so that the visible ones are there to be seen.
+# No limit is taken before this many jumps, so that the visible jumps are in the arc.
 FEWEST_JUMPS = 16
-# Unless a flight is no higher than this times rounding: what rounding does to its duration goes like the
-# reciprocal of its speed, and would spoil the limit.
+# The limit is taken earlier if a flight is no higher than this many times rounding: the rounding error of its
+# duration grows like the reciprocal of its speed and would spoil the limit.
 SHALLOW = 1e6
-# Longest remainder, in units of the field's own time, over which a varying Jacobian may be taken as constant.
+# Longest remaining time, in units of the field's own time, over which a varying Jacobian may count as
+# constant.
 SHORT = 1e-5
 LONG = 1.0
 # The same where the drift is that of the mean field, which is followed to second order.
 BRIEF = 1e-4
-# Largest relative change of the limit that rounding may be blamed for.
+# Largest relative change of the limit that may be due to rounding.
 ROUGH = 1e-6
-# Where its time still changes by more than this share, the limit is not looked for.
+# If the time of the limit still changes by more than this share, the limit is not computed.
 FAR = 1e3 * ROUGH
-# Share by which a flight that drowns in rounding, and the speed after it, may differ from a steady series.
+# Share by which a flight at the level of rounding, and the speed after it, may differ from a steady series.
 STEADY = 0.5
 
 
 @njit(**KERNEL)
 def far_side(model, run, transition):
-    """The side of its guard on which the transition that has just fired found the state."""
+    """The side of the guard on which the state was before the transition that has just fired."""
     if model.direction[transition] != 0:
         return model.direction[transition]
     return 1 if run.last_transversality > 0.0 else -1
@@ -95,7 +96,7 @@ def follow_mean(model, run, transition, speed, span, work):
 
 @njit(**INLINE)
 def change_of_limit_time(model, method, run, gain, shift, span):
-    """What later jumps will still change of the time to the limit, in units of the tolerances.
+    """The change of the time to the limit by later jumps, in units of the tolerances.
 
     Judged from the change since the jump before, by ``shift``, of which they will still make ``gain`` times.
     """
@@ -105,7 +106,7 @@ def change_of_limit_time(model, method, run, gain, shift, span):
 
 @njit(**KERNEL)
 def change_of_limit(model, method, run, gain, misfit, work):
-    """The same of the limit in ``work.settled``; ``misfit`` is that of its time."""
+    """The same for the limit in ``work.settled``; ``misfit`` is the change of its time."""
     for i in range(model.dimension):
         limit = work.settled[i]
         scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
@@ -131,7 +132,7 @@ def accumulation(model, method, run, transition, since_last, work):
     value = guard_value(model, transition, run.phase, run.y, work.scalar)
     band = rounding_band(model, run, transition, run.phase, run.y, work)
     span, found = 0.0, False
-    # A reset that leaves the guard begins no chatter.
+    # No chatter begins with a reset that leaves the guard.
     if abs(value) <= band:
         span = remaining_chatter(model, run, transition, speed, work)
     if not span > 0.0:
@@ -144,7 +145,7 @@ def accumulation(model, method, run, transition, since_last, work):
         flight, slower = run.trail[LIMIT, n] * (1.0 - ratio), ratio * run.trail[BEFORE, n]
         steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.phase)
         steady = steady and abs(speed - slower) <= STEADY * slower
-        # A flight of height v^2 / 2 a that drowns in rounding cannot be followed any further.
+        # A flight whose height v^2 / 2 a is at the level of rounding cannot be followed.
         height = 0.25 * speed * span * (1.0 - ratio)
         drowned = steady and height <= band
         shallow = height <= SHALLOW * band or run.chattering >= FEWEST_JUMPS
@@ -156,7 +157,7 @@ def accumulation(model, method, run, transition, since_last, work):
             follow_mean(model, run, transition, side * speed, span, work)
             misfit = change_of_limit(model, method, run, gain, misfit, work)
         else:
-            # Jumps that are driven, and no chatter yet: there is no limit to compare the next one with.
+            # The jumps are driven; there is no chatter yet, and no limit to compare with the next one.
             run.trail[LIMIT, 0] = math.inf
         # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
         # takes over.
@@ -180,7 +181,7 @@ def remember_impulse(model, run, transition, transversality, work):
     run.restitution = -after / transversality
     for i in range(n):
         change = work.new[i] - run.y[i]
-        # A reset that puts the state back on the guard only takes away the rounding of the landing.
+        # A reset that puts the state back on the guard only removes the rounding error of the landing.
         rounding = abs(change) <= 16.0 * EPSILON * run.scale[i]
         run.trail[IMPULSE, i] = 0.0 if rounding else change / (after - transversality)
 
@@ -239,7 +240,7 @@ def chatter_matrix(model, run, transition, work):
         for j in range(n):
             removed = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
             entry = (1.0 if i == j else 0.0) - removed
-            # What the projection takes out is taken out exactly: its rounding would pass for a direction.
+            # The projection is exact in this entry: its rounding error would look like a direction.
             work.saltation[i, j] = entry if abs(entry) > 1e-13 * (1.0 + abs(removed)) else 0.0
 
 
@@ -280,7 +281,7 @@ def drift_with_mean(model, run, transition, span, work):
 
 @njit(**KERNEL)
 def add_change_of_duration(model, method, run, target, span, work):
-    """Add to ``work.saltation`` what a change of the chatter's duration does; says whether that is anything.
+    """Add the effect of a change of the chatter's duration to ``work.saltation``; whether there is one.
 
     A state that chatters longer drifts longer with the mean field of the chatter, and shorter with that of
     the limit mode; where the two agree, up to what the error of the limit makes of them, nothing is added.

@@ -24,7 +24,7 @@ from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, RUN, TASK, W
 from hybrid.kernels.types.task import task_of
 
 MOST_JUMPS = 50
-# States that differ by less than this, relative to their sizes, came out the same.
+# States with a relative difference below this are equal.
 SAME = 1e-9
 
 
@@ -32,8 +32,8 @@ SAME = 1e-9
 def enter(model, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
-    One whose guard a reset has taken the state beyond is locked to this instant, not to its guard.
-    Transitions that only the start of a run fires come before all others.
+    A transition is locked to this instant, not to its guard, if a reset took the state beyond its guard.
+    Transitions that only fire at the start of a run come before all others.
     """
     mode, t, left = run.mode, run.phase, run.previous_mode
     if run.steps == 0:
@@ -56,7 +56,7 @@ def enter(model, run, work):
 
 @njit(**KERNEL)
 def settle(model, run, first, out, work):
-    """State ``(n,)`` after ``first`` and all that it sets off at the same instant; returns the mode."""
+    """State ``(n,)`` after ``first`` and all jumps that it triggers at the same instant; returns the mode."""
     n, t = model.dimension, run.phase
     mode, fired = run.mode, first
     side, due, zero = run.rehearsal[0], run.rehearsal[1], run.rehearsal[2]
@@ -127,7 +127,7 @@ def first_in_order(task, fired):
     mode, t, before = run.mode, run.phase, run.side[fired]
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
     direction = model.direction[fired]
-    # A guard that is not affine has been proved to change its sign here.
+    # For a guard that is not affine, the change of sign is proved.
     touched = (
         model.affine_guard[fired] == 1
         and turns_back(model, run, fired, -direction if direction != 0 else before, work)
@@ -135,7 +135,7 @@ def first_in_order(task, fired):
     )
     run.side[fired] = direction if direction != 0 else -before
     if run.on_guard[fired] == 0:
-        # A guard that is not small although it has just crossed zero has jumped.
+        # A guard that has just crossed zero and is not small has jumped.
         by_bounds = has_program(model, fired) and model.guard_in_series[fired] == 0
         run.on_guard[fired] = JUMPING if by_bounds else BY_SPEED
     run.due[fired] = 0 if touched else 1

@@ -54,7 +54,7 @@ from hybrid.kernels.types.task import task_of
 
 @njit(**KERNEL)
 def cross(model, transition, mode, t, x_minus, x_plus, work):
-    """The state after the jump into ``x_plus (n,)``, and all that its saltation matrix is made of.
+    """The state after the jump into ``x_plus (n,)``, and all terms of its saltation matrix.
 
     ``D_x R`` and ``D_t R`` into ``work.reset_jacobian``, ``f_plus - D_x R f_minus - D_t R`` into
     ``work.settled``; returns the transversality. After a transition that ends the run the state stays where
@@ -100,7 +100,7 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
 def remember_jump(model, run, record, transition, transversality, kind, known, x_plus, work):
     """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any.
 
-    Its matrix is ``work.saltation``, unless that is not ``known``: it follows from the rest.
+    Its matrix is ``work.saltation`` if that is ``known``; else the matrix follows from the other entries.
     """
     n, slot = model.dimension, record.jumps
     if slot == record.jump_phase.shape[0]:
@@ -162,7 +162,7 @@ def is_grazing(model, method, run, transition, transversality, work):
     band = error_band(method, run, work.gradient, model.dimension)
     if transversality * transversality <= 2.0 * abs(acceleration) * band:
         return True
-    # Inside such a dip the steps, and with them the sizes that the tolerances refer to, are those of the dip.
+    # Inside such a dip the steps are as short as the dip, and so are the sizes that the tolerances refer to.
     way_in = run.last_transversality
     grazed = run.last_kind == GRAZING and run.last_fired == transition
     return grazed and way_in * transversality < 0.0 and abs(transversality) <= 2.0 * abs(way_in)
@@ -170,7 +170,7 @@ def is_grazing(model, method, run, transition, transversality, work):
 
 @njit(**KERNEL)
 def judge(run, n, work):
-    """Keep the largest entry of any saltation matrix so far, and count those that are not finite."""
+    """Store the largest entry of all saltation matrices so far, and count those that are not finite."""
     largest = 0.0
     for i in range(n):
         for j in range(n):
@@ -182,7 +182,7 @@ def judge(run, n, work):
 
 @njit(**KERNEL)
 def move(model, run, transition, target, x_plus):
-    """Put the run behind a jump: state, mode and counters."""
+    """Move the run past a jump: state, mode and counters."""
     for i in range(model.dimension):
         run.y[i] = x_plus[i]
         run.scale[i] = max(run.scale[i], abs(x_plus[i]))
@@ -202,7 +202,7 @@ def move(model, run, transition, target, x_plus):
 
 @njit(**KERNEL)
 def leave(model, run, transition, transversality, work):
-    """Put the run behind a jump to ``work.new``."""
+    """Move the run past a jump to ``work.new``."""
     mode, target = run.mode, model.target[transition]
     if mode == target and model.marker[transition] == 0:
         remember_impulse(model, run, transition, transversality, work)
@@ -211,7 +211,7 @@ def leave(model, run, transition, transversality, work):
 
 @njit(**KERNEL)
 def cross_without_map(model, run, transition, mode, work):
-    """``cross`` where nobody asks for a saltation matrix: the state after the jump, and no derivatives."""
+    """``cross`` for runs without saltation matrices: the state after the jump, without derivatives."""
     t, target = run.phase, model.target[transition]
     model.field(mode, t, run.y, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, run.y, work.field, work.gradient)
@@ -224,7 +224,7 @@ def cross_without_map(model, run, transition, mode, work):
 
 @njit(**KERNEL)
 def cross_with_map(model, run, transition, mode, tangents, work):
-    """Cross a guard that says when, and begin an instant; returns the transversality."""
+    """Cross a guard that sets the time of the jump, and begin an instant; returns the transversality."""
     n = model.dimension
     transversality = saltation(model, transition, mode, run.phase, run.y, work.new, work)
     change_of_instant(run, n, transversality, work)
@@ -234,7 +234,7 @@ def cross_with_map(model, run, transition, mode, tangents, work):
 
 @njit(**KERNEL)
 def recall_map(model, run, tangents, work):
-    """Make up for the tangent map of the jump that began this instant, if nobody has asked for it."""
+    """Compute the tangent map of the jump that began this instant, if it has not been computed."""
     n = model.dimension
     if run.last_fired == NO_TRANSITION:
         begin_at_start(run, n, tangents)
@@ -250,8 +250,8 @@ def recall_map(model, run, tangents, work):
 def jump(task, transition):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record.
 
-    Without tangent vectors a saltation matrix is only made where it does not follow from the states at the
-    jump, of those that are locked to another.
+    Without tangent vectors a saltation matrix is computed only for locked jumps, where it does not follow
+    from the states at the jump.
     """
     _, model, method, run, record, work = task_of(task)
     n, mode, tangents = model.dimension, run.mode, task.tangents
@@ -291,7 +291,7 @@ def jump(task, transition):
 
 @njit(**KERNEL)
 def remember_flight(run, record, n, span, x_limit):
-    """Write the jumps that are skipped into the record of steps as one straight line to their limit."""
+    """Write the skipped jumps into the record of steps, as one straight line to their limit."""
     if record.steps == record.step_phase.shape[0]:
         return
     rows = record.step_coefficients[start_record(run, record, run.phase, span)]
@@ -376,9 +376,9 @@ def follow_rounds(task, remaining):
 
 @njit(boolean(TASK, int64, float64), **PART)
 def finish_chatter(task, transition, remaining):
-    """After a jump: if its like accumulate before the end of the run, go to their limit; says whether it did.
+    """After a jump: go to the limit if jumps accumulate before the end of the run; returns whether it did.
 
-    The limit is a jump of its own, into the mode that the transition names for it, if it names one.
+    The limit is a jump of its own, into the mode that the transition names, if it names one.
     """
     if follow_impacts(task, transition, remaining):
         return True

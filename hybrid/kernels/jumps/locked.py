@@ -1,4 +1,4 @@
-"""Jumps that a jump sets off at once: the guard of the first says when all of them happen.
+"""Jumps that a jump triggers at the same instant: the guard of the first determines the time of all.
 
 A reset that lands beyond a guard of its mode fires that transition too, on neighbouring orbits as on this
 one. Their instant changes with a tangent vector ``v`` before the first jump by ``tau = a v``, the saltation
@@ -18,7 +18,7 @@ from hybrid.kernels.types.layout import KERNEL
 
 @njit(**KERNEL)
 def keep_tangents(run, n, tangents):
-    """Keep the tangent vectors and what is summed along with them, as they are before a jump."""
+    """Store the tangent vectors, and the sums that go with them, as they are before a jump."""
     for i in range(n * tangents):
         run.before[i] = run.y[n + i]
     for c in range(tangents):
@@ -29,7 +29,7 @@ def keep_tangents(run, n, tangents):
 
 @njit(**KERNEL)
 def restore_tangents(run, n, tangents):
-    """Put the tangent vectors back to where they were before the first jump of this instant."""
+    """Restore the tangent vectors to their values before the first jump of this instant."""
     for i in range(n * tangents):
         run.y[n + i] = run.before[i]
     for c in range(tangents):
@@ -40,14 +40,14 @@ def restore_tangents(run, n, tangents):
 
 @njit(**KERNEL)
 def change_of_instant(run, n, transversality, work):
-    """Keep the derivative of the time at which a guard is crossed, whose gradient is ``work.gradient``."""
+    """Store the derivative of the time at which the guard with gradient ``work.gradient`` is crossed."""
     for j in range(n):
         run.instant[j] = -work.gradient[j] / transversality if work.gradient[j] != 0.0 else 0.0
 
 
 @njit(**KERNEL)
 def begin_instant(run, n, tangents, work):
-    """Keep what is there before a jump whose tangent map is ``work.saltation``.
+    """Store the tangent vectors and the tangent map ``work.saltation`` of a jump that begins an instant.
 
     ``change_of_instant`` has been called.
     """
@@ -57,7 +57,7 @@ def begin_instant(run, n, tangents, work):
 
 @njit(**KERNEL)
 def keep_map(run, n, work):
-    """Keep ``work.saltation`` as the tangent map of this instant so far."""
+    """Store ``work.saltation`` as the tangent map of this instant so far."""
     for j in range(n):
         for i in range(n):
             run.instant[n + n * j + i] = work.saltation[i, j]
@@ -66,7 +66,7 @@ def keep_map(run, n, work):
 
 @njit(**KERNEL)
 def postpone_map(run, n):
-    """Keep the state before a jump instead, for the case that another jump is locked to it."""
+    """Store the state before a jump instead, in case another jump is locked to this jump."""
     for i in range(n):
         run.instant[i] = run.y[i]
     run.map_is_known = 0
@@ -74,7 +74,7 @@ def postpone_map(run, n):
 
 @njit(**KERNEL)
 def begin_at_start(run, n, tangents):
-    """As ``begin_instant`` where a run starts beyond a guard."""
+    """As ``begin_instant``, for a run that starts beyond a guard."""
     keep_tangents(run, n, tangents)
     for i in range(n * (1 + n)):
         run.instant[i] = 0.0
@@ -85,7 +85,7 @@ def begin_at_start(run, n, tangents):
 
 @njit(**KERNEL)
 def follow(run, n, work):
-    """Take a jump set off at once into the tangent map of its instant.
+    """Include a triggered jump in the tangent map of its instant.
 
     ``work.reset_jacobian`` and ``work.settled`` hold its ``D_x R`` and ``f_plus - D_x R f - D_t R``. Its own
     matrix goes to ``work.saltation``: the derivative of the instant refers to the state after the jumps

@@ -1,4 +1,4 @@
-"""Chatter of several transitions in turn: the limit of their jumps, from the series that they make.
+"""Chatter of several transitions in turn: the limit of their jumps, from the series of their times.
 
 Transitions that fire in the same order again and again, each round shorter than the last by the same ratio
 ``r``, accumulate. The states and times right after the jumps of one transition are then smooth functions of
@@ -11,30 +11,30 @@ from hybrid.kernels.events.guards import guard_value
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import INLINE, KERNEL
 
-# Transitions in a round at most, and rounds that must have been seen.
+# Largest number of transitions in a round, and number of rounds that must have occurred.
 MOST_IN_TURN = 8
 FEWEST_ROUNDS = 5
 # No limit is taken before this many jumps.
 FEWEST_JUMPS = 16
-# Largest change of the ratio from round to round, as a share of how far the ratio is from 1.
+# Largest change of the ratio from round to round, as a share of the distance of the ratio from 1.
 STEADY = 0.1
-# Share that is left of a time where it has become shorter. Ratios closer to 1 are not told from it.
+# A time is shorter only if at most this share is left. Ratios closer to 1 cannot be told from 1.
 SHORTER = 0.999
-# A share of the time since the chatter began that is too short for the limit to change any more.
+# Share of the time since the chatter began that is too short to change the limit.
 NOTHING_LEFT = 1e-7
-# How far, in sizes of the state, guards may be from zero and resets from the identity at a limit.
+# Largest distance of guards from zero, and of resets from the identity, at a limit, in sizes of the state.
 ROUGH = 1e-6
 
 
 @njit(**INLINE)
 def slot_of(run, jumps):
-    """Where the visit after so many jumps, and the transition of the next one, are kept."""
+    """The slot for the visit after that many jumps, and for the transition of the next jump."""
     return jumps & (run.visits.shape[0] - 1)
 
 
 @njit(**KERNEL)
 def remember_visit(model, run):
-    """Keep the time and the state right after a jump."""
+    """Store the time and the state right after a jump."""
     row, n = run.visits[slot_of(run, run.jumps)], model.dimension
     for i in range(n):
         row[i] = run.y[i]
@@ -77,7 +77,7 @@ def time_left_of_rounds(model, run, turn, back):
 
 @njit(**KERNEL)
 def transitions_in_turn(model, run):
-    """How many transitions have fired in turn, in the same order round after round; 0 if none have.
+    """The number of transitions that fire in turn, in the same order in each round; 0 if there are none.
 
     One that brings the state back onto its guard, with a steady ratio, is followed by its own impacts.
     """
@@ -152,7 +152,7 @@ def size_of_visits(model, run, seen, out):
 
 @njit(**KERNEL)
 def limit_of_rounds(model, method, run, work):
-    """Time to the limit of the jumps that fire in turn, and how many these are; zero if there is none yet.
+    """Time to the limit of the jumps that fire in turn, and their number; zero if there is no limit yet.
 
     To be called after each jump. The limit is known once two estimates, a round apart, agree up to the
     tolerances, or once there is next to nothing left. The limit state goes to ``work.settled``.
@@ -188,7 +188,7 @@ def limit_of_rounds(model, method, run, work):
 
 @njit(**KERNEL)
 def next_in_turn(model, run, turn):
-    """The transition that would fire next; none if another one names the mode of the limit."""
+    """The transition that would fire next; none if another transition names the mode of the limit."""
     following = fired_before(run, turn - 1)
     if model.accumulates_to[following] != NO_MODE:
         return following
