@@ -10,11 +10,11 @@ from hybrid.kernels.types.layout import CUBE, ENTRY, INDICES, KERNEL, MATRIX, VE
 
 @njit(**KERNEL)
 def step_at(start, time, step):
-    """The last step that starts no later than ``time``, looked for from ``step`` on; the first if none."""
+    """The last step that starts no later than ``time``, searched from ``step`` on; the first step if none."""
     count = start.shape[0]
     low, high = 0, count
     if start[step] <= time:
-        # Most times fall into the step of the time before or into the next one.
+        # Most times fall into the same step as the previous time, or into the next step.
         low = step
         for _ in range(2):
             if low + 1 == count or start[low + 1] > time:

@@ -28,30 +28,30 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RUN, WORK
 
-# What a piece of a step may be found to be.
+# Verdicts on a piece of a step.
 EXPLAINED, UNKNOWN, HIDDEN = range(3)
-# A range differs from that at one point by rounding if it is no wider than so many times that.
+# A range is rounding if it is at most this many times as wide as the range at one point.
 FLAT = 4.0
-# A place of the step like any other.
+# An arbitrary place of the step.
 ELSEWHERE = 0.3819
-# Share of the largest difference of samples by which the forcing may leave the range of its neighbours:
-# a resolved maximum lies a little above them, and error control sees what the samples differ by.
+# The forcing may leave the range of neighbouring samples by this share of the largest difference of samples:
+# a resolved maximum lies a little above them, and error control sees the differences of the samples.
 BETWEEN = 0.25
-# Shares of the tolerance that may stay unseen, over the step and on one piece.
+# Shares of the tolerance that may remain unseen, on the whole step and on one piece.
 SHARE = 0.1
 SHARE_OF_PIECE = 0.01
 # A piece as short as the rounding of time is taken as it is: what it may hide is as large as what this
 # rounding does to a jump. More than so many tolerances of it are reported.
 COARSE_PIECE = 10.0
-# How many steps ahead the forcing is asked whether it is monotone, and after how many steps once more.
+# Number of steps ahead for which monotone forcing is tested, and number of steps until the next test.
 AHEAD = 16.0
 WAIT = 8
-# Most pieces that a step is divided into, and most times that it is shortened.
+# Largest number of pieces of a step, and of attempts to shorten it.
 MOST_PIECES = 400
 MOST_CUTS = 200
-# No step is made shorter than so many times the rounding of time.
+# Shortest step, in units of the rounding of time.
 FINEST = 64.0 * EPSILON
-# After so many such steps the forcing is no longer held to this.
+# After this many such steps the forcing is no longer tested.
 MOST_UNRESOLVED = 100
 # Tolerances by which a series may differ from its field over a step.
 MARGIN = 2.0
@@ -113,7 +113,7 @@ def _take_samples(model, program, path, order, clock, start, nodes, h, work):
 
 @njit(**INLINE)
 def _sampled_range(a, b, c, d):
-    """What is certainly between the samples ``[a, b]`` and ``[c, d]``; all between if both are uncertain."""
+    """The range surely between the samples ``[a, b]`` and ``[c, d]``; all between if both are uncertain."""
     one, other = min(b, d), max(a, c)
     return min(one, other), max(one, other)
 
@@ -140,14 +140,14 @@ def _judged(programs, first, last, j, whole, length, negligible, tolerance, work
         if programs.checked[first + place] == 0:
             continue
         row, i = work.registers[place], 2 * place
-        # Of a sample within rounding of a jump nobody knows which side the method has seen.
+        # For a sample within rounding of a jump, it is unknown which side the method has seen.
         low, high = _sampled_range(samples[j, i], samples[j, i + 1], samples[j + 1, i], samples[j + 1, i + 1])
         if place == last:
             beyond = _beyond(row, j, last, work)
             if beyond <= negligible or beyond * length <= tolerance:
                 return EXPLAINED
         elif not row[HIGH] - row[LOW] < math.inf:
-            # A part that may not even be in use, such as the other branch of a choice.
+            # This part may be unused, such as the other branch of a choice.
             continue
         if whole and _is_monotone(row) and row[HIGH] - row[LOW] < math.inf:
             continue
@@ -165,7 +165,7 @@ def _judged(programs, first, last, j, whole, length, negligible, tolerance, work
 
 @njit(**KERNEL)
 def _first_hidden(model, program, path, order, clock, start, nodes, h, tolerance, finest, work):
-    """How far a forcing is explained on a step of length ``h``, and the first place beyond where it is not.
+    """The length on which a forcing is explained, of a step ``h``, and the first unexplained place after it.
 
     Both are ``h`` if all of it is explained. ``tolerance`` is that of the forcing's integral. Returned third
     is the most that a piece as short as the rounding of time adds to that, as far as bounds can tell.
@@ -261,7 +261,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
             place, other, rest = _first_hidden(
                 model, program, path, order, clock, start, nodes, explained, tolerance, finest, work
             )
-            # What multiplies other forcings is not known, and neither is what they add to the state.
+            # The factors of other forcings are unknown, and so are their contributions to the state.
             coarse = coarse or (component >= 0 and rest > COARSE_PIECE * tolerance)
             if place < explained:
                 explained, beyond = place, other
@@ -276,7 +276,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
 
 @njit(**KERNEL)
 def _unresolved(run, longest, shortest):
-    """The step where none is explained: the shortest, but after many of them what had been proposed."""
+    """The step if no step is explained: the shortest one; after many such steps, the proposed one."""
     run.unresolved += 1
     return min(longest, shortest) if run.unresolved <= MOST_UNRESOLVED else longest
 

@@ -14,9 +14,10 @@ from hybrid.kernels.steps.step import combine, error_ratio, estimate_error
 from hybrid.kernels.types.layout import KERNEL, METHOD, MODEL, PART, VECTOR, WORK
 
 MOST_ITERATIONS = 10
-# An iteration that no longer contracts has met rounding if its last change is this far below the tolerance.
+# An iteration that no longer contracts has reached rounding if its last change is below this share of the
+# tolerance.
 STALLED = 1e-2
-# Error ratio of a step whose equations could not be solved: the driver will try about half of it.
+# Error ratio of a step whose equations could not be solved: the driver then tries about half the step.
 NOT_SOLVED = 10.0
 # Slots of the last row of Work.systems.
 LAST_LENGTH, LAST_MODE = 0, 1
@@ -66,7 +67,7 @@ def predict(method, mode, h, y, n, work):
 
 @njit(**KERNEL)
 def remember(method, mode, h, y, n, work):
-    """Keep the polynomial of this step for the next guess."""
+    """Store the polynomial of this step for the next guess."""
     s = method.b.shape[0]
     last = work.systems[(s + 1) * n + 1 :]
     for i in range(n):

@@ -1,4 +1,4 @@
-"""One step of a Runge-Kutta method: attempt, error control, first event, and landing on that."""
+"""One step of a Runge-Kutta method: attempt, error control, first event, and landing on the event."""
 
 import math
 
@@ -38,17 +38,17 @@ from hybrid.kernels.types.task import task_of
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 6.0
-# An event resets the pace: a flight that is a polynomial has no error to hold its steps back, and one step
-# across many bounces, each much shorter than it, would drown them in its rounding.
+# Steps start short after an event. A flight that is a polynomial has no error that limits its steps, and one
+# step across many short bounces would lose them in its rounding error.
 LONGEST_AFTER_EVENT = 100.0
-# Logarithm of how close together the tangent vectors may be at the end of a step. An implicit step can be as
-# long as it likes where they shrink fast: what it makes of them is then no exponential.
+# Logarithm of the smallest product of sines of the tangent vectors at the end of a step. An implicit step may
+# be long where they shrink fast, and its result is then far from an exponential.
 CLOSEST = math.log(1e3)
 
 
 @njit(**INLINE)
 def all_affine(model, mode):
-    """Whether every guard of the mode is affine, so that following them needs no interpolant of the state."""
+    """Whether all guards of the mode are affine and can be followed without an interpolant of the state."""
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         if model.affine_guard[model.outgoing[slot]] == 0:
             return False
@@ -62,7 +62,7 @@ def remember_step(model, method, run, record, t, h, work):
     interpolation_stages(model, method, run.mode, t, h, run.y, work)
     slot = start_record(run, record, t, h)
     rows = record.step_coefficients[slot]
-    # Element by element: an array assignment brings its error message along, seconds of compilation.
+    # Element by element: an array assignment would add its error message, seconds of compilation.
     for i in range(n):
         rows[0, i] = run.y[i]
     rows[0, n] = 0.0
@@ -78,7 +78,7 @@ def remember_step(model, method, run, record, t, h, work):
 
 @njit(**KERNEL)
 def remember_touch(model, method, run, record, t, h, work):
-    """Remember the grazing at ``GRAZING_PLACE`` on the attempted step."""
+    """Record the grazing at ``run.grazing_place`` on the attempted step."""
     theta = run.grazing_place
     interpolant_path(method, h, run.y, model.dimension, work)
     state_at(work.path, method.powers.shape[0] - 1, model.dimension, theta, work.state)
@@ -155,7 +155,7 @@ def carry_rates(method, length, work):
 
 @njit(**INLINE)
 def growth_factor(method, run, h, ratio):
-    """Factor to the next step from this error ratio, and from its trend over the last two steps.
+    """Factor for the next step from this error ratio and from its trend over the last two steps.
 
     The trend (Gustafsson 1994, doi:10.1145/198429.198437) foresees the shrinking steps towards a singularity,
     such as the end of a Hertz contact, where each step would otherwise be tried too long.
@@ -169,7 +169,7 @@ def growth_factor(method, run, h, ratio):
 
 @njit(**INLINE)
 def alignment_ratio(method, n, tangents, work):
-    """Error ratio that stands for the tangent vectors at the end of the attempted step.
+    """Error ratio due to the angles of the tangent vectors at the end of the attempted step.
 
     It makes the logarithm of the product of their sines a limit of the step's length. Above 1 they are too
     close together for the solver's error, which is relative to whole vectors.

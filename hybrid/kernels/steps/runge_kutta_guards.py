@@ -19,11 +19,11 @@ from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
-# A correction this small, relative to the step, is finished by one Euler step: the error left is its square.
+# Below this share of the step, one Euler step completes a correction: the error left is its square.
 EULER_IS_ENOUGH = 1e-8
-# Farthest Newton step, as a share of the step, for a guard that may have kinks and jumps.
+# Largest Newton step, as a share of the step, for a guard that may have kinks and jumps.
 FARTHEST = 1e-3
-# First distance, as a share of the step, at which the other side of a guard is looked for.
+# First distance, as a share of the step, at which the other side of a guard is searched.
 FIRST_REACH = 1e-10
 MOST_LANDINGS = 200
 NOT_THERE = -1.0
@@ -50,7 +50,7 @@ def affine_polynomial(model, method, transition, t, h, x, value, work):
 
 @njit(**KERNEL)
 def rounding_on_step(model, run, transition, t, h, work):
-    """How far from zero rounding can leave a guard that is at rest on a step; ``work.gradient`` is current.
+    """Largest value that rounding can give a guard at rest on a step; ``work.gradient`` is current.
 
     A state and a time that are zero where the step starts have no size there, only further on.
     """
@@ -64,7 +64,7 @@ def rounding_on_step(model, run, transition, t, h, work):
 
 @njit(**KERNEL)
 def leave_guard(model, run, transition, t, work):
-    """Put a guard on the side it has at the end of the attempted step, ``work.new``, whatever came before."""
+    """Set the side of a guard to its side at the end of the attempted step, ``work.new``."""
     value = guard_value(model, transition, t, work.new, work.scalar)
     model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
     if abs(value) > rounding_band(model, run, transition, t, work.new, work):
@@ -152,8 +152,8 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
     s = method.b.shape[0]
     low, high = 0.0, h
     begins = guard_value(model, transition, t, y, work.scalar) * side > 0.0
-    # Along the step an affine guard is as smooth as the state. Another one may have kinks, jumps, flat roots.
-    # It may cross more than once on the step, whose ends are no ends of a bracket then.
+    # Along the step an affine guard is as smooth as the state. Other guards may have kinks, jumps and flat
+    # roots, and may cross more than once on the step. The ends of the step are then no bracket.
     smooth = model.affine_guard[transition] == 1
     before = smooth and begins
     after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
@@ -165,7 +165,7 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
         value = guard_value(model, transition, t + length, work.new, work.scalar)
         speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
         correction = -value / speed
-        # The next correction is foreseen from the last two, since Newton's method converges quadratically.
+        # The next correction is predicted from the last two, because Newton's method converges quadratically.
         next_one = abs(correction) ** 3
         converges = smooth or (trial > 0 and next_one <= EPSILON * length * last * last)
         if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
@@ -183,9 +183,9 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
             return high, 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
-        # A place that Newton's method has not led to says nothing of how fast that converges.
+        # A place that does not come from Newton's method gives no rate of convergence.
         last = 0.0
-        # Beyond the error of an interpolant Newton's step follows something else, the slope beside a jump.
+        # A Newton step longer than the error of the interpolant follows another slope, that beside a jump.
         trusted = smooth or abs(correction) <= FARTHEST * h
         if low < newton < high and trusted and not slow:
             length, last = newton, abs(correction)
@@ -194,14 +194,14 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
         elif smooth:
             break
         else:
-            # Only one side has been seen: look for the other one, farther and farther from there.
+            # Only one side is known: search the other side at growing distances.
             length = low + reach if before else high - reach
             reach *= 8.0
             if before and low < h <= length:
-                # The end of the step is the farthest place there is.
+                # The end of the step is the farthest place.
                 length = h
             elif begins and after and length <= low:
-                # So is its start.
+                # The start of the step is the farthest place on this side.
                 before, length = True, 0.5 * high
             elif not low < length < high:
                 break

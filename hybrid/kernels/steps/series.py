@@ -1,4 +1,4 @@
-"""One step by the Taylor series of the solution, whose guards are isolated on the series themselves.
+"""One step by the Taylor series of the solution; guards are isolated on the series themselves.
 
 A series ``(order + 1, columns)`` holds normalised Taylor coefficients: the state, then the guards of the
 mode, the time since the start of the step, the integral of div f, what the recurrences need, and the tangent
@@ -51,43 +51,43 @@ from hybrid.kernels.types.task import task_of
 
 # Series that can be trusted to the last digit are cut off below rounding.
 EXACT_TOLERANCE = 1e-17
-# Share of the largest component that is an absolute tolerance for the others.
+# Share of the largest component that serves as absolute tolerance for the others.
 SHARE = 1e-3
 SAFETY = 0.9
-# Share of the tolerance that a tangent vector gets: stiff contacts stretch it a thousandfold and shrink it
-# again, and what was an error of the long vector is one of the short vector then.
+# Share of the tolerance for tangent vectors: a stiff contact stretches a vector a thousandfold and shrinks it
+# again, and the error made while the vector is long remains when it is short.
 TANGENT_SHARE = 0.1
-# Below this their error is rounding.
+# Below this tolerance the error of tangent vectors is rounding.
 FINEST = 1e-14
-# What stands for an absolute tolerance where there is none.
+# Absolute tolerance of exact series, which need none.
 TINY = 1e-300
-# Terms at the end of a series that have to be small.
+# Number of terms at the end of a series that must be small.
 TAIL = 8
 TAIL_OF_EXACT = 3
 # How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
 FALL_OF_EXACT = 4.0
-# Share of a step by which a landing may still be corrected.
+# Largest correction of a landing, as a share of the step.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
 LONG = 100.0
-# Share of the last stay in a mode by which a step goes beyond it.
+# A step may exceed the last stay in a mode by this share of the stay.
 AHEAD = 0.25
 # The clock of a guard's root stands still where guard and speed vanish together. Steps shorter than this
 # share of the stay in the mode do not lead away from there, if so many of them follow one another.
 CRAWL = 1e-4
 MOST_CRAWLING = 100
-# Share of time below which that is no step.
+# Below this share of the time the excess is too small for a step.
 NEXT_TO_NOTHING = 1e-10
 
 
 @njit(**INLINE)
 def weigh_state(series, n, rtol, atol, exact, weights):
-    """One over the tolerance of every component of the state into ``weights``; the rest weighs nothing."""
+    """One over the tolerance of each component of the state into ``weights``; all other weights are zero."""
     largest = 0.0
     for i in range(n if exact else 0):
         largest = max(largest, abs(series[0, i]))
     if exact and largest == 0.0:
-        # From rest at the origin, the first terms tell the size.
+        # At rest at the origin, the first terms determine the size.
         for i in range(n):
             largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
     floor = SHARE * rtol * largest + TINY if exact else atol + TINY
@@ -128,7 +128,7 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
     decisive = four_times(-math.inf)
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
-        # What is not a number is left out here, and met with when the series is summed.
+        # A nan is skipped here; it shows when the series is summed.
         worst = four_times(0.0)
         for i in range(0, n, NARROW):
             worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
@@ -166,7 +166,7 @@ def accept_series(model, run, tangents, order, h, work):
     on_guard = 0
     for slot in range(first, last):
         on_guard += run.on_guard[model.outgoing[slot]]
-    # What the state is a sum of is what its rounding is judged by.
+    # Rounding is judged by the terms of which the state is the sum.
     for i in range(n):
         run.scale[i] = max(run.scale[i] if on_guard > 0 else 0.0, series[order + 2, i])
         run.y[i] = series[order + 1, i]
@@ -316,7 +316,7 @@ def series_step(task, remaining):
 
 @njit(**INLINE)
 def as_far_as_last_time(model, run, mode):
-    """A little more than is left of a stay as long as the last one; anything if it is longer already.
+    """A little more than the rest of a stay as long as the last one; infinity if the stay is longer already.
 
     The event that ends it is found on the way; a longer step would only make it harder to find. A stay that
     was next to nothing says nothing of this one.

@@ -1,4 +1,4 @@
-"""Guards along a series: their polynomials, the proofs that they keep clear, the earliest crossing."""
+"""Guards along a series: their polynomials, proofs that they have no zero, the earliest crossing."""
 
 import math
 
@@ -28,9 +28,9 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
-# The error of the last step towards a root is taken to be this many times its estimate.
+# Safety factor for the estimated error of the last step towards a root.
 UNSEEN = 64.0
-# Share of a guard's size that the high powers of its series may reach together to be left out of a proof.
+# High powers of a series are left out of a proof if their sum is below this share of the size of the guard.
 NEGLIGIBLE = 0.003
 
 
@@ -50,7 +50,7 @@ POWERS = np.array(
 )
 # Verdicts on a guard.
 CLEAR, CROSSES, UNKNOWN = range(3)
-# What is not decided on a part this short is left to the whole polynomial.
+# If a part this short is not decided, the whole polynomial is used.
 SHORTEST_PART = 0.2
 
 
@@ -60,7 +60,7 @@ def to_bernstein(coefficients, degree):
     for k in range(1, degree + 1):
         coefficients[k] *= SHARES[degree, k]
     for level in range(degree):
-        # A view of what changes: its indices are plainly not negative, and need no check in the inner loop.
+        # A view whose indices are never negative needs no check in the inner loop.
         row = coefficients[level : degree + 1]
         before = row[0]
         for j in range(1, degree + 1 - level):
@@ -119,7 +119,7 @@ def beyond_known_roots(series, column, h, known_roots, size):
 
 @njit(**INLINE)
 def keeps_half(first, value, size):
-    """The cheap proof that a polynomial on ``[0, 1]`` keeps half of its ``first`` value, from that at 1.
+    """A cheap proof that a polynomial on ``[0, 1]`` keeps half of its ``first`` value, from its value at 1.
 
     With ``size`` the sum of the magnitudes of its terms, those that take it down on the way come to
     ``(size - value) / 2``.
@@ -143,7 +143,7 @@ def leading_powers(series, column, order, power, known_roots, size, coefficients
         if rest <= NEGLIGIBLE * size:
             break
         power *= h
-    # Its own rounding included.
+    # Including the rounding of this sum.
     return degree, max(rest, 0.0) + 64.0 * EPSILON * size
 
 
@@ -159,7 +159,7 @@ def falls_throughout(coefficients, degree, slope_of_rest, side):
 
 @njit(**KERNEL)
 def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
-    """What the leading powers of a guard prove of it, part by part from the start of the step on.
+    """Proofs about a guard by its leading powers, part by part from the start of the step.
 
     ``stack[0, 2:]`` are their Bernstein coefficients; all the others add no more than ``rest``, and no more
     than ``slope_of_rest`` to the slope; ``last`` is the value at the end of the step, with them. Returns
@@ -175,7 +175,7 @@ def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
         if stays(row[2:], degree, side, band + rest):
             top -= 1
             continue
-        # At the ends of the step the values are known as they are.
+        # At the ends of the step the exact values are known.
         left = row[2] * side - (rest + band if start > 0.0 else 0.0)
         right = last * side if end == 1.0 else row[2 + degree] * side + rest
         if (
@@ -221,7 +221,7 @@ def expanded_at(series, column, first, order, s):
 def time_of(series, clock, order, h, span):
     """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
     low, high = 0.0, h
-    # It may start without speed: the place grows like the root of the time then.
+    # The clock may start at speed zero; the place then grows like the root of the time.
     s = h * math.sqrt(min(max(span / value_at(series, clock, order, h), 0.0), 1.0))
     if s == 0.0:
         return s
@@ -285,7 +285,7 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
         if abs(shift * curve) < 0.5:
             shift /= 1.0 + shift * curve
         closer, change = s + shift, abs(shift)
-        # Its steps shrink here; one that does not is the rounding of the value.
+        # The steps of the method shrink here; a step that does not shrink is rounding.
         if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
             return s
         if low < closer < high:
@@ -339,7 +339,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         band = rounding
         if kind != EXACT:
             band = error_band(method, run, work.gradient, model.dimension)
-        # Along the root of a guard, what is small for the guard is not as small.
+        # A value that is small for a guard is less small for the root of the guard.
         if kind in (DESINGULARISED, ROOTED):
             rounding, band = math.sqrt(rounding), math.sqrt(band)
         size, power = beyond_known_roots(series, column, h, on_guard, size)

@@ -17,9 +17,9 @@ from hybrid.kernels.types.layout import (
     WORK,
 )
 
-# A state that is smaller than this many tolerances is taken to be of this size as a run starts.
+# At the start of a run, a state below this many tolerances counts as this large.
 MANY_TOLERANCES = 1e4
-# Share of a run, or of a forcing period, that is the unit of time of a state at rest.
+# Unit of time of a state at rest, as a share of the run or of the forcing period.
 AT_REST = 1e-4
 
 
@@ -211,7 +211,7 @@ def attempt(parts, model, method, mode, t, h, y, tangents, work):
 
 @njit(**KERNEL)
 def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
-    """``attempt``, for the places where a step is taken again: compiled once, not into each of them."""
+    """``attempt`` as a function that is compiled once, for steps that are repeated."""
     return attempt(parts, model, method, mode, t, h, y, tangents, work)
 
 
