@@ -371,7 +371,7 @@ class TestStart:
         arc = simulate(system, (2.0, 0.0, 0.0), (0.0, 4.0), mode="a")
         assert fired(arc) == ["back", "one"]
         assert arc.jumps.t.tolist() == pytest.approx([2.0, 3.0])
-        assert "beyond the guard of 'one', which counts as crossed" in arc.status.message
+        assert "beyond the guard of 'one'. This guard counts as crossed" in arc.status.message
         on_it = simulate(system, (1.0, 0.0, 0.0), (0.0, 0.5), mode="a")
         assert fired(on_it) == ["one"]
         assert "beyond" not in on_it.status.message
