@@ -26,6 +26,7 @@ from hybrid.symbolic.expressions import (
     Floor,
     Less,
     LessEqual,
+    Level,
     Not,
     Or,
     Remainder,
@@ -71,7 +72,9 @@ def _surfaces(entry: sympy.Expr, states: Sequence[sympy.Symbol]) -> list[str]:
     if not contains(entry, JUMPS):
         return []
     entry = _with_exact_turns(entry)
-    jumps = (node for node in nodes_of(JUMPS, entry) if mentions(node, states))
+    jumps = (
+        node for node in nodes_of(JUMPS, entry) if mentions(node, states) and not isinstance(node, Level)
+    )
     atoms = sorted(jumps, key=sympy.default_sort_key)
     names = {atom: sympy.Dummy(real=True) for atom in atoms}
     return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
@@ -108,6 +111,14 @@ def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Exp
         if _is_zero((above - below).subs(old, new)):
             return True
     return False
+
+
+def vanishes_on(expression: sympy.Expr, surface: sympy.Expr) -> bool:
+    """Whether an expression is proved to be zero wherever another one is."""
+    with distribute(True):
+        if _is_zero(expression):
+            return True
+        return any(_is_zero(expression.subs(old, new)) for old, new in _substitutions(surface))
 
 
 def _substitutions(surface: sympy.Expr) -> Iterator[tuple[sympy.Expr, sympy.Expr]]:

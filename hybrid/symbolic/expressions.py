@@ -75,6 +75,10 @@ class Floor(PiecewiseConstant):
     value = staticmethod(math.floor)
 
 
+class Level(Floor):
+    """A floor in a place where it does not jump: its jumps are events of their own."""
+
+
 class Ceiling(PiecewiseConstant):
     """The smallest integer not below ``u``."""
 
@@ -122,17 +126,38 @@ class And(PiecewiseConstant):
 
     value = staticmethod(lambda a, b: float(bool(a and b)))
 
+    @classmethod
+    def eval(cls, *args: sympy.Expr) -> sympy.Expr | None:
+        return ZERO if ZERO in args else _decided(cls, args)
+
 
 class Or(PiecewiseConstant):
     """0 if both arguments are 0, else 1."""
 
     value = staticmethod(lambda a, b: float(bool(a or b)))
 
+    @classmethod
+    def eval(cls, *args: sympy.Expr) -> sympy.Expr | None:
+        if any(arg.is_Number and not arg.is_zero for arg in args):
+            return ONE
+        return _decided(cls, args)
+
+
+def _decided(connective: Any, args: tuple[sympy.Expr, ...]) -> sympy.Expr | None:
+    """The value for two numbers; for a number that decides nothing the other argument, if it is 0 or 1."""
+    others = [arg for arg in args if not arg.is_Number]
+    if not others:
+        return number(connective.value(*map(float, args)))
+    return others[0] if len(others) == 1 and isinstance(others[0], TRUTHS) else None
+
 
 class Not(PiecewiseConstant):
     """1 if ``a`` is 0, else 0."""
 
     value = staticmethod(lambda a: float(not a))
+
+
+TRUTHS = (Less, LessEqual, Equal, And, Or, Not)
 
 
 class Absolute(RealFunction):

@@ -40,6 +40,7 @@ MATH_FUNCTIONS: dict[type[sympy.Basic], str] = {
     sympy.Abs: "abs",
     # math.floor gives an integer, which cannot hold every float
     sym.Floor: "np.floor",
+    sym.Level: "np.floor",
     sym.Ceiling: "np.ceil",
     sym.Truncate: "np.trunc",
 }

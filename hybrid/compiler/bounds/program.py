@@ -41,6 +41,7 @@ ONE_OPERAND: dict[type[sympy.Basic], int] = {
     sym.Absolute: op.ABSOLUTE,
     sympy.Abs: op.ABSOLUTE,
     sym.Floor: op.FLOOR,
+    sym.Level: op.FLOOR,
     sym.Ceiling: op.CEILING,
     sym.Truncate: op.TRUNCATE,
     sym.Sign: op.SIGN,

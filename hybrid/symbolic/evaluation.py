@@ -1,0 +1,123 @@
+"""Expressions as model functions: evaluated on numbers and on traced numbers by NumPy's functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import reduce
+from typing import Any
+
+import attrs
+import numpy as np
+import sympy
+from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+from sympy.core.parameters import distribute
+
+from hybrid.symbolic import expressions as sym
+from hybrid.symbolic.nodes import replaced
+from hybrid.symbolic.tracing import Traced, model_symbols
+
+FUNCTIONS: dict[type[sympy.Basic], Callable[..., Any]] = {
+    sympy.exp: np.exp,
+    expm1: np.expm1,
+    exp2: np.exp2,
+    sympy.log: np.log,
+    log1p: np.log1p,
+    log2: np.log2,
+    log10: np.log10,
+    sympy.sin: np.sin,
+    sympy.cos: np.cos,
+    sympy.tan: np.tan,
+    sympy.asin: np.arcsin,
+    sympy.acos: np.arccos,
+    sympy.atan: np.arctan,
+    sympy.sinh: np.sinh,
+    sympy.cosh: np.cosh,
+    sympy.tanh: np.tanh,
+    sympy.asinh: np.arcsinh,
+    sympy.acosh: np.arccosh,
+    sympy.atanh: np.arctanh,
+    sympy.Abs: np.abs,
+    sympy.sign: np.sign,
+    hypot: np.hypot,
+    sym.Absolute: np.abs,
+    sym.Atan2: np.arctan2,
+    sym.Ceiling: np.ceil,
+    sym.CubeRoot: np.cbrt,
+    sym.Equal: lambda a, b: a == b,
+    sym.Floor: np.floor,
+    # Written so that a list of operations tells it from a floor that jumps.
+    sym.Level: lambda u: np.floor(np.positive(np.positive(u))),
+    sym.Less: lambda a, b: a < b,
+    sym.LessEqual: lambda a, b: a <= b,
+    sym.Maximum: np.maximum,
+    sym.Minimum: np.minimum,
+    sym.Remainder: np.remainder,
+    sym.Select: np.where,
+    sym.Sign: np.sign,
+    sym.Step: lambda u: np.heaviside(u, 0.5),
+    sym.Truncate: np.trunc,
+    sym.TruncatedRemainder: np.fmod,
+    sym.And: np.logical_and,
+    sym.Or: np.logical_or,
+    sym.Not: np.logical_not,
+    sympy.Add: lambda *terms: reduce(lambda a, b: a + b, terms),
+    sympy.Mul: lambda *factors: reduce(lambda a, b: a * b, factors),
+    sympy.Pow: lambda base, exponent: base**exponent,
+}
+
+
+@attrs.frozen(eq=False)
+class Expressed:
+    """A model function ``(t, x, p)`` whose values are given by expressions.
+
+    Tracing gets the expressions themselves, in other symbols if need be, so a function derived from traced
+    functions is compiled as if it had been written by hand.
+
+    Attributes
+    ----------
+    expressions
+        In the symbols of `hybrid.symbolic.tracing.model_symbols`.
+    size
+        Number of values; None for a scalar function.
+    """
+
+    expressions: tuple[sympy.Expr, ...]
+    size: int | None = None
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        states, parameters = [*x], [*p]
+        symbols = model_symbols(len(states), len(parameters))
+        known = (symbols.t, *symbols.x, *symbols.p)
+        values = dict(zip(known, (t, *states, *parameters), strict=True))
+        if isinstance(t, Traced) and isinstance(t.content, sympy.Basic):
+            contents = {symbol: value.expression for symbol, value in values.items()}
+            with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
+                results: list[Any] = [Traced(replaced(each, contents)) for each in self.expressions]
+        else:
+            results = evaluated(self.expressions, values)
+        return results if self.size is not None else results[0]
+
+
+def evaluated(expressions: Iterable[sympy.Expr], values: Mapping[sympy.Symbol, Any]) -> list[Any]:
+    """Values of expressions for numbers or traced numbers in place of their symbols."""
+    known: dict[sympy.Expr, Any] = dict(values)
+    return [_value(each, known) for each in expressions]
+
+
+def _value(node: sympy.Expr, known: dict[sympy.Expr, Any]) -> Any:
+    if node not in known:
+        if node.is_Number or node.is_NumberSymbol:
+            known[node] = float(node)
+        else:
+            known[node] = FUNCTIONS[node.func](*(_value(each, known) for each in node.args))
+    return known[node]
+
+
+def expressed(expressions: Sequence[sympy.Expr]) -> Expressed:
+    """A vector-valued model function."""
+    return Expressed(tuple(expressions), len(expressions))
+
+
+def scalar(expression: sympy.Expr) -> Expressed:
+    """A scalar model function."""
+    return Expressed((expression,))

@@ -1,0 +1,287 @@
+"""Kinks and jumps of expressions, taken apart: the surfaces where they lie, and the smooth pieces between.
+
+A switching function such as ``sign(u)`` has one surface, where ``u`` vanishes, and one smooth branch on each
+side of it. `resolved` puts the branches in place of the functions, outermost choices first: of
+``where(a < 0, f, g)`` only the branch taken is looked at further.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+import sympy
+from sympy.core.parameters import distribute
+
+from hybrid.symbolic.expressions import (
+    ONE,
+    TRUTHS,
+    ZERO,
+    Absolute,
+    Ceiling,
+    Equal,
+    Floor,
+    Less,
+    LessEqual,
+    Level,
+    Maximum,
+    Minimum,
+    Remainder,
+    Select,
+    Sign,
+    Step,
+    Truncate,
+    TruncatedRemainder,
+)
+from hybrid.symbolic.nodes import contains, is_larger_than, mentions, nodes_of, replaced, symbols_of
+from hybrid.symbolic.tracing import Symbols
+
+COMPARISONS = (Less, LessEqual, Equal)
+COUNTS = (Floor, Ceiling, Truncate, Remainder, TruncatedRemainder)
+SWITCHING = (*COMPARISONS, *COUNTS, Sign, Step, Absolute, Maximum, Minimum)
+QUARTER = sympy.Rational(1, 4)
+# Surfaces written as longer trees are not expanded, so two of them are the same only if written alike.
+MOST_TERMS = 200
+# Digits to which coefficients of surfaces are compared.
+DIGITS = 12
+
+
+@attrs.frozen
+class Surface:
+    """A surface ``height = 0``.
+
+    Attributes
+    ----------
+    height
+        Positive above the surface, negative below it.
+    core, level
+        The surface lies where ``core``, a sum without constant that is written down as text, has the value
+        ``level``. Surfaces with the same core are parallel. The height grows with the core.
+    argument
+        For a floor its argument, whose fraction is below 1/2 above the surface; else None.
+    """
+
+    height: sympy.Expr
+    core: str
+    level: float
+    argument: sympy.Expr | None = None
+
+
+class Surfaces:
+    """The surfaces that have been found so far, numbered; a surface that is written twice is one."""
+
+    def __init__(self, symbols: Symbols) -> None:
+        self.symbols = symbols
+        self.known: list[Surface] = []
+
+    def find(self, height: sympy.Expr, argument: sympy.Expr | None = None) -> tuple[int, int]:
+        """Number of the surface where an expression vanishes, and 1 if it is positive above, else -1."""
+        core, level, orientation = _core(height, self.symbols)
+        number = self._number(core, level)
+        if number is not None:
+            return number, orientation
+        upwards = height if orientation > 0 else _negative(height)
+        self.known.append(Surface(upwards, core, level, argument))
+        return len(self.known) - 1, orientation
+
+    def match(self, height: sympy.Expr) -> tuple[int, int] | None:
+        """As `find`, but None if the surface has not been found before."""
+        core, level, orientation = _core(height, self.symbols)
+        number = self._number(core, level)
+        return None if number is None else (number, orientation)
+
+    def _number(self, core: str, level: float) -> int | None:
+        for number, surface in enumerate(self.known):
+            close = abs(surface.level - level) <= 10.0**-DIGITS * max(abs(level), abs(surface.level))
+            if surface.core == core and close:
+                return number
+        return None
+
+    def implied(self, number: int, sides: Mapping[int, int]) -> int | None:
+        """The side of a surface that the sides of other surfaces imply; None if they imply none.
+
+        Parameters
+        ----------
+        sides
+            By number of a surface: -1 below, 1 above, 0 on it; -2 and 2 on it, with the branch of that side.
+        """
+        surface = self.known[number]
+        for other, side in sides.items():
+            parallel = self.known[other]
+            if other == number or parallel.core != surface.core:
+                continue
+            towards = 1 if parallel.level > surface.level else -1
+            if side == towards or side in (0, -2, 2):
+                return towards
+        return None
+
+
+def _core(height: sympy.Expr, symbols: Symbols) -> tuple[str, float, int]:
+    """Text of a height without its constant and leading factor, the level, and the sign of the factor."""
+    if is_larger_than(MOST_TERMS, height):
+        return str(height), 0.0, 1
+    coefficients = height.expand().as_coefficients_dict()
+    constant = float(coefficients.pop(ONE, ZERO))
+    leading = next((float(coefficients[x]) for x in symbols.x if x in coefficients), None)
+    terms = sorted((str(term), float(factor)) for term, factor in coefficients.items())
+    factor = terms[0][1] if leading is None else leading
+    core = " + ".join(f"{each / factor:.{DIGITS}e}*{term}" for term, each in terms)
+    return core, -constant / factor, 1 if factor > 0 else -1
+
+
+def _negative(height: sympy.Expr) -> sympy.Expr:
+    """The opposite, term by term: without SymPy's distribution a factor -1 would stay outside of a sum."""
+    return sympy.Add(*(-term for term in sympy.Add.make_args(height)))
+
+
+@attrs.frozen
+class Resolved:
+    """Expressions without switching functions, and the sides of surfaces that were used, each -1 or 1."""
+
+    entries: tuple[sympy.Expr, ...]
+    used: dict[int, int]
+
+
+def resolved(entries: Sequence[sympy.Expr], sides: Mapping[int, int], surfaces: Surfaces) -> Resolved | int:
+    """Expressions with the branches that hold on given sides; or the first surface whose side is missing.
+
+    Parameters
+    ----------
+    entries
+        In the symbols of ``surfaces``.
+    sides
+        By number of a surface: -1 below, 1 above; -2 and 2 on it, with the branch of that side.
+    """
+    used: dict[int, int] = {}
+    with distribute(False):
+        while (atom := _first_atom(entries, surfaces.symbols)) is not None:
+            branch = _rewritten(atom)
+            if branch is None:
+                height, argument = _height(atom)
+                number, orientation = surfaces.find(height, argument)
+                side = sides.get(number) or surfaces.implied(number, sides)
+                if side is None:
+                    return number
+                used[number] = 1 if side > 0 else -1
+                branch = _branch(atom, used[number] * orientation)
+            entries = [_without_truths(replaced(entry, {atom: branch})) for entry in entries]
+        heights = [surfaces.known[number].height for number in used]
+        entries = [_guarded(entry, heights) for entry in entries]
+    return Resolved(tuple(entries), used)
+
+
+def switching_names(entries: Sequence[sympy.Expr], symbols: Symbols) -> list[str]:
+    """Names of the switching functions of the state or of time in expressions."""
+    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if _switches(atom, symbols)}
+    return sorted(found)
+
+
+def _switches(atom: sympy.Expr, symbols: Symbols) -> bool:
+    return not isinstance(atom, Level) and mentions(atom, symbols.variables)
+
+
+def _first_atom(entries: Sequence[sympy.Expr], symbols: Symbols) -> sympy.Expr | None:
+    """An innermost switching function; those in the condition of a choice come before its branches."""
+    clean: set[sympy.Expr] = set()
+
+    def search(node: sympy.Expr) -> sympy.Expr | None:
+        if node in clean or not contains(node, SWITCHING):
+            return None
+        for argument in node.args:
+            found = search(argument)
+            if found is not None:
+                return found
+        if isinstance(node, SWITCHING) and _switches(node, symbols):
+            return node
+        clean.add(node)
+        return None
+
+    for entry in entries:
+        found = search(entry)
+        if found is not None:
+            return found
+    return None
+
+
+def _rewritten(atom: sympy.Expr) -> sympy.Expr | None:
+    """An atom in terms of simpler ones; None if it is a simple one."""
+    if isinstance(atom, Equal):
+        # It holds on a surface only, not beside it.
+        return ZERO
+    if isinstance(atom, Remainder):
+        a, b = atom.args
+        return a - b * Floor(a / b)
+    if isinstance(atom, TruncatedRemainder):
+        a, b = atom.args
+        return a - b * Truncate(a / b)
+    if isinstance(atom, Truncate):
+        [u] = atom.args
+        return Select(Less(u, ZERO), Ceiling(u), Floor(u))
+    return None
+
+
+def _height(atom: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr | None]:
+    """The expression that vanishes where an atom switches; for a floor also its argument."""
+    if isinstance(atom, Less | LessEqual):
+        a, b = atom.args
+        return b - a, None
+    if isinstance(atom, Maximum | Minimum):
+        a, b = atom.args
+        return a - b, None
+    [u] = atom.args
+    if isinstance(atom, Floor | Ceiling):
+        # Positive in the first half of each step from a whole number to the next, negative in the second.
+        return sympy.sin(2 * sympy.pi * u, evaluate=False), (
+            f"mod({u},1)>1/2",
+            f"2*({u}) whole",
+            f"mod({u},1)<1/2",
+        )
+    return u, None
+
+
+def _branch(atom: sympy.Expr, side: int) -> sympy.Expr:
+    """What an atom is where the expression of `_height` has the sign ``side``."""
+    if isinstance(atom, Less | LessEqual | Step):
+        return ONE if side > 0 else ZERO
+    if isinstance(atom, Sign):
+        return sympy.Integer(side)
+    if isinstance(atom, Maximum | Minimum):
+        a, b = atom.args
+        return a if (side > 0) == isinstance(atom, Maximum) else b
+    [u] = atom.args
+    if isinstance(atom, Absolute):
+        return u if side > 0 else _negative(u)
+    # The floor has the same value up to a quarter beyond both ends of its half of a step.
+    level = Level(u + QUARTER if side > 0 else u - QUARTER)
+    return level if isinstance(atom, Floor) else level + 1
+
+
+def _without_truths(expression: sympy.Expr) -> sympy.Expr:
+    """The expression with numbers that serve as conditions taken as true: they are zero on a surface only."""
+    changes = {}
+    for node in nodes_of(Select, expression):
+        condition, a, _ = node.args
+        if not isinstance(condition, TRUTHS) and symbols_of(condition) and not contains(condition, SWITCHING):
+            changes[node] = a
+    return replaced(expression, changes) if changes else expression
+
+
+def _guarded(expression: sympy.Expr, heights: Sequence[sympy.Expr]) -> sympy.Expr:
+    """The expression with fractional powers of heights made zero beyond their surface, where they are nan.
+
+    A step may evaluate a point slightly outside of its mode.
+    """
+    changes = {}
+    for node in nodes_of(sympy.Pow, expression):
+        base, exponent = node.args
+        if exponent.is_Number and not exponent.is_Integer and _is_multiple(base, heights):
+            changes[node] = Maximum(base, ZERO) ** exponent
+    return replaced(expression, changes) if changes else expression
+
+
+def _is_multiple(base: sympy.Expr, heights: Sequence[sympy.Expr]) -> bool:
+    for height in heights:
+        ratio = sympy.cancel(base / height)
+        if ratio.is_number:
+            return True
+    return False

@@ -1,0 +1,309 @@
+"""How a system is split: cells become modes, their surfaces guards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import reduce
+from typing import Any
+
+import attrs
+import sympy
+from sympy.core.parameters import distribute
+
+from hybrid.errors import ModelError
+from hybrid.symbolic.evaluation import expressed, scalar
+from hybrid.symbolic.expressions import ZERO, And, Less, LessEqual
+from hybrid.symbolic.nodes import replaced, symbols_of
+from hybrid.symbolic.switches import Resolved, Surfaces, resolved
+from hybrid.symbolic.tracing import TraceError, model_symbols, trace
+from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
+from hybrid.transform.cells import Cell, Choice, Pieces
+from hybrid.transform.naming import Names
+
+
+@attrs.frozen
+class _Outgoing:
+    """A user's transition in the expressions of its functions; None for what could not be traced."""
+
+    index: int
+    transition: Transition
+    guard: sympy.Expr | None
+    reset: list[sympy.Expr] | None
+
+
+class Splitter:
+    """Makes the modes and transitions of the split system, cell by cell."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.original = system
+        self.variables = system.variables
+        self.symbols = model_symbols(system.dimension, len(system.parameters))
+        self.surfaces = Surfaces(self.symbols)
+        self.names = Names(self.variables)
+        self.outgoing = [
+            _Outgoing(i, each, self._guard(each), self._reset(each))
+            for i, each in enumerate(system.transitions)
+        ]
+        self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
+        self.mode_names: dict[Cell, str] = {}
+        self.waiting: list[Cell] = []
+
+    def system(self) -> HybridSystem:
+        for pieces in self.pieces:
+            for choice in pieces.cells({}):
+                self.name_of(choice.cell)
+        modes: list[Mode] = []
+        transitions: list[Transition] = []
+        used: set[str] = set()
+        self.waiting.reverse()
+        while self.waiting:
+            cell = self.waiting.pop(0)
+            modes.append(self._mode(cell))
+            for transition in self._transitions(cell):
+                name = transition.name
+                number = 2
+                while name in used:
+                    name = f"{transition.name} ({number})"
+                    number += 1
+                used.add(name)
+                transitions.append(attrs.evolve(transition, name=name))
+        return attrs.evolve(self.original, modes=modes, transitions=transitions)
+
+    def name_of(self, cell: Cell) -> str:
+        """Name of the mode of a cell, which is going to be made if it has not been."""
+        if cell not in self.mode_names:
+            own = self.original.modes[cell.mode].name
+            sides = self.names.cell(self.surfaces.known, cell.sides)
+            several = len(self.original.modes) > 1
+            self.mode_names[cell] = f"{own}: {sides}" if sides and several else sides or own
+            self.waiting.append(cell)
+        return self.mode_names[cell]
+
+    def _traced(self, what: str, function: Function) -> list[sympy.Expr]:
+        try:
+            return trace(function, self.variables.state, self.variables.parameter_names)
+        except TraceError as error:
+            raise ModelError(
+                f"split: {what} cannot be traced, so its kinks and jumps cannot be found: {error}."
+            ) from error
+
+    def _pieces(self, index: int, mode: Mode) -> Pieces:
+        field = self._traced(f"the field of mode {mode.name!r}", mode.field)
+        watched = [
+            each.guard
+            for each in self.outgoing
+            if each.transition.source == mode.name and each.guard is not None
+        ]
+        return Pieces(index, field, watched, self.variables, self.surfaces)
+
+    def _guard(self, transition: Transition) -> sympy.Expr | None:
+        try:
+            [guard] = trace(transition.guard.function, self.variables.state, self.variables.parameter_names)
+        except TraceError:
+            return None
+        return guard
+
+    def _reset(self, transition: Transition) -> list[sympy.Expr] | None:
+        if transition.reset is None:
+            return [*self.symbols.x]
+        try:
+            return trace(transition.reset.function, self.variables.state, self.variables.parameter_names)
+        except TraceError:
+            return None
+
+    def _mode(self, cell: Cell) -> Mode:
+        original = self.original.modes[cell.mode]
+        if not cell.sides:
+            return attrs.evolve(original, name=self.name_of(cell), part_of=original.name)
+        field = self.pieces[cell.mode].flow(dict(cell.sides))
+        return Mode(self.name_of(cell), field, part_of=original.name)
+
+    def _transitions(self, cell: Cell) -> Iterator[Transition]:
+        for number, side in cell.sides:
+            if side:
+                yield from self._arrivals(cell, number, side)
+            else:
+                yield from self._departures(cell, number)
+        for outgoing in self.outgoing:
+            if outgoing.transition.source == self.original.modes[cell.mode].name:
+                yield from self._copies(cell, outgoing)
+
+    def _arrivals(self, cell: Cell, number: int, side: int) -> Iterator[Transition]:
+        """The transitions of a state that reaches a surface from one side."""
+        pieces, source = self.pieces[cell.mode], self.name_of(cell)
+        height = scalar(self.surfaces.known[number].height)
+        beyond = {**dict(cell.sides), number: -2 * side}
+        for choice in pieces.cells(beyond):
+            sides, target = {**beyond, **dict(choice.chosen)}, self.name_of(choice.cell)
+            extra = self._on(choice.chosen)
+            if not pieces.jumps(sides, number) or not pieces.may_attract(sides, number):
+                yield Transition(source, target, Guard(height, -side, when=_all(extra)))
+                continue
+            at_start = Guard(height, -side, when=_all(extra), at_start=True)
+            yield Transition(source, target, at_start, name=f"{source}->{target} at the start")
+            surface = pieces.between(sides, number)
+            arrives, crosses = (
+                (surface.arrives_from_below, surface.crosses_up)
+                if side < 0
+                else (surface.arrives_from_above, surface.crosses_down)
+            )
+            for sliding in pieces.cells({**sides, number: 0}):
+                more = [self._condition(arrives), *extra, *self._on(sliding.chosen)]
+                yield Transition(source, self.name_of(sliding.cell), Guard(height, -side, when=_all(more)))
+            onwards = [self._condition(crosses), *extra]
+            yield Transition(source, target, Guard(height, -side, when=_all(onwards)))
+
+    def _departures(self, cell: Cell, number: int) -> Iterator[Transition]:
+        """The transitions of a state that slides along a surface and leaves it."""
+        pieces, source, sides = self.pieces[cell.mode], self.name_of(cell), dict(cell.sides)
+        surface = pieces.between(sides, number)
+        height = scalar(self.surfaces.known[number].height)
+        where = f" at {self.names.side(self.surfaces.known, number, 0)}" if len(cell.sliding) > 1 else ""
+        ways = [
+            (side, self.name_of(choice.cell), self._on(choice.chosen))
+            for side in (1, -1)
+            for choice in pieces.cells({**sides, number: 2 * side})
+        ]
+        for side, target, extra in ways:
+            off = Guard(height, side, when=_all([self._condition(surface.is_off), *extra]), at_start=True)
+            yield Transition(source, target, off, name=f"{source}->{target} at the start")
+        attraction = self._function(surface.attraction)
+        at_start = Guard(attraction, -1, at_start=True)
+        yield Transition(source, None, at_start, name=f"{source}: two-fold at start{where}")
+        yield Transition(source, None, Guard(attraction, -1), name=f"{source}: two-fold{where}")
+        projection = Reset(expressed(self._traced("the projection", surface.projection)))
+        for side, target, extra in ways:
+            speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
+            yield Transition(source, target, Guard(speed, side, when=_all(extra)), projection)
+
+    def _function(self, function: Function) -> Function:
+        """A derived scalar function by its expression, which can be pickled."""
+        return scalar(self._condition(function))
+
+    def _condition(self, function: Function) -> sympy.Expr:
+        [condition] = trace(function, self.variables.state, self.variables.parameter_names)
+        return condition
+
+    def _on(
+        self, chosen: Sequence[tuple[int, int]], after: Sequence[sympy.Expr] | None = None
+    ) -> list[sympy.Expr]:
+        """Conditions that the state lies on these sides; with ``after``, the state after a reset."""
+        conditions: list[sympy.Expr] = []
+        for number, side in chosen:
+            height = self.surfaces.known[number].height
+            if after is not None:
+                height = self._height_after(number, after)
+            conditions.append(LessEqual(ZERO, height) if side > 0 else Less(height, ZERO))
+        return conditions
+
+    def _height_after(self, number: int, after: Sequence[sympy.Expr]) -> sympy.Expr:
+        with distribute(False):
+            return replaced(self.surfaces.known[number].height, dict(zip(self.symbols.x, after, strict=True)))
+
+    def _copies(self, cell: Cell, outgoing: _Outgoing) -> Iterator[Transition]:
+        """A user's transition in one cell: one for each side that the state may land on."""
+        transition = outgoing.transition
+        own = self.names.cell(self.surfaces.known, cell.sides)
+        new: dict[str, Any] = {
+            "source": self.name_of(cell),
+            "name": f"{transition.name} ({own})" if own else transition.name,
+            "part_of": transition.name,
+        }
+        guard = self._smooth_guard(cell, outgoing)
+        if transition.target is None:
+            yield attrs.evolve(transition, guard=guard, **new)
+            return
+        asked = [] if guard.when is None else [self._truth(guard.when)]
+        new["accumulates_to"] = self._limit(cell, transition)
+        for chosen, after in self._after(cell, outgoing):
+            reset = transition.reset if after == outgoing.reset else Reset(expressed(after or ()))
+            for landing in self._landings(cell, transition.target, after):
+                more = [*self._on(chosen), *self._on(landing.chosen, after)]
+                when = _all([*asked, *more]) if more else guard.when
+                yield attrs.evolve(
+                    transition,
+                    target=self.name_of(landing.cell),
+                    guard=attrs.evolve(guard, when=when),
+                    reset=reset,
+                    **new,
+                )
+
+    def _truth(self, condition: Function) -> sympy.Expr:
+        """A user's condition, positive or true, as a truth value."""
+        [value] = self._traced("a condition of a guard", condition)
+        return Less(ZERO, value)
+
+    def _smooth_guard(self, cell: Cell, outgoing: _Outgoing) -> Guard:
+        """The guard of a user's transition with the branches of a cell; as it is if it has none."""
+        guard = outgoing.transition.guard
+        if outgoing.guard is None:
+            return guard
+        result = resolved([outgoing.guard], _upper(cell.sides), self.surfaces)
+        assert isinstance(result, Resolved), "a cell decides every switch of its guards"
+        if not result.used:
+            return guard
+        return attrs.evolve(guard, function=scalar(result.entries[0]), gradient=None)
+
+    def _after(
+        self, cell: Cell, outgoing: _Outgoing
+    ) -> Iterator[tuple[tuple[tuple[int, int], ...], list[sympy.Expr] | None]]:
+        """The states after a user's reset, for each choice of the branches that it has."""
+        if outgoing.reset is None:
+            yield (), None
+            return
+        waiting: list[dict[int, int]] = [{}]
+        while waiting:
+            chosen = waiting.pop()
+            result = resolved(outgoing.reset, {**_upper(cell.sides), **chosen}, self.surfaces)
+            if isinstance(result, int):
+                waiting += [{**chosen, result: +1}, {**chosen, result: -1}]
+            else:
+                yield tuple(chosen.items()), outgoing.reset if not result.used else [*result.entries]
+
+    def _landings(self, cell: Cell, target: str, after: list[sympy.Expr] | None) -> list[Choice]:
+        """The cells of the target mode that the state after a reset may lie in."""
+
+        def decide(number: int) -> int | None:
+            return None if after is None else self._side_after(cell, number, after)
+
+        landings = self.pieces[self.original.mode_index(target)].cells({}, decide)
+        if after is None and len(landings) > 1:
+            raise ModelError(
+                f"split: a reset into mode {target!r} cannot be traced, so it is not known on which side of "
+                "its switches the state lands. Write the reset with NumPy functions (np.where, np.abs)."
+            )
+        return landings
+
+    def _side_after(self, cell: Cell, number: int, after: Sequence[sympy.Expr]) -> int | None:
+        """The side of a surface on which a state lands from a cell, if it is always the same."""
+        height = self._height_after(number, after)
+        if not symbols_of(height):
+            # On the surface itself the rules of an instant decide; the state may be on either side.
+            return -1 if float(height) < 0 else 1
+        match = self.surfaces.match(height)
+        if match is None:
+            return None
+        same, orientation = match
+        sides = dict(cell.sides)
+        side = sides[same] if same in sides else self.surfaces.implied(same, sides)
+        return None if side is None else side * orientation
+
+    def _limit(self, cell: Cell, transition: Transition) -> str | None:
+        """The mode for the limit of chatter: on the sides of the cell, above where it has none."""
+        if transition.accumulates_to is None:
+            return None
+        sides = _upper(cell.sides)
+        pieces = self.pieces[self.original.mode_index(transition.accumulates_to)]
+        [choice] = pieces.cells({}, lambda number: sides.get(number, 1))
+        return self.name_of(choice.cell)
+
+
+def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:
+    """Sides with the branch above on each surface along which the state slides."""
+    return {number: side or 2 for number, side in sides}
+
+
+def _all(conditions: Sequence[sympy.Expr]) -> Function | None:
+    """The condition that all of several hold; None for none."""
+    return scalar(reduce(And, conditions)) if conditions else None

@@ -1,0 +1,161 @@
+"""A surface with a field on either side: crossing, sliding and their borderline cases, by Filippov."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.system.elements import Function
+from hybrid.system.variables import Variables
+
+# A start in the sliding mode does not slide if it is further from the surface than this fraction of the
+# state. The drift during sliding is far smaller, so a run can be continued from any of its states.
+SLIDING_BAND = 1e-6
+# The two fields count as tangent to the surface if both cross it slower than this fraction of their speeds.
+TANGENT = 1e-9
+# An orbit that reaches the surface slower than this fraction of its speed and turns back only touches it.
+TOUCH = 3e-8
+
+
+@attrs.frozen(eq=False)
+class SwitchingSurface:
+    """The model functions derived from two fields and a switching function."""
+
+    variables: Variables
+    below: Function
+    above: Function
+    switching: Function
+    gradient: Function  # (D_x h, D_t h)
+    speed_below: Function  # L_b and L_a, the rates of h along the fields
+    speed_above: Function
+    turn_below: Function  # rate of L_b along the field below, and of L_a along the field above
+    turn_above: Function
+
+    def may_attract(self) -> bool:
+        """Whether sliding is possible: False if the two speeds are proved equal everywhere."""
+        from hybrid.symbolic.tracing import trace
+
+        L_b, L_a = trace(self.speeds, self.variables.state, self.variables.parameter_names)
+        return bool((L_b - L_a).expand() != 0)
+
+    def speeds(self, t: Any, x: Any, p: Any) -> tuple[Any, ...]:
+        """``(L_b, L_a)``."""
+        return self.speed_below(t, x, p), self.speed_above(t, x, p)
+
+    def sliding_field(self, t: Any, x: Any, p: Any) -> list[Any]:
+        L_b, L_a = self.speeds(t, x, p)
+        attraction = L_b - L_a
+        return [
+            b if _is_zero(a - b) else (L_b * a - L_a * b) / attraction
+            for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
+        ]
+
+    # The conditions of the crossings of h = 0.
+
+    def arrives_from_below(self, t: Any, x: Any, p: Any) -> Any:
+        return self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) <= 0.0)
+
+    def arrives_from_above(self, t: Any, x: Any, p: Any) -> Any:
+        return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) >= 0.0)
+
+    def crosses_up(self, t: Any, x: Any, p: Any) -> Any:
+        return self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) > 0.0)
+
+    def crosses_down(self, t: Any, x: Any, p: Any) -> Any:
+        return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) < 0.0)
+
+    def _goes_on(self, t: Any, x: Any, p: Any, side: float) -> Any:
+        """Whether an orbit that reaches the surface rising (side +1) or falling (-1) does not just touch it.
+
+        An orbit that leaves the sliding mode at a fold starts on the surface with a speed through it that is
+        zero up to rounding, and accelerates back into its own side. That is not an arrival. The speed is
+        compared with those of both fields, because the field at the fold may be at rest, as for a mass that
+        is about to slip.
+        """
+        if side > 0:
+            speed, turn = self.speed_below(t, x, p), self.turn_below(t, x, p)
+        else:
+            speed, turn = self.speed_above(t, x, p), self.turn_above(t, x, p)
+        return (side * turn >= 0.0) | (side * speed > TOUCH * self._steepest(t, x, p))
+
+    def attraction(self, t: Any, x: Any, p: Any) -> Any:
+        L_b, L_a = self.speeds(t, x, p)
+        return L_b - L_a - self._hardly_moving(t, x, p)
+
+    def _hardly_moving(self, t: Any, x: Any, p: Any) -> Any:
+        """A speed through the surface that counts as zero.
+
+        It is as smooth as the fields, so the sliding mode has a Taylor series if they do.
+        """
+        return TANGENT * self._steepest(t, x, p)
+
+    def _steepest(self, t: Any, x: Any, p: Any) -> Any:
+        """The rate of ``h`` if all velocities of both fields were normal to the surface."""
+        slope, speed = self.gradient(t, x, p)[:-1], [*self.below(t, x, p), *self.above(t, x, p)]
+        return np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
+
+    def is_off(self, t: Any, x: Any, p: Any) -> Any:
+        """Whether a state is too far from the surface to slide, relative to its largest component."""
+        largest = np.abs(x[0])
+        for value in x[1:]:
+            largest = np.maximum(largest, np.abs(value))
+        slope = _dot([np.abs(each) for each in self.gradient(t, x, p)[:-1]], [1.0] * len(x), 0.0)
+        return np.abs(self.switching(t, x, p)) > SLIDING_BAND * slope * largest
+
+    def projection(self, t: Any, x: Any, p: Any) -> list[Any]:
+        """The nearest point of the surface, to first order."""
+        normal = self.gradient(t, x, p)[:-1]
+        share = self.switching(t, x, p) / _dot(normal, normal, 0.0)
+        return [value - share * slope for value, slope in zip(x, normal, strict=True)]
+
+
+def surface_between(
+    variables: Variables, below: Function, above: Function, switching: Function
+) -> SwitchingSurface:
+    """The surface where a switching function vanishes, with its fields; all three must be traceable."""
+    gradient = _derived_gradient(variables, switching)
+    speeds = [_rate(gradient, field) for field in (below, above)]
+    turns = [
+        _rate(_derived_gradient(variables, speed), field)
+        for speed, field in zip(speeds, (below, above), strict=True)
+    ]
+    return SwitchingSurface(variables, below, above, switching, gradient, *speeds, *turns)
+
+
+def _derived_gradient(variables: Variables, function: Function) -> Function:
+    """``(D_x, D_t)`` of a scalar function as a model function, which can itself be traced."""
+    # SymPy is slow to import, so it is not imported with the library.
+    from hybrid.symbolic.derivatives import jacobian_of
+    from hybrid.symbolic.evaluation import expressed
+    from hybrid.symbolic.tracing import model_symbols, trace
+
+    names = variables.parameter_names
+    symbols = model_symbols(variables.dimension, len(names))
+    [row] = jacobian_of(trace(function, variables.state, names), symbols.variables)
+    return expressed(row)
+
+
+def _rate(gradient: Function, field: Function) -> Function:
+    """``D_t g + D_x g f``, the rate of a function along a field, as a model function."""
+
+    def rate(t: Any, x: Any, p: Any) -> Any:
+        *normal, own = gradient(t, x, p)
+        return _dot(normal, field(t, x, p), own)
+
+    return rate
+
+
+def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:
+    """``total`` plus the dot product; terms whose first factor is zero are skipped."""
+    for factor, other in zip(a, b, strict=True):
+        if not _is_zero(factor):
+            total = total + factor * other
+    return total
+
+
+def _is_zero(value: Any) -> bool:
+    """Whether a number is zero; a traced number counts as zero if its expression is."""
+    return bool(getattr(value, "expression", value) == 0)
