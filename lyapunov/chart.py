@@ -24,6 +24,7 @@ from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
+from hybrid.system.growth import growing
 from lyapunov.spectrum import Estimate, first_vectors, interval_length
 
 UNTOUCHED = Status(
@@ -75,6 +76,7 @@ class Chart:
         return f"<Chart over {' and '.join(self.over)}, {self.status.size} rows: {ends}>"
 
 
+@growing
 def chart(
     system: HybridSystem,
     over: Mapping[str, ArrayLike],

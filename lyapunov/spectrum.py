@@ -19,6 +19,7 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.system.growth import growing
 from lyapunov.statistics import (
     TaperedMean,
     closed_batch_means,
@@ -95,6 +96,7 @@ class LyapunovSpectrum:
         return f"<LyapunovSpectrum [{values}] of {self.intervals} intervals, {self.status.code.name}>"
 
 
+@growing
 def lyapunov_spectrum(
     system: HybridSystem,
     x0: ArrayLike,

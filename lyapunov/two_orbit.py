@@ -19,6 +19,7 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
+from hybrid.system.growth import growing
 from lyapunov.spectrum import INTERVALS_AT_ONCE, end_at, interval_length
 from lyapunov.statistics import running_tapered_mean
 
@@ -115,6 +116,7 @@ class TwoOrbitExponents:
         return f"<TwoOrbitExponents {value} of {self.intervals} intervals, {self.status.code.name}>"
 
 
+@growing
 def two_orbit_exponents(
     system: HybridSystem,
     x0: ArrayLike,

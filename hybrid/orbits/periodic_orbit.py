@@ -23,6 +23,7 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import DOP853, Solver
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.growth import growing
 
 # Newton steps are halved at most to this share; then the full step is taken.
 SHORTEST_STEP = 1 / 64
@@ -105,6 +106,7 @@ class PeriodicOrbit:
         return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
 
 
+@growing
 def periodic_orbit(
     system: HybridSystem,
     x0: ArrayLike,

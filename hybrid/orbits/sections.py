@@ -22,6 +22,7 @@ from hybrid.solvers import Solver
 from hybrid.status import Status
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.growth import growing
 from hybrid.transform.markers import with_section
 
 POINTS_AT_ONCE = 500
@@ -64,6 +65,7 @@ class Section:
         return f"<Section of {len(self)} points, {self.status.code.name}>"
 
 
+@growing
 def stroboscopic_section(
     system: HybridSystem,
     x0: ArrayLike,
@@ -173,6 +175,7 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     return states[:total], places[:total], code
 
 
+@growing
 def poincare_section(
     system: HybridSystem,
     x0: ArrayLike,

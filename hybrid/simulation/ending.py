@@ -16,13 +16,26 @@ from hybrid.status import (
     run_status,
     stuck_status,
 )
+from hybrid.system.growth import Unexplored
 
 
 def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
+    _grow(trajectory, code)
     status = _status(trajectory, code)
     notes = [*_start_beyond(trajectory), *_unproved(trajectory), *_unresolved(trajectory)]
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
+
+
+def _grow(trajectory: Trajectory, code: int) -> None:
+    """Unexplored if the run was ended by a transition into a mode that has not been made yet."""
+    growth, last = trajectory.system.growth, trajectory.run.last_fired
+    if growth is None or code != StatusCode.TERMINAL or last < 0:
+        return
+    name = trajectory.system.transition_names[last]
+    if growth.leads_on(name):
+        growth.extend(name)
+        raise Unexplored(name)
 
 
 def _start_beyond(trajectory: Trajectory) -> Iterator[str]:

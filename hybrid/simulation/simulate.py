@@ -20,12 +20,14 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.growth import growing
 
 # Room of the record that kernels fill before Python empties it: large enough that the crossing costs nothing.
 STEPS_AT_ONCE = 2048
 JUMPS_AT_ONCE = 1024
 
 
+@growing
 def simulate(
     system: HybridSystem,
     x0: ArrayLike,

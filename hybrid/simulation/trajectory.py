@@ -18,7 +18,8 @@ from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.growth import Unexplored
 
 UNLIMITED = np.iinfo(np.int64).max
 
@@ -40,9 +41,14 @@ def start(
     ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
     name of the argument that ``t0`` comes from, ``stop`` who may end the run early.
     """
-    compiled = compile_system(system)
+    as_system("system", system)
     state = system.variables.state_values("x0", x0)
     t0 = arguments.number(time, t0)
+    if system.growth is not None:
+        values = system.parameter_values(parameters)
+        if system.growth.place(t0, state, values, mode):
+            raise Unexplored(mode)
+    compiled = compile_system(system)
     solver = check_solver(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
     plan = plan_of(compiled, solver, tangents)

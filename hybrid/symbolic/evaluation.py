@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import attrs
@@ -85,32 +85,66 @@ class Expressed:
     size: int | None = None
 
     def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The values at a point."""
         states, parameters = [*x], [*p]
         symbols = model_symbols(len(states), len(parameters))
         known = (symbols.t, *symbols.x, *symbols.p)
-        values = dict(zip(known, (t, *states, *parameters), strict=True))
+        values = (t, *states, *parameters)
         if isinstance(t, Traced) and isinstance(t.content, sympy.Basic):
-            contents = {symbol: value.expression for symbol, value in values.items()}
-            with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
-                results: list[Any] = [Traced(replaced(each, contents)) for each in self.expressions]
+            results: list[Any] = [
+                Traced(each) for each in self._in_terms_of(known, [each.content for each in values])
+            ]
         else:
-            results = evaluated(self.expressions, values)
+            results = self._program.run(dict(zip(known, values, strict=True)))
         return results if self.size is not None else results[0]
 
+    def _in_terms_of(
+        self, symbols: Sequence[sympy.Symbol], contents: Sequence[sympy.Expr]
+    ) -> Sequence[sympy.Expr]:
+        changed = {old: new for old, new in zip(symbols, contents, strict=True) if new != old}
+        if not changed:
+            return self.expressions
+        with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
+            return [replaced(each, changed) for each in self.expressions]
 
-def evaluated(expressions: Iterable[sympy.Expr], values: Mapping[sympy.Symbol, Any]) -> list[Any]:
-    """Values of expressions for numbers or traced numbers in place of their symbols."""
-    known: dict[sympy.Expr, Any] = dict(values)
-    return [_value(each, known) for each in expressions]
+    @cached_property
+    def _program(self) -> Program:
+        return Program(self.expressions)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Expressed, (self.expressions, self.size)
 
 
-def _value(node: sympy.Expr, known: dict[sympy.Expr, Any]) -> Any:
-    if node not in known:
+class Program:
+    """Expressions as a list of calls of NumPy's functions, each on the results of calls before it."""
+
+    def __init__(self, expressions: Iterable[sympy.Expr]) -> None:
+        self.symbols: dict[int, sympy.Symbol] = {}
+        self.constants: dict[int, float] = {}
+        self.calls: list[tuple[int, Callable[..., Any], tuple[int, ...]]] = []
+        self._places: dict[sympy.Expr, int] = {}
+        self.results = [self._place(each) for each in expressions]
+
+    def _place(self, node: sympy.Expr) -> int:
+        if node in self._places:
+            return self._places[node]
+        operands = tuple(map(self._place, node.args)) if not node.is_Number else ()
+        place = self._places[node] = len(self._places)
         if node.is_Number or node.is_NumberSymbol:
-            known[node] = float(node)
+            self.constants[place] = float(node)
+        elif node.is_Symbol:
+            self.symbols[place] = node
         else:
-            known[node] = FUNCTIONS[node.func](*(_value(each, known) for each in node.args))
-    return known[node]
+            self.calls.append((place, FUNCTIONS[node.func], operands))
+        return place
+
+    def run(self, values: Mapping[sympy.Symbol, Any]) -> list[Any]:
+        """Values of the expressions for numbers or traced numbers in place of their symbols."""
+        found: dict[int, Any] = {place: values[symbol] for place, symbol in self.symbols.items()}
+        found |= self.constants
+        for place, function, operands in self.calls:
+            found[place] = function(*(found[each] for each in operands))
+        return [found[place] for place in self.results]
 
 
 def expressed(expressions: Sequence[sympy.Expr]) -> Expressed:

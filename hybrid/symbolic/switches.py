@@ -8,8 +8,10 @@ side of it. `resolved` puts the branches in place of the functions, outermost ch
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
+import numpy as np
 import sympy
 from sympy.core.parameters import distribute
 
@@ -44,6 +46,8 @@ QUARTER = sympy.Rational(1, 4)
 MOST_TERMS = 200
 # Digits to which coefficients of surfaces are compared.
 DIGITS = 12
+# Rounding of these coefficients, as a share of the largest.
+ROUNDING = 1e-12
 
 
 @attrs.frozen
@@ -73,6 +77,7 @@ class Surfaces:
     def __init__(self, symbols: Symbols) -> None:
         self.symbols = symbols
         self.known: list[Surface] = []
+        self._implied: dict[Any, int | None] = {}
 
     def find(self, height: sympy.Expr, argument: sympy.Expr | None = None) -> tuple[int, int]:
         """Number of the surface where an expression vanishes, and 1 if it is positive above, else -1."""
@@ -105,15 +110,47 @@ class Surfaces:
         sides
             By number of a surface: -1 below, 1 above, 0 on it; -2 and 2 on it, with the branch of that side.
         """
-        surface = self.known[number]
-        for other, side in sides.items():
-            parallel = self.known[other]
-            if other == number or parallel.core != surface.core:
-                continue
-            towards = 1 if parallel.level > surface.level else -1
-            if side == towards or side in (0, -2, 2):
-                return towards
+        key = number, frozenset((other, side) for other, side in sides.items() if other != number)
+        if key not in self._implied:
+            given = [(self.known[other].height, side) for other, side in key[1]]
+            height = self.known[number].height
+            self._implied[key] = next((side for side in (1, -1) if _follows(height, side, given)), None)
+        return self._implied[key]
+
+
+def _follows(height: sympy.Expr, side: int, given: Sequence[tuple[sympy.Expr, int]]) -> bool:
+    """Whether a height is proved to have the sign ``side``, as a sum of others (Farkas' lemma).
+
+    It has if it is a positive constant plus a combination of the others, with factors that have the signs of
+    these others; a surface that the state lies on may have any factor. Products of states and parameters
+    count as variables of their own.
+    """
+    target = _monomials(height)
+    columns, strict = [{ONE: 1.0}], [True]
+    for other, on in given:
+        row = _monomials(other)
+        if row is None:
+            continue
+        signs = (1.0, -1.0) if on in (0, -2, 2) else (float(on),)
+        columns += [{name: sign * factor for name, factor in row.items()} for sign in signs]
+        strict += [on in (-1, 1)] * len(signs)
+    if target is None or not target.keys() <= {name for row in columns for name in row}:
+        return False
+    # SciPy's optimisers take half a second to import.
+    from scipy.optimize import nnls
+
+    names = [*{name for row in [*columns, target] for name in row}]
+    matrix = np.array([[row.get(name, 0.0) for row in columns] for name in names])
+    factors, distance = nnls(matrix, np.array([side * target.get(name, 0.0) for name in names]))
+    scale = max(map(abs, target.values()))
+    return bool(distance <= ROUNDING * scale and np.any(factors[strict] > ROUNDING * scale))
+
+
+def _monomials(height: sympy.Expr) -> dict[sympy.Expr, float] | None:
+    """Coefficients of the products of symbols in a height; None if it is too long to be expanded."""
+    if is_larger_than(MOST_TERMS, height):
         return None
+    return {name: float(factor) for name, factor in height.expand().as_coefficients_dict().items()}
 
 
 def _core(height: sympy.Expr, symbols: Symbols) -> tuple[str, float, int]:
@@ -142,32 +179,71 @@ class Resolved:
     used: dict[int, int]
 
 
-def resolved(entries: Sequence[sympy.Expr], sides: Mapping[int, int], surfaces: Surfaces) -> Resolved | int:
-    """Expressions with the branches that hold on given sides; or the first surface whose side is missing.
+@attrs.define
+class _Stage:
+    """Expressions with some switches decided: the next switch and what it leads to on either side."""
+
+    entries: tuple[sympy.Expr, ...]
+    used: dict[int, int]
+    atom: sympy.Expr | None = None
+    number: int = -1
+    orientation: int = 0
+    beyond: dict[int, _Stage] = attrs.field(factory=dict)
+
+
+class Switches:
+    """The switching functions in a few expressions; what has been worked out for some sides is kept.
 
     Parameters
     ----------
     entries
         In the symbols of ``surfaces``.
-    sides
-        By number of a surface: -1 below, 1 above; -2 and 2 on it, with the branch of that side.
     """
-    used: dict[int, int] = {}
-    with distribute(False):
-        while (atom := _first_atom(entries, surfaces.symbols)) is not None:
-            branch = _rewritten(atom)
-            if branch is None:
-                height, argument = _height(atom)
-                number, orientation = surfaces.find(height, argument)
-                side = sides.get(number) or surfaces.implied(number, sides)
-                if side is None:
-                    return number
-                used[number] = 1 if side > 0 else -1
-                branch = _branch(atom, used[number] * orientation)
-            entries = [_without_truths(replaced(entry, {atom: branch})) for entry in entries]
-        heights = [surfaces.known[number].height for number in used]
-        entries = [_guarded(entry, heights) for entry in entries]
-    return Resolved(tuple(entries), used)
+
+    def __init__(self, entries: Sequence[sympy.Expr], surfaces: Surfaces) -> None:
+        self.surfaces = surfaces
+        self._root = self._stage(tuple(entries), {})
+
+    def resolved(self, sides: Mapping[int, int]) -> Resolved | int:
+        """Expressions with the branches on given sides; or the first surface whose side is missing.
+
+        Parameters
+        ----------
+        sides
+            By number of a surface: -1 below, 1 above; -2 and 2 on it, with the branch of that side.
+        """
+        stage = self._root
+        while stage.atom is not None:
+            side = sides.get(stage.number) or self.surfaces.implied(stage.number, sides)
+            if side is None:
+                return stage.number
+            side = 1 if side > 0 else -1
+            if side not in stage.beyond:
+                stage.beyond[side] = self._decided(stage, side)
+            stage = stage.beyond[side]
+        return Resolved(stage.entries, stage.used)
+
+    def _decided(self, stage: _Stage, side: int) -> _Stage:
+        assert stage.atom is not None
+        branch = _branch(stage.atom, side * stage.orientation)
+        with distribute(False):
+            entries = tuple(replaced(entry, {stage.atom: branch}) for entry in stage.entries)
+        return self._stage(entries, {**stage.used, stage.number: side})
+
+    def _stage(self, entries: tuple[sympy.Expr, ...], used: dict[int, int]) -> _Stage:
+        """The stage that these expressions are in, up to the first switch whose side is not known."""
+        with distribute(False):
+            while (atom := _first_atom(entries, self.surfaces.symbols)) is not None:
+                branch = _rewritten(atom)
+                if branch is None:
+                    number, orientation = self.surfaces.find(*_height(atom))
+                    if number not in used:
+                        entries = tuple(map(_without_truths, entries))
+                        return _Stage(entries, used, atom, number, orientation)
+                    branch = _branch(atom, used[number] * orientation)
+                entries = tuple(replaced(entry, {atom: branch}) for entry in entries)
+            heights = [self.surfaces.known[number].height for number in used]
+            return _Stage(tuple(_guarded(_without_truths(entry), heights) for entry in entries), used)
 
 
 def switching_names(entries: Sequence[sympy.Expr], symbols: Symbols) -> list[str]:

@@ -17,6 +17,7 @@ from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_functions
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
+from hybrid.system.growth import Growth
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.variables import Variables, as_parameters, as_state
@@ -84,6 +85,8 @@ class HybridSystem(Portable):
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
+    # What makes further modes, for a system that is made in stages.
+    growth: Growth | None = attrs.field(default=None, kw_only=True, repr=False)
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 

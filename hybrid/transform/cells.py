@@ -18,11 +18,10 @@ from hybrid.symbolic.continuity import vanishes_on
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.evaluation import expressed, scalar
 from hybrid.symbolic.expressions import ZERO
-from hybrid.symbolic.switches import Surfaces, resolved
-from hybrid.symbolic.tracing import trace
+from hybrid.symbolic.switches import Surfaces, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
-from hybrid.transform.surface import SwitchingSurface, surface_between
+from hybrid.transform.surface import SwitchingSurface
 
 # By number of a surface: -1 below, 1 above, 0 sliding along it; -2 and 2 on it, with the branch of that side.
 Sides = Mapping[int, int]
@@ -30,10 +29,22 @@ Sides = Mapping[int, int]
 
 @attrs.frozen
 class Cell:
-    """A mode of the system that is split, and the sides of the surfaces that matter in the cell."""
+    """A part of a mode: the sides of the surfaces around it.
+
+    Attributes
+    ----------
+    mode
+        Index of the mode in the system that is split.
+    sides
+        By surface, -1, 0 or 1.
+    branches
+        Sides that decide every switch. A cell may extend across a surface that changes nothing there: the
+        sides of one of its parts are as good as those of the others.
+    """
 
     mode: int
     sides: tuple[tuple[int, int], ...]
+    branches: tuple[tuple[int, int], ...] = attrs.field(eq=False)
 
     @property
     def sliding(self) -> tuple[int, ...]:
@@ -43,10 +54,19 @@ class Cell:
 
 @attrs.frozen
 class Choice:
-    """A cell with the sides that had to be chosen to reach it, by surface."""
+    """A cell that some sides lead to.
+
+    Attributes
+    ----------
+    chosen
+        Missing sides that lead to this cell and not to another.
+    sides
+        All sides, which decide every switch.
+    """
 
     cell: Cell
     chosen: tuple[tuple[int, int], ...]
+    sides: dict[int, int]
 
 
 class Pieces:
@@ -69,14 +89,14 @@ class Pieces:
         surfaces: Surfaces,
     ) -> None:
         self.mode = mode
-        self.field = [*field]
-        self.watched = [*watched]
+        self.size = len(field)
+        self.switches = Switches([*field, *watched], surfaces)
         self.variables = variables
         self.surfaces = surfaces
         self._fields: dict[Any, Function] = {}
         self._between: dict[Any, SwitchingSurface] = {}
 
-    def cells(self, sides: Sides, decide: Callable[[int], int | None] | None = None) -> list[Choice]:
+    def cells(self, sides: Sides, decide: Callable[[int], int | None] | None = None) -> Iterator[Choice]:
         """The cells where these sides hold; sides that are missing and matter are chosen both ways.
 
         Sides of surfaces that do not matter are left out.
@@ -86,7 +106,6 @@ class Pieces:
         decide
             Gives a missing side if there is no choice.
         """
-        found: list[Choice] = []
         known = dict(sides)
         waiting: list[dict[int, int]] = [{}]
         while waiting:
@@ -100,28 +119,64 @@ class Pieces:
                     known[result] = side
                     waiting.append(chosen)
                 continue
-            found.append(Choice(Cell(self.mode, tuple(sorted(result.items()))), tuple(chosen.items())))
+            yield Choice(self._merged(result), tuple(chosen.items()), {**known, **chosen})
+
+    def choices(self, sides: Sides, decide: Callable[[int], int | None] | None = None) -> list[Choice]:
+        """As `cells`, but a side that makes no difference in the end is not chosen."""
+        found = [*self.cells(sides, decide)]
+        if len({choice.cell for choice in found}) == 1:
+            return [attrs.evolve(found[0], chosen=())]
         return found
 
+    def _merged(self, sides: dict[int, int]) -> Cell:
+        """The cell with these sides, and with what lies across those of its surfaces that change nothing."""
+        branches = sides
+        for number, side in sorted(sides.items()):
+            if side and number in sides:
+                sides = self._joined(sides, number, branches)
+        return Cell(self.mode, tuple(sorted(sides.items())), tuple(sorted(branches.items())))
+
+    def _joined(self, sides: dict[int, int], number: int, branches: dict[int, int]) -> dict[int, int]:
+        """Sides without a surface across which every function stays the same; all sides if some do not.
+
+        Both parts must lie where the sides of the other part, except for this surface, hold too.
+        """
+        rest = {other: side for other, side in sides.items() if other != number}
+        beyond = self._asked({**rest, number: -2 * sides[number]})
+        if isinstance(beyond, int) or self._entries(beyond) != self._entries(branches):
+            return sides
+        others = {other: side for other, side in beyond.items() if other != number}
+        here, there = {**rest, number: sides[number]}, {**others, number: -sides[number]}
+        if self._holds(others, here) and self._holds(rest, there):
+            return self._essential({**rest, **others})
+        return sides
+
+    def _holds(self, wanted: Sides, sides: Sides) -> bool:
+        """Whether some sides follow from others."""
+        return all(sides.get(k) == s or self.surfaces.implied(k, sides) == s for k, s in wanted.items())
+
+    def _entries(self, sides: Sides) -> list[tuple[sympy.Expr, ...]]:
+        """Every function with the branches of some sides, at each vertex of a sliding cell."""
+        return [tuple(self._resolved(vertex)) for vertex in _vertices(sides)]
+
+    def _essential(self, sides: dict[int, int]) -> dict[int, int]:
+        """The sides that do not follow from the others."""
+        for number in sorted(sides):
+            others = {k: s for k, s in sides.items() if k != number}
+            if self.surfaces.implied(number, others) == sides[number]:
+                sides = others
+        return sides
+
     def _asked(self, sides: Sides) -> dict[int, int] | int:
-        """The sides that matter and do not follow from others, each -1, 0 or 1; or a surface that is missing."""
+        """The sides that matter and do not follow from others, -1, 0 or 1; or a surface that is missing."""
         used: dict[int, int] = {}
         for vertex in _vertices(sides):
-            result = resolved([*self.field, *self.watched], vertex, self.surfaces)
+            result = self.switches.resolved(vertex)
             if isinstance(result, int):
                 return result
             used |= result.used
         used |= {number: 0 for number in used if sides.get(number) == 0}
-        return {
-            number: side
-            for number, side in used.items()
-            if self.surfaces.implied(number, {k: s for k, s in used.items() if k != number}) is None
-        }
-
-    def functions(self, sides: Sides) -> list[sympy.Expr]:
-        """The watched functions; on a surface along which the state slides, as above it."""
-        vertex = {number: side or 2 for number, side in sides.items()}
-        return self._resolved(vertex)[len(self.field) :]
+        return self._essential(used)
 
     def flow(self, sides: Sides) -> Function:
         """The field on these sides, with the sliding fields derived."""
@@ -136,15 +191,13 @@ class Pieces:
             return expressed(self._vertex_field(sides))
         if len(on) == 2 and not self._is_additive(sides, *on):
             return self._bilinear(sides, *on)
-        last = on[-1]
-        sliding = self.between(sides, last).sliding_field
-        return expressed(trace(sliding, self.variables.state, self.variables.parameter_names))
+        return self.between(sides, on[-1]).sliding_field
 
     def _vertex_field(self, sides: Sides) -> list[sympy.Expr]:
-        return self._resolved(sides)[: len(self.field)]
+        return self._resolved(sides)[: self.size]
 
     def _resolved(self, sides: Sides) -> list[sympy.Expr]:
-        result = resolved([*self.field, *self.watched], sides, self.surfaces)
+        result = self.switches.resolved(sides)
         assert not isinstance(result, int), "the side of a surface is missing"
         return [*result.entries]
 
@@ -154,25 +207,29 @@ class Pieces:
         if key not in self._between:
             height = scalar(self.surfaces.known[number].height)
             below, above = (self.flow({**sides, number: side}) for side in (-2, 2))
-            self._between[key] = surface_between(self.variables, below, above, height)
+            self._between[key] = SwitchingSurface(self.variables, below, above, height)
         return self._between[key]
 
     def jumps(self, sides: Sides, number: int) -> bool:
         """Whether the field is not proved to be continuous across a surface, all other sides as given."""
         height = self.surfaces.known[number].height
         return any(
-            not vanishes_on(above - below, height)
-            for vertex in _vertices(sides, besides=number)
-            for below, above in self._across(vertex, number)
+            not vanishes_on(change, height) for changes in self._changes(sides, number) for change in changes
         )
-
-    def _across(self, vertex: Sides, number: int) -> Iterator[tuple[sympy.Expr, sympy.Expr]]:
-        fields = [self._vertex_field({**vertex, number: side}) for side in (-2, 2)]
-        return zip(*fields, strict=True)
 
     def may_attract(self, sides: Sides, number: int) -> bool:
         """Whether the speeds through a surface may differ on its two sides."""
-        return any(self.between(vertex, number).may_attract() for vertex in _vertices(sides, besides=number))
+        [normal] = jacobian_of([self.surfaces.known[number].height], self.surfaces.symbols.x)
+        return any(
+            sympy.Add(*(slope * change for slope, change in zip(normal, changes, strict=True))).expand() != 0
+            for changes in self._changes(sides, number)
+        )
+
+    def _changes(self, sides: Sides, number: int) -> Iterator[list[sympy.Expr]]:
+        """The change of the field from below a surface to above it, at each vertex of the other sides."""
+        for vertex in _vertices(sides, besides=number):
+            below, above = (self._vertex_field({**vertex, number: side}) for side in (-2, 2))
+            yield [a - b for b, a in zip(below, above, strict=True)]
 
     def _is_additive(self, sides: Sides, one: int, other: int) -> bool:
         """Whether the jumps across two surfaces simply add up."""

@@ -8,7 +8,7 @@ from hybrid.errors import ModelError
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import Variables, as_parameters, as_state
-from hybrid.transform.surface import surface_between
+from hybrid.transform.surface import SwitchingSurface
 
 
 def filippov(
@@ -101,7 +101,7 @@ def filippov(
             raise ModelError(f"filippov: {what} must be a function of (t, x, p); got {function!r}.")
     variables = Variables(state, parameters)
     _check_traceable(variables, below, above, switching)
-    surface = surface_between(variables, below, above, switching)
+    surface = SwitchingSurface(variables, below, above, switching)
     modes = [Mode("below", below), Mode("above", above)]
     if surface.may_attract():
         modes.append(Mode("sliding", surface.sliding_field))

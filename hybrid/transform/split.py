@@ -10,4 +10,4 @@ def split(system: HybridSystem) -> HybridSystem:
     as_system("system", system)
     from hybrid.transform.splitter import Splitter
 
-    return Splitter(system).system()
+    return Splitter(system).begin()

@@ -2,24 +2,40 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from functools import reduce
+from itertools import chain, count, islice
+from threading import RLock
 from typing import Any
 
 import attrs
+import numpy as np
 import sympy
 from sympy.core.parameters import distribute
 
 from hybrid.errors import ModelError
-from hybrid.symbolic.evaluation import expressed, scalar
+from hybrid.symbolic.evaluation import Program, expressed, scalar
 from hybrid.symbolic.expressions import ZERO, And, Less, LessEqual
 from hybrid.symbolic.nodes import replaced, symbols_of
-from hybrid.symbolic.switches import Resolved, Surfaces, resolved
+from hybrid.symbolic.switches import Resolved, Surfaces, Switches
 from hybrid.symbolic.tracing import TraceError, model_symbols, trace
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.naming import Names
+
+# A system of more modes than this is made in stages, of at least so many modes at a time.
+MOST_AT_ONCE, FEWEST_AT_ONCE = 24, 8
+
+
+@attrs.frozen
+class Edge:
+    """A transition, the cell that it leads to, and the cell for the limit of its chatter; None for none."""
+
+    transition: Transition
+    target: Cell | None
+    limit: Cell | None = None
 
 
 @attrs.frozen
@@ -37,6 +53,7 @@ class Splitter:
 
     def __init__(self, system: HybridSystem) -> None:
         self.original = system
+        self.lock = RLock()
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))
         self.surfaces = Surfaces(self.symbols)
@@ -46,39 +63,100 @@ class Splitter:
             for i, each in enumerate(system.transitions)
         ]
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
-        self.mode_names: dict[Cell, str] = {}
-        self.waiting: list[Cell] = []
+        self.made: dict[Cell, tuple[Mode, list[Edge]]] = {}
+        self.stage: HybridSystem | None = None
+        self.frontier: dict[str, Cell] = {}
 
-    def system(self) -> HybridSystem:
-        for pieces in self.pieces:
-            for choice in pieces.cells({}):
-                self.name_of(choice.cell)
-        modes: list[Mode] = []
+    def begin(self) -> HybridSystem:
+        """The whole system if it is small; else a stage of it that grows."""
+        first = [choice.cell for pieces in self.pieces for choice in islice(pieces.cells({}), MOST_AT_ONCE)]
+        self._make(first[:MOST_AT_ONCE], MOST_AT_ONCE)
+        return self.current
+
+    @property
+    def current(self) -> HybridSystem:
+        """The system with all modes that have been made so far."""
+        if self.stage is None:
+            self.stage = self._assembled()
+        return self.stage
+
+    def leads_on(self, transition: str) -> bool:
+        """Whether a transition leads to a mode that the system lacks."""
+        return transition in self.frontier
+
+    def extend(self, transition: str) -> None:
+        """Make the mode to which a transition leads, and some around it."""
+        with self.lock:
+            self._make([self.frontier[transition]], max(FEWEST_AT_ONCE, len(self.made) // 2))
+
+    def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
+        """Make the modes in which a run may start; whether there were any to be made."""
+        values = dict(
+            zip((self.symbols.t, *self.symbols.x, *self.symbols.p), (t, *x, *parameters), strict=True)
+        )
+        missing = []
+        for pieces, own in zip(self.pieces, self.original.modes, strict=True):
+            if mode is None or mode == own.name:
+                # A run that starts on a surface finds out by itself on which side it goes on.
+                [cell] = [each.cell for each in pieces.cells({}, lambda number: self._side(number, values))]
+                missing += [] if cell in self.made else [cell]
+        with self.lock:
+            self._make(missing, FEWEST_AT_ONCE)
+        return bool(missing)
+
+    def _side(self, number: int, values: dict[sympy.Symbol, float]) -> int:
+        [height] = Program([self.surfaces.known[number].height]).run(values)
+        return 1 if height >= 0 else -1
+
+    def _make(self, cells: Sequence[Cell], most: int) -> None:
+        """Make these cells, and others that can be reached from them, nearest first."""
+        waiting = deque(cells)
+        wanted = set(cells)
+        made = 0
+        while waiting and (made < most or waiting[0] in wanted):
+            cell = waiting.popleft()
+            if cell in self.made:
+                continue
+            edges = [*self._edges(cell)]
+            self.made[cell] = self._mode(cell), edges
+            self.stage = None
+            made += 1
+            for edge in edges:
+                if edge.limit is not None:
+                    wanted.add(edge.limit)
+                    waiting.appendleft(edge.limit)
+                if edge.target is not None:
+                    waiting.append(edge.target)
+
+    def _assembled(self) -> HybridSystem:
+        """The system of all cells that have been made."""
         transitions: list[Transition] = []
+        self.frontier.clear()
         used: set[str] = set()
-        self.waiting.reverse()
-        while self.waiting:
-            cell = self.waiting.pop(0)
-            modes.append(self._mode(cell))
-            for transition in self._transitions(cell):
-                name = transition.name
-                number = 2
-                while name in used:
-                    name = f"{transition.name} ({number})"
-                    number += 1
+        for _, edges in self.made.values():
+            for edge in edges:
+                transition = edge.transition
+                names = chain([transition.name], (f"{transition.name} ({k})" for k in count(2)))
+                name = next(each for each in names if each not in used)
                 used.add(name)
-                transitions.append(attrs.evolve(transition, name=name))
-        return attrs.evolve(self.original, modes=modes, transitions=transitions)
+                if edge.target is None or edge.target in self.made:
+                    transitions.append(attrs.evolve(transition, name=name))
+                    continue
+                self.frontier[name] = edge.target
+                onward = Transition(
+                    transition.source, None, transition.guard, name=name, part_of=transition.part_of
+                )
+                transitions.append(onward)
+        modes = [mode for mode, _ in self.made.values()]
+        growth = self if self.frontier else None
+        return attrs.evolve(self.original, modes=modes, transitions=transitions, growth=growth)
 
     def name_of(self, cell: Cell) -> str:
-        """Name of the mode of a cell, which is going to be made if it has not been."""
-        if cell not in self.mode_names:
-            own = self.original.modes[cell.mode].name
-            sides = self.names.cell(self.surfaces.known, cell.sides)
-            several = len(self.original.modes) > 1
-            self.mode_names[cell] = f"{own}: {sides}" if sides and several else sides or own
-            self.waiting.append(cell)
-        return self.mode_names[cell]
+        """Name of the mode of a cell."""
+        own = self.original.modes[cell.mode].name
+        sides = self.names.cell(self.surfaces.known, cell.sides)
+        several = len(self.original.modes) > 1
+        return f"{own}: {sides}" if sides and several else sides or own
 
     def _traced(self, what: str, function: Function) -> list[sympy.Expr]:
         try:
@@ -114,12 +192,12 @@ class Splitter:
 
     def _mode(self, cell: Cell) -> Mode:
         original = self.original.modes[cell.mode]
-        if not cell.sides:
+        if not cell.branches:
             return attrs.evolve(original, name=self.name_of(cell), part_of=original.name)
-        field = self.pieces[cell.mode].flow(dict(cell.sides))
+        field = self.pieces[cell.mode].flow(dict(cell.branches))
         return Mode(self.name_of(cell), field, part_of=original.name)
 
-    def _transitions(self, cell: Cell) -> Iterator[Transition]:
+    def _edges(self, cell: Cell) -> Iterator[Edge]:
         for number, side in cell.sides:
             if side:
                 yield from self._arrivals(cell, number, side)
@@ -129,53 +207,57 @@ class Splitter:
             if outgoing.transition.source == self.original.modes[cell.mode].name:
                 yield from self._copies(cell, outgoing)
 
-    def _arrivals(self, cell: Cell, number: int, side: int) -> Iterator[Transition]:
+    def _arrivals(self, cell: Cell, number: int, side: int) -> Iterator[Edge]:
         """The transitions of a state that reaches a surface from one side."""
-        pieces, source = self.pieces[cell.mode], self.name_of(cell)
+        pieces = self.pieces[cell.mode]
         height = scalar(self.surfaces.known[number].height)
         beyond = {**dict(cell.sides), number: -2 * side}
-        for choice in pieces.cells(beyond):
-            sides, target = {**beyond, **dict(choice.chosen)}, self.name_of(choice.cell)
+        for choice in pieces.choices(beyond):
+            sides = {**dict(cell.branches), **choice.sides}
             extra = self._on(choice.chosen)
             if not pieces.jumps(sides, number) or not pieces.may_attract(sides, number):
-                yield Transition(source, target, Guard(height, -side, when=_all(extra)))
+                yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra)))
                 continue
-            at_start = Guard(height, -side, when=_all(extra), at_start=True)
-            yield Transition(source, target, at_start, name=f"{source}->{target} at the start")
+            yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra), at_start=True))
             surface = pieces.between(sides, number)
             arrives, crosses = (
                 (surface.arrives_from_below, surface.crosses_up)
                 if side < 0
                 else (surface.arrives_from_above, surface.crosses_down)
             )
-            for sliding in pieces.cells({**sides, number: 0}):
+            for sliding in pieces.choices({**sides, number: 0}):
                 more = [self._condition(arrives), *extra, *self._on(sliding.chosen)]
-                yield Transition(source, self.name_of(sliding.cell), Guard(height, -side, when=_all(more)))
+                yield self._edge(cell, sliding.cell, Guard(height, -side, when=_all(more)))
             onwards = [self._condition(crosses), *extra]
-            yield Transition(source, target, Guard(height, -side, when=_all(onwards)))
+            yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)))
 
-    def _departures(self, cell: Cell, number: int) -> Iterator[Transition]:
+    def _edge(self, cell: Cell, target: Cell, guard: Guard, reset: Reset | None = None) -> Edge:
+        source, to = self.name_of(cell), self.name_of(target)
+        name = f"{source}->{to} at the start" if guard.at_start else f"{source}->{to}"
+        return Edge(Transition(source, to, guard, reset, name=name), target)
+
+    def _departures(self, cell: Cell, number: int) -> Iterator[Edge]:
         """The transitions of a state that slides along a surface and leaves it."""
-        pieces, source, sides = self.pieces[cell.mode], self.name_of(cell), dict(cell.sides)
-        surface = pieces.between(sides, number)
+        pieces, source = self.pieces[cell.mode], self.name_of(cell)
+        surface = pieces.between(dict(cell.branches), number)
         height = scalar(self.surfaces.known[number].height)
         where = f" at {self.names.side(self.surfaces.known, number, 0)}" if len(cell.sliding) > 1 else ""
         ways = [
-            (side, self.name_of(choice.cell), self._on(choice.chosen))
+            (side, choice.cell, self._on(choice.chosen))
             for side in (1, -1)
-            for choice in pieces.cells({**sides, number: 2 * side})
+            for choice in pieces.choices({**dict(cell.sides), number: 2 * side})
         ]
         for side, target, extra in ways:
             off = Guard(height, side, when=_all([self._condition(surface.is_off), *extra]), at_start=True)
-            yield Transition(source, target, off, name=f"{source}->{target} at the start")
+            yield self._edge(cell, target, off)
         attraction = self._function(surface.attraction)
         at_start = Guard(attraction, -1, at_start=True)
-        yield Transition(source, None, at_start, name=f"{source}: two-fold at start{where}")
-        yield Transition(source, None, Guard(attraction, -1), name=f"{source}: two-fold{where}")
+        yield Edge(Transition(source, None, at_start, name=f"{source}: two-fold at start{where}"), None)
+        yield Edge(Transition(source, None, Guard(attraction, -1), name=f"{source}: two-fold{where}"), None)
         projection = Reset(expressed(self._traced("the projection", surface.projection)))
         for side, target, extra in ways:
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
-            yield Transition(source, target, Guard(speed, side, when=_all(extra)), projection)
+            yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), projection)
 
     def _function(self, function: Function) -> Function:
         """A derived scalar function by its expression, which can be pickled."""
@@ -201,7 +283,7 @@ class Splitter:
         with distribute(False):
             return replaced(self.surfaces.known[number].height, dict(zip(self.symbols.x, after, strict=True)))
 
-    def _copies(self, cell: Cell, outgoing: _Outgoing) -> Iterator[Transition]:
+    def _copies(self, cell: Cell, outgoing: _Outgoing) -> Iterator[Edge]:
         """A user's transition in one cell: one for each side that the state may land on."""
         transition = outgoing.transition
         own = self.names.cell(self.surfaces.known, cell.sides)
@@ -212,22 +294,24 @@ class Splitter:
         }
         guard = self._smooth_guard(cell, outgoing)
         if transition.target is None:
-            yield attrs.evolve(transition, guard=guard, **new)
+            yield Edge(attrs.evolve(transition, guard=guard, **new), None)
             return
         asked = [] if guard.when is None else [self._truth(guard.when)]
-        new["accumulates_to"] = self._limit(cell, transition)
+        limit = self._limit(cell, transition)
+        new["accumulates_to"] = None if limit is None else self.name_of(limit)
         for chosen, after in self._after(cell, outgoing):
             reset = transition.reset if after == outgoing.reset else Reset(expressed(after or ()))
             for landing in self._landings(cell, transition.target, after):
                 more = [*self._on(chosen), *self._on(landing.chosen, after)]
                 when = _all([*asked, *more]) if more else guard.when
-                yield attrs.evolve(
+                copy = attrs.evolve(
                     transition,
                     target=self.name_of(landing.cell),
                     guard=attrs.evolve(guard, when=when),
                     reset=reset,
                     **new,
                 )
+                yield Edge(copy, landing.cell, limit)
 
     def _truth(self, condition: Function) -> sympy.Expr:
         """A user's condition, positive or true, as a truth value."""
@@ -239,7 +323,7 @@ class Splitter:
         guard = outgoing.transition.guard
         if outgoing.guard is None:
             return guard
-        result = resolved([outgoing.guard], _upper(cell.sides), self.surfaces)
+        result = Switches([outgoing.guard], self.surfaces).resolved(_upper(cell.branches))
         assert isinstance(result, Resolved), "a cell decides every switch of its guards"
         if not result.used:
             return guard
@@ -252,10 +336,11 @@ class Splitter:
         if outgoing.reset is None:
             yield (), None
             return
+        switches = Switches(outgoing.reset, self.surfaces)
         waiting: list[dict[int, int]] = [{}]
         while waiting:
             chosen = waiting.pop()
-            result = resolved(outgoing.reset, {**_upper(cell.sides), **chosen}, self.surfaces)
+            result = switches.resolved({**_upper(cell.sides), **chosen})
             if isinstance(result, int):
                 waiting += [{**chosen, result: +1}, {**chosen, result: -1}]
             else:
@@ -267,7 +352,7 @@ class Splitter:
         def decide(number: int) -> int | None:
             return None if after is None else self._side_after(cell, number, after)
 
-        landings = self.pieces[self.original.mode_index(target)].cells({}, decide)
+        landings = self.pieces[self.original.mode_index(target)].choices({}, decide)
         if after is None and len(landings) > 1:
             raise ModelError(
                 f"split: a reset into mode {target!r} cannot be traced, so it is not known on which side of "
@@ -289,14 +374,14 @@ class Splitter:
         side = sides[same] if same in sides else self.surfaces.implied(same, sides)
         return None if side is None else side * orientation
 
-    def _limit(self, cell: Cell, transition: Transition) -> str | None:
-        """The mode for the limit of chatter: on the sides of the cell, above where it has none."""
+    def _limit(self, cell: Cell, transition: Transition) -> Cell | None:
+        """The cell for the limit of chatter: on the sides of the cell, above where it has none."""
         if transition.accumulates_to is None:
             return None
         sides = _upper(cell.sides)
         pieces = self.pieces[self.original.mode_index(transition.accumulates_to)]
-        [choice] = pieces.cells({}, lambda number: sides.get(number, 1))
-        return self.name_of(choice.cell)
+        [choice] = pieces.choices({}, lambda number: sides.get(number, 1))
+        return choice.cell
 
 
 def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -28,11 +29,31 @@ class SwitchingSurface:
     below: Function
     above: Function
     switching: Function
-    gradient: Function  # (D_x h, D_t h)
-    speed_below: Function  # L_b and L_a, the rates of h along the fields
-    speed_above: Function
-    turn_below: Function  # rate of L_b along the field below, and of L_a along the field above
-    turn_above: Function
+
+    @cached_property
+    def gradient(self) -> Function:
+        """``(D_x h, D_t h)``."""
+        return _derived_gradient(self.variables, self.switching)
+
+    @cached_property
+    def speed_below(self) -> Function:
+        """``L_b``, the rate of the switching function along the field below."""
+        return _rate(self.variables, self.gradient, self.below)
+
+    @cached_property
+    def speed_above(self) -> Function:
+        """``L_a``."""
+        return _rate(self.variables, self.gradient, self.above)
+
+    @cached_property
+    def turn_below(self) -> Function:
+        """Rate of ``L_b`` along the field below."""
+        return _rate(self.variables, _derived_gradient(self.variables, self.speed_below), self.below)
+
+    @cached_property
+    def turn_above(self) -> Function:
+        """Rate of ``L_a`` along the field above."""
+        return _rate(self.variables, _derived_gradient(self.variables, self.speed_above), self.above)
 
     def may_attract(self) -> bool:
         """Whether sliding is possible: False if the two speeds are proved equal everywhere."""
@@ -45,26 +66,36 @@ class SwitchingSurface:
         """``(L_b, L_a)``."""
         return self.speed_below(t, x, p), self.speed_above(t, x, p)
 
-    def sliding_field(self, t: Any, x: Any, p: Any) -> list[Any]:
-        L_b, L_a = self.speeds(t, x, p)
-        attraction = L_b - L_a
-        return [
-            b if _is_zero(a - b) else (L_b * a - L_a * b) / attraction
-            for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
-        ]
+    @cached_property
+    def sliding_field(self) -> Function:
+        """The equivalent field, along which the switching function is constant."""
+        from hybrid.symbolic.evaluation import expressed
+        from hybrid.symbolic.tracing import trace
 
-    # The conditions of the crossings of h = 0.
+        def field(t: Any, x: Any, p: Any) -> list[Any]:
+            L_b, L_a = self.speeds(t, x, p)
+            attraction = L_b - L_a
+            return [
+                b if _is_zero(a - b) else (L_b * a - L_a * b) / attraction
+                for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
+            ]
+
+        return expressed(trace(field, self.variables.state, self.variables.parameter_names))
 
     def arrives_from_below(self, t: Any, x: Any, p: Any) -> Any:
+        """Whether an orbit that comes from below stays on the surface."""
         return self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) <= 0.0)
 
     def arrives_from_above(self, t: Any, x: Any, p: Any) -> Any:
+        """Whether an orbit that comes from above stays on the surface."""
         return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) >= 0.0)
 
     def crosses_up(self, t: Any, x: Any, p: Any) -> Any:
+        """Whether an orbit that comes from below crosses the surface."""
         return self._goes_on(t, x, p, +1.0) & (self.speed_above(t, x, p) > 0.0)
 
     def crosses_down(self, t: Any, x: Any, p: Any) -> Any:
+        """Whether an orbit that comes from above crosses the surface."""
         return self._goes_on(t, x, p, -1.0) & (self.speed_below(t, x, p) < 0.0)
 
     def _goes_on(self, t: Any, x: Any, p: Any, side: float) -> Any:
@@ -82,6 +113,7 @@ class SwitchingSurface:
         return (side * turn >= 0.0) | (side * speed > TOUCH * self._steepest(t, x, p))
 
     def attraction(self, t: Any, x: Any, p: Any) -> Any:
+        """``L_b - L_a``, less what counts as zero: positive where the surface attracts."""
         L_b, L_a = self.speeds(t, x, p)
         return L_b - L_a - self._hardly_moving(t, x, p)
 
@@ -112,19 +144,6 @@ class SwitchingSurface:
         return [value - share * slope for value, slope in zip(x, normal, strict=True)]
 
 
-def surface_between(
-    variables: Variables, below: Function, above: Function, switching: Function
-) -> SwitchingSurface:
-    """The surface where a switching function vanishes, with its fields; all three must be traceable."""
-    gradient = _derived_gradient(variables, switching)
-    speeds = [_rate(gradient, field) for field in (below, above)]
-    turns = [
-        _rate(_derived_gradient(variables, speed), field)
-        for speed, field in zip(speeds, (below, above), strict=True)
-    ]
-    return SwitchingSurface(variables, below, above, switching, gradient, *speeds, *turns)
-
-
 def _derived_gradient(variables: Variables, function: Function) -> Function:
     """``(D_x, D_t)`` of a scalar function as a model function, which can itself be traced."""
     # SymPy is slow to import, so it is not imported with the library.
@@ -138,14 +157,17 @@ def _derived_gradient(variables: Variables, function: Function) -> Function:
     return expressed(row)
 
 
-def _rate(gradient: Function, field: Function) -> Function:
+def _rate(variables: Variables, gradient: Function, field: Function) -> Function:
     """``D_t g + D_x g f``, the rate of a function along a field, as a model function."""
+    from hybrid.symbolic.evaluation import scalar
+    from hybrid.symbolic.tracing import trace
 
     def rate(t: Any, x: Any, p: Any) -> Any:
         *normal, own = gradient(t, x, p)
         return _dot(normal, field(t, x, p), own)
 
-    return rate
+    [expression] = trace(rate, variables.state, variables.parameter_names)
+    return scalar(expression)
 
 
 def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:

@@ -1,0 +1,61 @@
+"""Systems that grow: modes that are made when a run reaches them.
+
+A system that has been split may have thousands of modes, of which a run visits a few. It begins with some of
+them. A transition into a mode that has not been made yet ends the run with `Unexplored`; the call is then
+repeated with a larger system. Systems stay immutable: each is one stage of its growth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Growth(Protocol):
+    """What makes further modes of a system."""
+
+    @property
+    def current(self) -> Any:
+        """The system with all modes that have been made so far."""
+        ...
+
+    def leads_on(self, transition: str) -> bool:
+        """Whether a transition leads to a mode that the system lacks."""
+        ...
+
+    def extend(self, transition: str) -> None:
+        """Make the mode to which a transition leads, and some around it."""
+        ...
+
+    def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
+        """Make the modes in which a run may start; whether there were any to be made."""
+        ...
+
+
+class Unexplored(Exception):
+    """A run needs modes that have been made only now."""
+
+
+def growing(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[Any, P], R]:
+    """Repeat a call until its system has all modes that the call needs.
+
+    The first argument is the system; a result therefore belongs to a system that has every mode it visits.
+    """
+
+    @wraps(function)
+    def call(system: Any, *args: P.args, **kwargs: P.kwargs) -> R:
+        growth = getattr(system, "growth", None)
+        while growth is not None:
+            try:
+                return function(growth.current, *args, **kwargs)
+            except Unexplored:
+                continue
+        return function(system, *args, **kwargs)
+
+    return call
