@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import attrs
 import sympy
@@ -39,6 +40,7 @@ from hybrid.symbolic.tracing import Symbols, TraceError, model_symbols, trace
 from hybrid.system.checks import derivative_has_time_column
 from hybrid.system.derivatives import complex_step_error
 from hybrid.system.functions import (
+    CONDITION,
     ModelFunction,
     condition_function,
     field_function,
@@ -55,6 +57,7 @@ _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
 _ZERO_CELL = re.compile(r"out\[\d+, \d+\] = 0\.0")
 # So many zeros are written by a loop.
 MANY_ZEROS = 50
+Result = TypeVar("Result")
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
 
@@ -82,8 +85,11 @@ def _emitted(system: HybridSystem) -> Emitted:
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
     boundaries = [_boundaries(system, mode.name, guards, writer.symbols) for mode in system.modes]
     propagators = [
-        propagator(field.expressions, around, writer.symbols)
-        for field, around in zip(fields, boundaries, strict=True)
+        writer.remembered(
+            ("propagator", mode.field, tuple(around)),
+            partial(propagator, field.expressions, around, writer.symbols),
+        )
+        for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
     n = system.dimension
     series = [each.series for each in propagators]
@@ -185,8 +191,23 @@ class _Writer:
         self.system = system
         self.symbols: Symbols = model_symbols(system.dimension, len(system.parameters))
         self.opaque: dict[str, OpaqueFunction] = {}
+        # A system that grows has most of its functions from its last stage.
+        self._known: dict[Any, Any] = {} if system.growth is None else system.growth.written
+
+    def remembered(self, key: Any, make: Callable[[], Result]) -> Result:
+        """What ``make`` returns; the same as the last time for the same key."""
+        if key not in self._known:
+            self._known[key] = make()
+        found: Result = self._known[key]
+        return found
 
     def write(self, function: ModelFunction) -> _Written:
+        """Statements for a function and its derivative."""
+        return self.remembered(
+            (function.value, function.derivative, function.size), lambda: self._write(function)
+        )
+
+    def _write(self, function: ModelFunction) -> _Written:
         targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
         try:
             expressions = self.traced(function.value)
@@ -203,12 +224,16 @@ class _Writer:
 
     def condition(self, function: ModelFunction) -> _Written:
         """Statements for the condition of a guard; a truth value becomes 1 or 0."""
+        return self.remembered((CONDITION, function.value), lambda: self._condition(function))
+
+    def _condition(self, function: ModelFunction) -> _Written:
         try:
             [value] = self.traced(function.value)
         except ModelError as reason:
             return _Written(self._opaque_value(function, ["out[0]"], reason), [])
-        statements = assignments(["out[0]"], [Select(value, ONE, ZERO) if value.is_Boolean else value])
-        return _Written(statements, [], [value])
+        value = Select(value, ONE, ZERO) if value.is_Boolean else value
+        # It is evaluated at crossings only, so it is not worth a long search for common parts.
+        return _Written(assignments(["out[0]"], [value], thorough=False), [], [value])
 
     def identity(self) -> _Written:
         """The reset of a transition that has none."""
@@ -384,13 +409,17 @@ def _written_condition(writer: _Writer, transition: Transition) -> _Written:
 
 
 def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
-    """Source of a function with one branch per index; an empty one is left out."""
+    """Source of a function with a branch for each index; indices share one if their statements are equal."""
     order = "order, " if name.endswith("series") else ""
     lines = [f"def {name}(index, t, x, p, {order}out):"]
+    indices: dict[tuple[str, ...], list[int]] = {}
     for index, statements in enumerate(branches):
-        if statements:
-            lines.append(f"    {'if' if len(lines) == 1 else 'elif'} index == {index}:")
-            lines += [f"        {statement}" for statement in statements]
+        indices.setdefault(tuple(statements), []).append(index)
+    for body, places in indices.items():
+        if body:
+            condition = " or ".join(f"index == {place}" for place in places)
+            lines.append(f"    {'if' if len(lines) == 1 else 'elif'} {condition}:")
+            lines += [f"        {statement}" for statement in body]
     if len(lines) == 1:
         lines.append("    pass")
     return "\n".join(lines) + "\n"

@@ -72,13 +72,16 @@ LARGE = 400
 LARGE_TREE = 20_000
 
 
-def assignments(targets: Sequence[str], expressions: Sequence[sympy.Expr]) -> list[str]:
+def assignments(
+    targets: Sequence[str], expressions: Sequence[sympy.Expr], *, thorough: bool = True
+) -> list[str]:
     """Statements that first compute every expression and then store the values in their targets.
 
-    ``targets`` may therefore overlap with variables that the expressions read.
+    ``targets`` may therefore overlap with variables that the expressions read. Without ``thorough``, only
+    whole expressions are shared, not parts of sums and products.
     """
     uses = _uses(expressions)
-    if len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in expressions):
+    if not thorough or len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in expressions):
         reduced, printer = expressions, _Printer(node for node, count in uses.items() if count > 1)
     else:
         shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("c", real=True), list=True)

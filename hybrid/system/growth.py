@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -18,7 +18,15 @@ R = TypeVar("R")
 
 
 class Growth(Protocol):
-    """What makes further modes of a system."""
+    """What makes further modes of a system.
+
+    Attributes
+    ----------
+    written
+        What the compiler has made of the functions of earlier stages.
+    """
+
+    written: dict[Any, Any]
 
     @property
     def current(self) -> Any:
@@ -58,4 +66,4 @@ def growing(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
                 continue
         return function(system, *args, **kwargs)
 
-    return call
+    return cast("Callable[Concatenate[Any, P], R]", call)

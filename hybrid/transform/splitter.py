@@ -25,8 +25,8 @@ from hybrid.system.graph import HybridSystem
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.naming import Names
 
-# A system of more modes than this is made in stages, of at least so many modes at a time.
-MOST_AT_ONCE, FEWEST_AT_ONCE = 24, 8
+# A system of more modes than this is made in stages, of at least so many more modes each.
+MOST_WHOLE, FEWEST_MORE = 12, 3
 
 
 @attrs.frozen
@@ -54,6 +54,8 @@ class Splitter:
     def __init__(self, system: HybridSystem) -> None:
         self.original = system
         self.lock = RLock()
+        self.written: dict[Any, Any] = {}
+        self.heights: dict[int, Function] = {}
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))
         self.surfaces = Surfaces(self.symbols)
@@ -63,14 +65,18 @@ class Splitter:
             for i, each in enumerate(system.transitions)
         ]
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
-        self.made: dict[Cell, tuple[Mode, list[Edge]]] = {}
+        self.known: dict[Cell, tuple[Mode, list[Edge]]] = {}
+        self.made: dict[Cell, None] = {}
         self.stage: HybridSystem | None = None
         self.frontier: dict[str, Cell] = {}
 
     def begin(self) -> HybridSystem:
-        """The whole system if it is small; else a stage of it that grows."""
-        first = [choice.cell for pieces in self.pieces for choice in islice(pieces.cells({}), MOST_AT_ONCE)]
-        self._make(first[:MOST_AT_ONCE], MOST_AT_ONCE)
+        """The whole system if it is small; else its first stage."""
+        first = [choice.cell for pieces in self.pieces for choice in islice(pieces.cells({}), MOST_WHOLE)]
+        self._make(first, MOST_WHOLE + 1)
+        if len(self.made) > MOST_WHOLE:
+            # A run makes the modes around its start.
+            self.made = dict.fromkeys(first[:1])
         return self.current
 
     @property
@@ -87,7 +93,7 @@ class Splitter:
     def extend(self, transition: str) -> None:
         """Make the mode to which a transition leads, and some around it."""
         with self.lock:
-            self._make([self.frontier[transition]], max(FEWEST_AT_ONCE, len(self.made) // 2))
+            self._make([self.frontier[transition]], max(FEWEST_MORE, len(self.made) // 3))
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
@@ -101,7 +107,7 @@ class Splitter:
                 [cell] = [each.cell for each in pieces.cells({}, lambda number: self._side(number, values))]
                 missing += [] if cell in self.made else [cell]
         with self.lock:
-            self._make(missing, FEWEST_AT_ONCE)
+            self._make(missing, len(missing))
         return bool(missing)
 
     def _side(self, number: int, values: dict[sympy.Symbol, float]) -> int:
@@ -110,31 +116,35 @@ class Splitter:
 
     def _make(self, cells: Sequence[Cell], most: int) -> None:
         """Make these cells, and others that can be reached from them, nearest first."""
-        waiting = deque(cells)
+        waiting, made = deque(cells), 0
         wanted = set(cells)
-        made = 0
         while waiting and (made < most or waiting[0] in wanted):
             cell = waiting.popleft()
             if cell in self.made:
                 continue
-            edges = [*self._edges(cell)]
-            self.made[cell] = self._mode(cell), edges
-            self.stage = None
+            self.made[cell] = self.stage = None
             made += 1
-            for edge in edges:
+            for edge in self._leaving(cell):
                 if edge.limit is not None:
                     wanted.add(edge.limit)
                     waiting.appendleft(edge.limit)
                 if edge.target is not None:
                     waiting.append(edge.target)
 
+    def _leaving(self, cell: Cell) -> list[Edge]:
+        """The transitions that leave a cell."""
+        if cell not in self.known:
+            edges = [*self._edges(cell)]
+            self.known[cell] = self._mode(cell), edges
+        return self.known[cell][1]
+
     def _assembled(self) -> HybridSystem:
         """The system of all cells that have been made."""
         transitions: list[Transition] = []
         self.frontier.clear()
         used: set[str] = set()
-        for _, edges in self.made.values():
-            for edge in edges:
+        for cell in self.made:
+            for edge in self._leaving(cell):
                 transition = edge.transition
                 names = chain([transition.name], (f"{transition.name} ({k})" for k in count(2)))
                 name = next(each for each in names if each not in used)
@@ -147,7 +157,7 @@ class Splitter:
                     transition.source, None, transition.guard, name=name, part_of=transition.part_of
                 )
                 transitions.append(onward)
-        modes = [mode for mode, _ in self.made.values()]
+        modes = [self.known[cell][0] for cell in self.made]
         growth = self if self.frontier else None
         return attrs.evolve(self.original, modes=modes, transitions=transitions, growth=growth)
 
@@ -210,7 +220,7 @@ class Splitter:
     def _arrivals(self, cell: Cell, number: int, side: int) -> Iterator[Edge]:
         """The transitions of a state that reaches a surface from one side."""
         pieces = self.pieces[cell.mode]
-        height = scalar(self.surfaces.known[number].height)
+        height = self._height(number)
         beyond = {**dict(cell.sides), number: -2 * side}
         for choice in pieces.choices(beyond):
             sides = {**dict(cell.branches), **choice.sides}
@@ -240,7 +250,7 @@ class Splitter:
         """The transitions of a state that slides along a surface and leaves it."""
         pieces, source = self.pieces[cell.mode], self.name_of(cell)
         surface = pieces.between(dict(cell.branches), number)
-        height = scalar(self.surfaces.known[number].height)
+        height = self._height(number)
         where = f" at {self.names.side(self.surfaces.known, number, 0)}" if len(cell.sliding) > 1 else ""
         ways = [
             (side, choice.cell, self._on(choice.chosen))
@@ -258,6 +268,11 @@ class Splitter:
         for side, target, extra in ways:
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
             yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), projection)
+
+    def _height(self, number: int) -> Function:
+        if number not in self.heights:
+            self.heights[number] = scalar(self.surfaces.known[number].height)
+        return self.heights[number]
 
     def _function(self, function: Function) -> Function:
         """A derived scalar function by its expression, which can be pickled."""
