@@ -81,6 +81,8 @@ class _Surface:
         self.matrices = system.matrices[index].reshape(-1, n, n)
         self.constants = system.constants[index].reshape(-1, n)
         self.signs = np.array(list(product((-1, 1), repeat=len(self.sliding))))
+        count = range(len(self.sliding))
+        self.others = np.array([[j for j in count if j != i] for i in count], int)  # Row i: all but i.
         self.normals = system.normals[self.sliding]
         self.guess = np.zeros(len(self.sliding))
 
@@ -90,9 +92,8 @@ class _Surface:
     def field(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         return np.prod((1 + self.signs * u) / 2, axis=1) @ self.vertices(x)
 
-    def slide(self, x: np.ndarray) -> np.ndarray:
-        """The field along the surfaces."""
-        return self.field(x, self.equivalent(x))
+    def speed(self, x: np.ndarray) -> float:
+        return np.linalg.norm(self.vertices(x), axis=1).max()
 
     def equivalent(self, x: np.ndarray) -> np.ndarray:
         """The stable ``u`` near the last one."""
@@ -111,8 +112,7 @@ class _Surface:
     def jacobian(self, rates: np.ndarray, u: np.ndarray) -> np.ndarray:
         """The derivative of the rates ``h'`` by ``u``."""
         factors = (1 + self.signs * u) / 2
-        others = [np.prod(np.delete(factors, j, axis=1), axis=1) for j in range(len(u))]
-        return rates.T @ (self.signs / 2 * np.transpose(others))
+        return rates.T @ (self.signs / 2 * np.prod(factors[:, self.others], axis=2))
 
     def stability(self, rates: np.ndarray, u: np.ndarray) -> float:
         return (-1) ** len(u) * np.linalg.det(self.jacobian(rates, u))
@@ -161,15 +161,14 @@ class _Surface:
 
 
 def solve(system: System, x0, t1: float, samples=(), mode: Mode | None = None, max_events: int = 200) -> Run:
-    """Follow the orbit from ``x0`` over ``0 <= t <= t1``; ``mode`` chooses where the start leaves several."""
+    """Follow the orbit from ``x0`` over ``0 <= t <= t1``; ``mode`` decides where several are consistent."""
     x, samples = np.array(x0, float), np.asarray(samples, float)
     run = Run("ended", 0.0, x, [], [], np.full((len(samples), len(x)), np.nan))
     on = np.flatnonzero(np.abs(system.heights(x)) <= 1e-12 * np.linalg.norm(system.normals, axis=1))
     outside = tuple(np.sign(system.heights(x)).astype(int))
     try:
-        here, u = (
-            (mode, np.zeros(len(outside))) if mode else _decide(system, x, outside, list(on), None, None)
-        )
+        start = np.zeros(len(outside))
+        here, u = (mode, start) if mode else _decide(system, x, outside, list(on), start, None)
         run.modes.append(here)
         fresh = [k for k in on if here[k]]
         while True:
@@ -201,22 +200,17 @@ def _decide(system, x, mode, on, previous, leaving) -> tuple[Mode, np.ndarray]:
     ``leaving`` is the switch and the side of a sliding that has just ended: then sliding on all surfaces is
     excluded, and the surface is left to that side with a speed that grows from zero.
     """
-    previous = np.zeros(len(mode)) if previous is None else previous
     everything = _Surface(system, tuple(0 if k in on else s for k, s in enumerate(mode)))
-    speed = np.linalg.norm(everything.vertices(x), axis=1).max() + 1e-300
+    scales = np.linalg.norm(system.normals, axis=1) * everything.speed(x) + 1e-300
     consistent = []
     for choice in product((-1, 0, 1), repeat=len(on)):
-        candidate = list(mode)
-        for k, s in zip(on, choice, strict=True):
-            candidate[k] = s
         if leaving and not any(choice):
             continue
-        surface = _Surface(system, tuple(candidate))
-        scales = np.linalg.norm(system.normals, axis=1) * speed
+        candidate = np.array(mode)
+        candidate[on] = choice
+        surface = _Surface(system, tuple(candidate.tolist()))
         rates = surface.vertices(x) @ surface.normals.T / scales[surface.sliding]
-        first_order = leaving and all(
-            s == (leaving[1] if k == leaving[0] else 0) for k, s in zip(on, choice, strict=True)
-        )
+        first_order = leaving and choice == tuple(leaving[1] if k == leaving[0] else 0 for k in on)
         for u in surface.zeros(rates, previous[surface.sliding]):
             speeds = system.normals @ surface.field(x, u) / scales
             conditions = [s * speeds[k] for k, s in zip(on, choice, strict=True) if s and not first_order]
@@ -226,9 +220,9 @@ def _decide(system, x, mode, on, previous, leaving) -> tuple[Mode, np.ndarray]:
             if abs(worst) < MARGINAL:
                 raise _Halt("grazing")
             if worst > 0:
-                full = np.array(candidate, float)
+                full = candidate.astype(float)
                 full[surface.sliding] = u
-                consistent.append((tuple(int(s) for s in candidate), full))
+                consistent.append((surface.mode, full))
     if len(consistent) != 1:
         raise _Halt("undecided")
     return consistent[0]
@@ -251,24 +245,17 @@ def _until_event(surface, run, t1, samples, fresh) -> tuple[int, int] | None:
         if t + tau >= t1:
             return None
         if event is not None:
+            _, index, touch = event
+            k, side = surface.meaning(index)
             after, before = (surface.margins(flow(tau + delta)) for delta in (FRESH, -FRESH))
-            slope = (before - after)[event[1]] / (2 * FRESH)
-            k, side = surface.meaning(event[1])
-            speed = 1.0 if side else np.linalg.norm(surface.system.normals[k]) * _speed(surface, run.x)
-            others = np.delete(surface.margins(flow(tau + TOGETHER)), event[1])
-            if (
-                event[2]
-                or slope < MARGINAL * speed
-                or others.min(initial=1.0) <= 0
-                or run.t - began < TOGETHER
-            ):
+            slope = (before - after)[index] / (2 * FRESH)
+            speed = 1.0 if side else np.linalg.norm(surface.system.normals[k]) * surface.speed(run.x)
+            others = np.delete(surface.margins(flow(tau + TOGETHER)), index)
+            together = run.t - began < TOGETHER or others.min(initial=1.0) <= 0
+            if touch or together or slope < MARGINAL * speed:
                 raise _Halt("grazing")
             return k, side
     return None
-
-
-def _speed(surface: _Surface, x: np.ndarray) -> float:
-    return np.linalg.norm(surface.vertices(x), axis=1).max()
 
 
 def _grid(length: float, count: int) -> np.ndarray:
@@ -299,7 +286,8 @@ def _cell(surface: _Surface, t: float, x: np.ndarray) -> Iterator[tuple]:
 def _slide(surface: _Surface, t: float, x: np.ndarray, t1: float) -> Iterator[tuple]:
     """The same for sliding, one window for each step; steps shrink where the equivalent ``u`` is lost."""
     longest = STEP
-    make = lambda: DOP853(lambda _, y: surface.slide(y), t, x, t1, longest, rtol=1e-12, atol=1e-13)  # noqa: E731
+    field = lambda _, y: surface.field(y, surface.equivalent(y))  # noqa: E731
+    make = lambda: DOP853(field, t, x, t1, longest, rtol=1e-12, atol=1e-13)  # noqa: E731
     solver = make()
     while solver.status == "running":
         try:
@@ -332,16 +320,15 @@ def _first(margins: Callable, grid, values, new, began) -> tuple[float, int, boo
         stop = start + negative[0] if len(negative) else len(grid) - 1
         if len(negative):
             found.append((brentq(one, grid[stop - 1], grid[stop], xtol=1e-15), q, False))
-        inner = column[start + 1 : stop]
-        low = (
-            (inner <= column[start:stop][:-1])
-            & (inner <= column[start + 2 : stop + 1])
-            & (inner < np.ptp(column))
+        before, inner, after = (
+            column[start : stop - 1],
+            column[start + 1 : stop],
+            column[start + 2 : stop + 1],
         )
+        low = (inner <= before) & (inner <= after) & (inner < np.ptp(column))
         for i in start + 1 + np.flatnonzero(low):
-            best = minimize_scalar(
-                one, bounds=(grid[i - 1], grid[i + 1]), method="bounded", options={"xatol": 1e-9}
-            )
+            bounds = grid[i - 1], grid[i + 1]
+            best = minimize_scalar(one, bounds=bounds, method="bounded", options={"xatol": 1e-9})
             if best.fun <= 0:
                 found.append((brentq(one, grid[i - 1], best.x, xtol=1e-15), q, False))
             elif best.fun < MARGINAL * np.ptp(column):
@@ -361,7 +348,8 @@ def random_system(rng: np.random.Generator, n: int, m: int, kind: str, attractio
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offsets = 0.3 * rng.normal(size=m)
     A, b = rng.normal(size=(n, n)) / np.sqrt(n), 0.4 * rng.normal(size=n)
-    A += (rng.uniform(-0.8, 0.2) - np.linalg.eigvals(A).real.max()) * np.eye(n)
+    A += rng.uniform(0.0, 2.0) * (A - A.T)  # Rotation, so that orbits meet surfaces again and leave sliding.
+    A += (rng.uniform(-0.8, 0.0) - np.linalg.eigvals(A).real.max()) * np.eye(n)
     pull = np.where(rng.random(m) < attraction, -1, 1) * rng.uniform(0.5, 1.5, size=m)
     C = 0.4 * rng.normal(size=(n, m))
     C += normals.T * (pull - np.sum(normals.T * C, axis=0))
