@@ -30,7 +30,7 @@ TOGETHER = 1e-9  # Events closer than this in time count as one degenerate event
 FRESH = 1e-5  # An orbit that returns this soon to a surface it has just left counts as grazing.
 WINDOW = 0.2  # Longest search for events in an open cell.
 TERMS = 22  # Of the exponential series, whose argument has at most norm one.
-STEP = 0.05  # Longest step of the integration along surfaces.
+STEP = 0.1  # Longest step of the integration along surfaces.
 Mode = tuple[int, ...]  # One of -1, 0, +1 for each switch; 0 means sliding.
 
 
@@ -126,11 +126,11 @@ class _Surface:
             except np.linalg.LinAlgError:
                 return None
             u = u - step
-            if np.abs(step).max() < 1e-13:
+            if np.abs(step).max() < 1e-8:  # The error is of the order of the step's square.
                 return u
             if np.abs(u).max() > 1e3:
                 return None
-        return u if np.abs(step).max() < 1e-11 else None
+        return None
 
     def zeros(self, rates: np.ndarray, previous: np.ndarray) -> list[np.ndarray]:
         """All zeros that Newton's method finds from the centre, the previous ``u`` and each half diagonal."""
