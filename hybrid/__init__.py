@@ -19,6 +19,7 @@ from hybrid.status import Status, StatusCode
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.filippov import filippov
+from hybrid.transform.split import from_equations, split
 
 __version__ = "0.1.0"
 
@@ -49,11 +50,13 @@ __all__ = [
     "WorkPrecision",
     "compile_system",
     "filippov",
+    "from_equations",
     "global_error",
     "periodic_orbit",
     "poincare_section",
     "saltation_matrix",
     "simulate",
+    "split",
     "stroboscopic_section",
     "work_precision",
 ]

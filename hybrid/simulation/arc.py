@@ -90,7 +90,7 @@ class Grazing:
 
 @attrs.frozen(eq=False, repr=False)
 class Jumps(Sequence[Jump]):
-    """The jumps of an arc in order; ``jumps["impact"]`` are those of one transition.
+    """The jumps of an arc in order; ``jumps["impact"]`` are those of one transition, or of all its copies.
 
     Each :class:`Jump` is made when it is looked at; the arrays hold all of them.
 
@@ -170,8 +170,8 @@ class Jumps(Sequence[Jump]):
     def __getitem__(self, index: slice | str) -> list[Jump]: ...
     def __getitem__(self, index: int | slice | str) -> Jump | list[Jump]:
         if isinstance(index, str):
-            fired = self.system.transition_index(index)
-            return [self._jump(i) for i in np.flatnonzero(self.transition_index == fired).tolist()]
+            fired = np.isin(self.transition_index, self.system.copies_of(index))
+            return [self._jump(i) for i in np.flatnonzero(fired).tolist()]
         if isinstance(index, slice):
             return [self._jump(i) for i in range(*index.indices(len(self)))]
         if not -len(self) <= index < len(self):
@@ -280,6 +280,11 @@ class HybridArc:
     def mode(self) -> np.ndarray:
         """Names of the modes, ``(N,)``."""
         return np.array(self.system.mode_names)[self._mode_index]
+
+    @cached_property
+    def part_of(self) -> np.ndarray:
+        """Names of the modes before the system was split, ``(N,)``."""
+        return np.array([mode.part_of for mode in self.system.modes])[self._mode_index]
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -25,12 +26,20 @@ def choose_mode(
     ModelError
         If the name is unknown, no mode allows the state, or more than one does.
     """
-    if mode is not None:
-        index = system.mode_index(mode)
-        verdicts = _verdicts(system, parts, model, run, work, range(index, index + 1))
-        said = zip(system.transition_names, verdicts, strict=True)
-        return index, tuple(name for name, verdict in said if verdict == codes.BEYOND)
     modes = system.mode_names
+    if mode is not None:
+        within = system.parts_of(mode)
+        verdicts = _verdicts(system, parts, model, run, work, within)
+        if len(within) > 1:
+            # Guards of the user's may be crossed, as the mode is named; the sides of its parts must be right.
+            against = [(tr.part_of, tr.source) for tr in _against(system, verdicts)]
+            within = [i for i in within if (None, modes[i]) not in against]
+        if len(within) == 1:
+            [index] = within
+            said = zip(system.transitions, verdicts, strict=True)
+            beyond = [tr for tr, verdict in said if verdict == codes.BEYOND and tr.source == modes[index]]
+            return index, tuple(tr.name for tr in beyond)
+        return _refused(system, run, verdicts, [modes[i] for i in within])
     verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
     if len(modes) == 1 and codes.BEYOND not in verdicts:
         return 0, ()
@@ -38,6 +47,10 @@ def choose_mode(
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1:
         return modes.index(allowed[0]), ()
+    return _refused(system, run, verdicts, allowed)
+
+
+def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[str]) -> NoReturn:
     if not allowed:
         raise ArgumentError(
             f"{_place(system, run)} is allowed in no mode: {_faults(system, verdicts)}. Start on the other "
@@ -49,17 +62,20 @@ def choose_mode(
     )
 
 
-def _verdicts(system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: range) -> list[int]:
+def _verdicts(
+    system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: Sequence[int]
+) -> list[int]:
     """One code per transition that leaves one of the modes: whether its guard allows the start of the run."""
     verdicts = np.zeros(len(system.transitions), dtype=np.int64)
     kernel = entry(load_kernels("hybrid.kernels.events.initial_mode").try_modes)
-    undefined = kernel(parts, model, run, work, modes.start, modes.stop, verdicts)
-    if undefined != codes.NO_TRANSITION:
-        raise ArgumentError(
-            f"Transition {system.transition_names[undefined]!r}: the guard is {work.scalar[0]} at "
-            f"t = {run.phase}, {_place(system, run)}. "
-            "A guard must be finite wherever its mode runs."
-        )
+    for mode in modes:
+        undefined = kernel(parts, model, run, work, mode, mode + 1, verdicts)
+        if undefined != codes.NO_TRANSITION:
+            raise ArgumentError(
+                f"Transition {system.transition_names[undefined]!r}: the guard is {work.scalar[0]} at "
+                f"t = {run.phase}, {_place(system, run)}. "
+                "A guard must be finite wherever its mode runs."
+            )
     return verdicts.tolist()
 
 

@@ -185,8 +185,8 @@ class Transition(Portable):
     name
         Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
     part_of
-        Name of the transition that this one is a copy of, in a system that has been split; by default its
-        own.
+        Name of the transition that this one is a copy of, in a system that has been split, and None for one
+        between two parts of a mode; by default its own.
 
     Raises
     ------
@@ -200,7 +200,7 @@ class Transition(Portable):
     reset: Reset | None = attrs.field(default=None, converter=_as_reset)
     accumulates_to: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
     name: str = attrs.field(kw_only=True, validator=_nonempty_name)
-    part_of: str = attrs.field(kw_only=True, validator=_nonempty_name)
+    part_of: str | None = attrs.field(kw_only=True, validator=_optional_name)
 
     @reset.validator
     def _check_reset(self, attribute: attrs.Attribute[Reset | None], value: object) -> None:

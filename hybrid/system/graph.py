@@ -85,6 +85,8 @@ class HybridSystem(Portable):
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
+    # Lines for `repr`: what short names in a derived system stand for.
+    notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, repr=False)
     # What makes further modes, for a system that is made in stages.
     growth: Growth | None = attrs.field(default=None, kw_only=True, repr=False)
     # Cache of compile_system, with the lifetime of the system.
@@ -118,6 +120,9 @@ class HybridSystem(Portable):
         if self.period is not None:
             period = "a function of the parameters" if callable(self.period) else f"{self.period:.6g}"
             lines.append(f"period: {period}")
+        lines += self.notes
+        if self.growth is not None:
+            lines.append("A run adds the modes that it needs.")
         return lines
 
     def _transition_rows(self) -> list[list[str]]:
@@ -185,6 +190,16 @@ class HybridSystem(Portable):
         if not isinstance(name, str) or name not in self.mode_names:
             raise ModelError(unknown_name("Mode", name, self.mode_names, "Modes"))
         return self.mode_names.index(name)
+
+    def parts_of(self, name: str) -> list[int]:
+        """Indices of the modes that are parts of a mode, or of the one mode of that name."""
+        parts = [i for i, mode in enumerate(self.modes) if name in (mode.name, mode.part_of)]
+        return parts or [self.mode_index(name)]
+
+    def copies_of(self, name: str) -> list[int]:
+        """Indices of the transitions that are copies of a transition, or of the one of that name."""
+        copies = [i for i, each in enumerate(self.transitions) if name in (each.name, each.part_of)]
+        return copies or [self.transition_index(name)]
 
     def transition_index(self, name: str | Transition) -> int:
         """Index of a transition, by name or object; a ModelError lists the names if it does not exist."""

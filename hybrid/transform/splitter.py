@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from functools import reduce
-from itertools import chain, count, islice
+from itertools import chain, count, islice, product
 from threading import RLock
 from typing import Any
 
@@ -20,11 +20,16 @@ from hybrid.symbolic.expressions import ZERO, And, Less, LessEqual
 from hybrid.symbolic.nodes import replaced, symbols_of
 from hybrid.symbolic.switches import Resolved, Surfaces, Switches
 from hybrid.symbolic.tracing import TraceError, model_symbols, trace
+from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.naming import Names
 
+# Parts may differ from the field by so much of its largest value: other orders of the same sums.
+AGREEMENT = 1e-9
+# Sizes of the states at which they are compared.
+SIZES = (0.1, 1.0, 10.0)
 # A system of more modes than this is made in stages, of at least so many more modes each.
 MOST_WHOLE, FEWEST_MORE = 12, 3
 
@@ -70,9 +75,13 @@ class Splitter:
         self.stage: HybridSystem | None = None
         self.frontier: dict[str, Cell] = {}
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _begun, (self.original,)
+
     def begin(self) -> HybridSystem:
         """The whole system if it is small; else its first stage."""
         first = [choice.cell for pieces in self.pieces for choice in islice(pieces.cells({}), MOST_WHOLE)]
+        self._check_values()
         self._make(first, MOST_WHOLE + 1)
         if len(self.made) > MOST_WHOLE:
             # A run makes the modes around its start.
@@ -97,18 +106,46 @@ class Splitter:
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
-        values = dict(
-            zip((self.symbols.t, *self.symbols.x, *self.symbols.p), (t, *x, *parameters), strict=True)
-        )
-        missing = []
-        for pieces, own in zip(self.pieces, self.original.modes, strict=True):
-            if mode is None or mode == own.name:
-                # A run that starts on a surface finds out by itself on which side it goes on.
-                [cell] = [each.cell for each in pieces.cells({}, lambda number: self._side(number, values))]
-                missing += [] if cell in self.made else [cell]
+        values = self._values(t, x, parameters)
+        # A run that starts on a surface finds out by itself on which side it goes on.
+        cells = [
+            self._cell_at(pieces, values)
+            for pieces, own in zip(self.pieces, self.original.modes, strict=True)
+            if mode is None or mode == own.name
+        ]
+        missing = [cell for cell in cells if cell not in self.made]
         with self.lock:
             self._make(missing, len(missing))
         return bool(missing)
+
+    def _values(self, t: float, x: np.ndarray, parameters: np.ndarray) -> dict[sympy.Symbol, float]:
+        symbols = (self.symbols.t, *self.symbols.x, *self.symbols.p)
+        return dict(zip(symbols, (t, *x, *parameters), strict=True))
+
+    def _cell_at(self, pieces: Pieces, values: dict[sympy.Symbol, float]) -> Cell:
+        """The cell in which a point lies; above the surfaces that it lies on."""
+        [choice] = pieces.cells({}, lambda number: self._side(number, values))
+        return choice.cell
+
+    def _check_values(self) -> None:
+        """A ModelError if the field of a cell differs from the user's at a sample point in it."""
+        parameters = self.original.parameter_values()
+        for pieces, mode in zip(self.pieces, self.original.modes, strict=True):
+            for size, (t, point) in product(SIZES, sample_points(self.original.dimension)):
+                x = size * point
+                cell = self._cell_at(pieces, self._values(t, x, parameters))
+                flow = pieces.flow(dict(cell.branches))
+                whole, part = (
+                    evaluate(self.variables, each, t, x, parameters) for each in (mode.field, flow)
+                )
+                if whole is None or part is None:
+                    continue
+                scale = max(np.abs(whole).max(), np.abs(part).max())
+                if np.abs(whole - part).max() > AGREEMENT * scale:
+                    raise ModelError(
+                        f"split: the part {self.name_of(cell)!r} of mode {mode.name!r} has other values than "
+                        f"its field at t = {t}, x = {x}: {part}, not {whole}. Please report this model."
+                    )
 
     def _side(self, number: int, values: dict[sympy.Symbol, float]) -> int:
         [height] = Program([self.surfaces.known[number].height]).run(values)
@@ -159,7 +196,8 @@ class Splitter:
                 transitions.append(onward)
         modes = [self.known[cell][0] for cell in self.made]
         growth = self if self.frontier else None
-        return attrs.evolve(self.original, modes=modes, transitions=transitions, growth=growth)
+        notes = (*self.original.notes, *self.names.notes)
+        return attrs.evolve(self.original, modes=modes, transitions=transitions, notes=notes, growth=growth)
 
     def name_of(self, cell: Cell) -> str:
         """Name of the mode of a cell."""
@@ -244,7 +282,7 @@ class Splitter:
     def _edge(self, cell: Cell, target: Cell, guard: Guard, reset: Reset | None = None) -> Edge:
         source, to = self.name_of(cell), self.name_of(target)
         name = f"{source}->{to} at the start" if guard.at_start else f"{source}->{to}"
-        return Edge(Transition(source, to, guard, reset, name=name), target)
+        return Edge(Transition(source, to, guard, reset, name=name, part_of=None), target)
 
     def _departures(self, cell: Cell, number: int) -> Iterator[Edge]:
         """The transitions of a state that slides along a surface and leaves it."""
@@ -262,8 +300,8 @@ class Splitter:
             yield self._edge(cell, target, off)
         attraction = self._function(surface.attraction)
         at_start = Guard(attraction, -1, at_start=True)
-        yield Edge(Transition(source, None, at_start, name=f"{source}: two-fold at start{where}"), None)
-        yield Edge(Transition(source, None, Guard(attraction, -1), name=f"{source}: two-fold{where}"), None)
+        for guard, name in (at_start, "two-fold at start"), (Guard(attraction, -1), "two-fold"):
+            yield Edge(Transition(source, None, guard, name=f"{source}: {name}{where}", part_of=None), None)
         projection = Reset(expressed(self._traced("the projection", surface.projection)))
         for side, target, extra in ways:
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
@@ -304,29 +342,33 @@ class Splitter:
         own = self.names.cell(self.surfaces.known, cell.sides)
         new: dict[str, Any] = {
             "source": self.name_of(cell),
-            "name": f"{transition.name} ({own})" if own else transition.name,
             "part_of": transition.name,
         }
         guard = self._smooth_guard(cell, outgoing)
         if transition.target is None:
-            yield Edge(attrs.evolve(transition, guard=guard, **new), None)
+            yield Edge(attrs.evolve(transition, guard=guard, name=_copy_name(transition, own), **new), None)
             return
         asked = [] if guard.when is None else [self._truth(guard.when)]
         limit = self._limit(cell, transition)
         new["accumulates_to"] = None if limit is None else self.name_of(limit)
-        for chosen, after in self._after(cell, outgoing):
-            reset = transition.reset if after == outgoing.reset else Reset(expressed(after or ()))
-            for landing in self._landings(cell, transition.target, after):
-                more = [*self._on(chosen), *self._on(landing.chosen, after)]
-                when = _all([*asked, *more]) if more else guard.when
-                copy = attrs.evolve(
-                    transition,
-                    target=self.name_of(landing.cell),
-                    guard=attrs.evolve(guard, when=when),
-                    reset=reset,
-                    **new,
-                )
-                yield Edge(copy, landing.cell, limit)
+        landings = [
+            (chosen, after, landing)
+            for chosen, after in self._after(cell, outgoing)
+            for landing in self._landings(cell, transition.target, after)
+        ]
+        for chosen, after, landing in landings:
+            more = [*self._on(chosen), *self._on(landing.chosen, after)]
+            when = _all([*asked, *more]) if more else guard.when
+            to = self.names.cell(self.surfaces.known, landing.cell.sides)
+            copy = attrs.evolve(
+                transition,
+                target=self.name_of(landing.cell),
+                guard=attrs.evolve(guard, when=when),
+                reset=transition.reset if after == outgoing.reset else Reset(expressed(after or ())),
+                name=_copy_name(transition, own, to if len(landings) > 1 else ""),
+                **new,
+            )
+            yield Edge(copy, landing.cell, limit)
 
     def _truth(self, condition: Function) -> sympy.Expr:
         """A user's condition, positive or true, as a truth value."""
@@ -397,6 +439,19 @@ class Splitter:
         pieces = self.pieces[self.original.mode_index(transition.accumulates_to)]
         [choice] = pieces.choices({}, lambda number: sides.get(number, 1))
         return choice.cell
+
+
+def _begun(system: HybridSystem) -> Splitter:
+    """The splitter of a system that has been pickled."""
+    splitter = Splitter(system)
+    splitter.begin()
+    return splitter
+
+
+def _copy_name(transition: Transition, own: str, to: str = "") -> str:
+    """Name of the copy of a user's transition that leaves some sides, and leads to others if they matter."""
+    sides = f"{own}->{to}" if own and to else own or (to and f"->{to}")
+    return f"{transition.name} ({sides})" if sides else transition.name
 
 
 def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:
