@@ -152,6 +152,6 @@ def discontinuous_status(jumps: Mapping[str, str]) -> Status:
         StatusCode.DISCONTINUOUS_FIELD,
         f"Reached the end, but {', and '.join(places)}: tangent vectors, and results computed from them, are "
         "not valid beyond such a jump.",
-        "Split the field into modes joined by guards there; if the fields point towards each other, "
-        "hybrid.filippov derives the sliding mode between them.",
+        "hybrid.split(system) makes modes joined by guards of a field that is written with NumPy functions, "
+        "with the sliding modes between them.",
     )

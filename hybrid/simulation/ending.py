@@ -24,6 +24,8 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
     _grow(trajectory, code)
     status = _status(trajectory, code)
     notes = [*_start_beyond(trajectory), *_unproved(trajectory), *_unresolved(trajectory)]
+    if status.code != StatusCode.DISCONTINUOUS_FIELD:
+        notes += _kinks(trajectory)
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
 
 
@@ -76,6 +78,16 @@ def _unresolved(trajectory: Trajectory) -> Iterator[str]:
             f"On {steps} steps the forcing is not resolved: it changes, or its bounds are wide, over times "
             "as short as the rounding of time. A pulse may have been stepped over there."
         )
+
+
+def _kinks(trajectory: Trajectory) -> Iterator[str]:
+    """A note on fields with kinks inside of their mode, where tangent vectors lose digits."""
+    if trajectory.tangents:
+        for mode, names in trajectory.system.switching.items():
+            yield (
+                f"The field of mode {mode!r} has kinks ({', '.join(names)}): tangent vectors lose digits at "
+                "each. hybrid.split(system) makes guards of them."
+            )
 
 
 def _status(trajectory: Trajectory, code: int) -> Status:

@@ -8,6 +8,7 @@ algebra can follow a branch taken in Python, because the value it depends on is 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from hybrid.errors import ModelError
+from hybrid.symbolic.branches import refused_branch
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
 # NumPy's universal functions that can be traced; ``hybrid.symbolic.ufuncs`` has a rule for each.
@@ -84,10 +86,6 @@ NEEDS_NUMBER = (
     "np.zeros_like(x) in place of np.zeros to fill an array"
 )
 NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
-NEEDS_DECISION = (
-    "a branch cannot be traced: make its sides modes joined by a guard, or, if the value does not jump at "
-    "the switch, use np.maximum, np.clip or np.where in place of if, and, max"
-)
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -138,7 +136,7 @@ class Traced(NDArrayOperatorsMixin):
         raise AttributeError(text)
 
     def __bool__(self) -> bool:
-        raise refusal(NEEDS_DECISION)
+        raise refusal(refused_branch(sys._getframe(1)))
 
     def __float__(self) -> float:
         raise refusal(NEEDS_NUMBER)

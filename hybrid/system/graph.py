@@ -20,6 +20,7 @@ from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.growth import Growth
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
+from hybrid.system.switching import switching_inside
 from hybrid.system.variables import Variables, as_parameters, as_state
 
 if TYPE_CHECKING:
@@ -120,6 +121,9 @@ class HybridSystem(Portable):
         if self.period is not None:
             period = "a function of the parameters" if callable(self.period) else f"{self.period:.6g}"
             lines.append(f"period: {period}")
+        if self.switching:
+            inside = "; ".join(f"{', '.join(names)} in mode {mode}" for mode, names in self.switching.items())
+            lines.append(f"kinks or jumps inside of modes: {inside} (hybrid.split makes modes of them)")
         lines += self.notes
         if self.growth is not None:
             lines.append("A run adds the modes that it needs.")
@@ -139,6 +143,17 @@ class HybridSystem(Portable):
             ]
             for transition in self.transitions
         ]
+
+    @cached_property
+    def switching(self) -> dict[str, list[str]]:
+        """By mode: the switching functions that its field applies to the state, away from its guards."""
+        values = self.parameter_values()
+        found: dict[str, list[str]] = {}
+        for mode in self.modes:
+            guards = [each.guard.function for each in self.transitions if each.source == mode.name]
+            names = switching_inside(self.variables, mode.field, guards, values)
+            found |= {mode.name: names} if names else {}
+        return found
 
     @cached_property
     def variables(self) -> Variables:

@@ -163,7 +163,7 @@ def fails(function, text, state=NAMES):
 def test_what_cannot_be_traced_is_told():
     fails(
         lambda t, x, p: (x.a if x.a > 0 else x.b,),
-        r"branch cannot be traced: make its sides modes joined by a guard.*np.where",
+        r"branch cannot be traced: in place of ``x.a if x.a > 0 else x.b``",
     )
     fails(lambda t, x, p: (max(x.a, 0),), r"np.maximum")
     fails(lambda t, x, p: (math.sin(x.a),), r"use np.sin in place of math.sin")
