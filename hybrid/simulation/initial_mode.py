@@ -13,6 +13,9 @@ from hybrid.kernels.types import codes
 from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem
 
+# Verdict on a guard that is not finite; those of the kernel are above zero.
+UNDEFINED = -1
+
 
 def choose_mode(
     system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None
@@ -43,7 +46,11 @@ def choose_mode(
     verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
     if len(modes) == 1 and codes.BEYOND not in verdicts:
         return 0, ()
+    # A guard may be undefined in modes to which the state does not belong.
+    undefined = {i for i, verdict in enumerate(verdicts) if verdict == UNDEFINED}
     violated = {transition.source for transition in _against(system, verdicts)}
+    if undefined and len(violated) == len(modes):
+        raise _undefined(system, model, run, work, min(undefined))
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1:
         return modes.index(allowed[0]), ()
@@ -71,12 +78,18 @@ def _verdicts(
     for mode in modes:
         undefined = kernel(parts, model, run, work, mode, mode + 1, verdicts)
         if undefined != codes.NO_TRANSITION:
-            raise ArgumentError(
-                f"Transition {system.transition_names[undefined]!r}: the guard is {work.scalar[0]} at "
-                f"t = {run.phase}, {_place(system, run)}. "
-                "A guard must be finite wherever its mode runs."
-            )
+            if len(modes) == 1:
+                raise _undefined(system, model, run, work, undefined)
+            verdicts[undefined] = UNDEFINED
     return verdicts.tolist()
+
+
+def _undefined(system: HybridSystem, model: Any, run: Any, work: Any, transition: int) -> ArgumentError:
+    model.guard(transition, run.phase, run.y, model.parameters, work.scalar)
+    return ArgumentError(
+        f"Transition {system.transition_names[transition]!r}: the guard is {work.scalar[0]} at "
+        f"t = {run.phase}, {_place(system, run)}. A guard must be finite wherever its mode runs."
+    )
 
 
 def _against(system: HybridSystem, verdicts: list[int]) -> list[Transition]:

@@ -122,7 +122,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "on_guard": (transitions,),
         "due": (transitions,),
         "recent": (RECENT,),
-        "rehearsal": (3, transitions),
+        "rehearsal": (4, transitions),
         "visits": (RECENT, n + 2),
         "first_step": (modes,),
         "stay": (modes,),

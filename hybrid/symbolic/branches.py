@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import linecache
+from functools import reduce
 from itertools import islice, pairwise
 from types import FrameType
 
@@ -14,11 +15,13 @@ OTHERWISE = (
 )
 # Longer pieces of code are not shown.
 LONGEST = 160
-EXTREMES = {"max": "np.maximum", "min": "np.minimum"}
+EXTREMES = {"max": "np.maximum", "min": "np.minimum", "amax": "np.maximum", "amin": "np.minimum"}
 
 
 def refused_branch(frame: FrameType | None) -> str:
     """Text of the error for a branch that is taken in a frame, with the code to write instead."""
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith("numpy"):
+        frame = frame.f_back
     found = None if frame is None else _replacement(frame)
     if found is None:
         return f"{CANNOT}: {OTHERWISE}"
@@ -60,7 +63,7 @@ def _holds(node: ast.expr | ast.stmt, line: int | None, column: int | None) -> b
 
 def _is_branch(node: ast.AST) -> bool:
     if isinstance(node, ast.Call):
-        return isinstance(node.func, ast.Name) and node.func.id in EXTREMES and len(node.args) == 2
+        return _extreme(node) is not None
     if isinstance(node, ast.Compare):
         return len(node.ops) > 1
     if isinstance(node, ast.UnaryOp):
@@ -74,14 +77,28 @@ def _shown(node: ast.AST) -> str:
 
 def _rewritten(node: ast.AST, following: ast.AST | None) -> str | None:
     match node:
-        case ast.Call(func=ast.Name(id=name), args=[a, b]):
-            return f"{EXTREMES[name]}({ast.unparse(a)}, {ast.unparse(b)})"
+        case ast.Call():
+            return _extreme(node)
         case ast.IfExp():
             return ast.unparse(_chosen(node.test, node.body, node.orelse))
         case ast.If():
             return _statement(node, following)
         case _:
             return _condition(node)
+
+
+def _extreme(node: ast.Call) -> str | None:
+    """The largest or least of several values, two at a time; None for another call."""
+    name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    match node.args:
+        case [ast.List(elts=values) | ast.Tuple(elts=values)]:
+            pass
+        case values:
+            pass
+    if name not in EXTREMES or len(values) < 2 or node.keywords:
+        return None
+    written = [ast.unparse(each) for each in values]
+    return reduce(lambda a, b: f"{EXTREMES[name]}({a}, {b})", written)
 
 
 def _condition(node: ast.AST) -> str:

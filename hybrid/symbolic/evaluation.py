@@ -43,6 +43,7 @@ FUNCTIONS: dict[type[sympy.Basic], Callable[..., Any]] = {
     sym.Atan2: np.arctan2,
     sym.Ceiling: np.ceil,
     sym.CubeRoot: np.cbrt,
+    sym.Gate: lambda u, rest: np.where(u < 0.0, 0.0, np.heaviside(u, 0.5) * rest),
     sym.Equal: lambda a, b: a == b,
     sym.Floor: np.floor,
     # Written so that a list of operations tells it from a floor that jumps.

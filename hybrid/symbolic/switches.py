@@ -173,10 +173,17 @@ def _negative(height: sympy.Expr) -> sympy.Expr:
 
 @attrs.frozen
 class Resolved:
-    """Expressions without switching functions, and the sides of surfaces that were used, each -1 or 1."""
+    """Expressions without switching functions, and the sides of surfaces that were used, each -1 or 1.
+
+    Attributes
+    ----------
+    bare
+        The expressions without protection of fractional powers, which are nan beyond their surface.
+    """
 
     entries: tuple[sympy.Expr, ...]
     used: dict[int, int]
+    bare: tuple[sympy.Expr, ...]
 
 
 @attrs.define
@@ -189,6 +196,7 @@ class _Stage:
     number: int = -1
     orientation: int = 0
     beyond: dict[int, _Stage] = attrs.field(factory=dict)
+    resolved: Resolved | None = None
 
 
 class Switches:
@@ -221,7 +229,11 @@ class Switches:
             if side not in stage.beyond:
                 stage.beyond[side] = self._decided(stage, side)
             stage = stage.beyond[side]
-        return Resolved(stage.entries, stage.used)
+        if stage.resolved is None:
+            heights = [self.surfaces.known[number].height for number in stage.used]
+            guarded = tuple(_guarded(entry, heights) for entry in stage.entries)
+            stage.resolved = Resolved(guarded, stage.used, stage.entries)
+        return stage.resolved
 
     def _decided(self, stage: _Stage, side: int) -> _Stage:
         assert stage.atom is not None
@@ -236,14 +248,31 @@ class Switches:
             while (atom := _first_atom(entries, self.surfaces.symbols)) is not None:
                 branch = _rewritten(atom)
                 if branch is None:
-                    number, orientation = self.surfaces.find(*_height(atom))
+                    height, argument = _height(atom)
+                    height, sign = self._simpler(height, used)
+                    number, orientation = self.surfaces.find(height, argument)
+                    orientation *= sign
                     if number not in used:
                         entries = tuple(map(_without_truths, entries))
                         return _Stage(entries, used, atom, number, orientation)
                     branch = _branch(atom, used[number] * orientation)
                 entries = tuple(replaced(entry, {atom: branch}) for entry in entries)
-            heights = [self.surfaces.known[number].height for number in used]
-            return _Stage(tuple(_guarded(_without_truths(entry), heights) for entry in entries), used)
+            return _Stage(tuple(map(_without_truths, entries)), used)
+
+    def _simpler(self, height: sympy.Expr, used: Mapping[int, int]) -> tuple[sympy.Expr, int]:
+        """A height without the factors whose signs are known on some sides, and these signs' product."""
+        given = [(self.surfaces.known[number].height, side) for number, side in used.items()]
+        kept, sign = [], 1
+        for factor in sympy.Mul.make_args(height):
+            base, exponent = factor.as_base_exp()
+            even = exponent.is_integer and exponent % 2 == 0
+            if even or isinstance(factor, sympy.exp) or _follows(base, 1, given):
+                continue
+            if exponent.is_integer and (factor.is_negative or _follows(base, -1, given)):
+                sign = -sign
+            elif not factor.is_positive:
+                kept.append(factor)
+        return (sympy.Mul(*kept), sign) if kept else (height, 1)
 
 
 def switching_names(entries: Sequence[sympy.Expr], symbols: Symbols) -> list[str]:

@@ -266,7 +266,7 @@ class HybridSystem(Portable):
             ends = {transition.source, transition.target, transition.accumulates_to} - {None}
             linked |= ends if len(ends) > 1 else set()
         lonely = [name for name in self.mode_names if name not in linked]
-        if len(self.modes) > 1 and lonely:
+        if len(self.modes) > 1 and lonely and self.growth is None:
             raise ModelError(
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."

@@ -116,7 +116,10 @@ class _Probe(NDArrayOperatorsMixin):
         return _Probe(getattr(ufunc, method)(*numbers, **options), self.log)
 
     def __array_function__(self, function: Callable[..., Any], types: Any, args: Any, kwargs: Any) -> Any:
-        result = function(*map(_plain, args), **{name: _plain(each) for name, each in kwargs.items()})
+        plain = [*map(_plain, args)]
+        if function is np.clip and len(plain) == 3:
+            self.log.append(("clip", _heights("clip", plain)))
+        result = function(*plain, **{name: _plain(each) for name, each in kwargs.items()})
         return _Probe(result, self.log) if np.ndim(result) == 0 else result
 
     def __getattr__(self, name: str) -> Any:

@@ -225,10 +225,15 @@ class Pieces:
             for changes in self._changes(sides, number)
         )
 
+    def _bare_field(self, sides: Sides) -> list[sympy.Expr]:
+        result = self.switches.resolved(sides)
+        assert not isinstance(result, int), "the side of a surface is missing"
+        return [*result.bare[: self.size]]
+
     def _changes(self, sides: Sides, number: int) -> Iterator[list[sympy.Expr]]:
         """The change of the field from below a surface to above it, at each vertex of the other sides."""
         for vertex in _vertices(sides, besides=number):
-            below, above = (self._vertex_field({**vertex, number: side}) for side in (-2, 2))
+            below, above = (self._bare_field({**vertex, number: side}) for side in (-2, 2))
             yield [a - b for b, a in zip(below, above, strict=True)]
 
     def _is_additive(self, sides: Sides, one: int, other: int) -> bool:

@@ -101,7 +101,12 @@ class Names:
         return mentions(term, self.symbols.x) or any("(" in symbol.name for symbol in symbols_of(term))
 
     def _text(self, expression: sympy.Expr) -> str:
-        return _Printer().doprint(expression.xreplace(self.words)).replace(" ", "").replace("**", "^")
+        return (
+            _Printer({"full_prec": False})
+            .doprint(expression.xreplace(self.words))
+            .replace(" ", "")
+            .replace("**", "^")
+        )
 
 
 class _Printer(StrPrinter):

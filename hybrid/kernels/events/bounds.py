@@ -322,12 +322,12 @@ def bound_guard(programs, transition, path, order, clock, start, pace, middle, r
     return _run(programs, transition, registers, radius)
 
 
-@njit(float64(PROGRAMS, int64, float64, VECTOR, VECTOR, float64, MATRIX), **PART)
-def spread_by_rounding(programs, transition, t, x, scale, share, registers):
+@njit(float64(PROGRAMS, int64, float64, float64, VECTOR, VECTOR, float64, MATRIX), **PART)
+def spread_by_rounding(programs, transition, t, clock, x, scale, share, registers):
     """How far a guard may be from its value at ``(t, x)`` when each argument is off by its rounding.
 
     A component of the state may be off by ``share`` times its size in ``scale (n,)``, the time by ``share``
-    times itself. The returned distance is negative if the guard may jump within this rounding.
+    times ``clock``. The returned distance is negative if the guard may jump within this rounding.
     """
     first = programs.first[transition]
     for place in range(first, programs.first[transition + 1]):
@@ -335,7 +335,7 @@ def spread_by_rounding(programs, transition, t, x, scale, share, registers):
         code = programs.rows[place, 0]
         if code == op.STATE or code == op.TIME:
             value = x[a] if code == op.STATE else t
-            spread = share * (scale[a] if code == op.STATE else abs(t))
+            spread = share * (scale[a] if code == op.STATE else clock)
             _bound_constant(row, value)
             row[LOW], row[HIGH] = value - spread, value + spread
             row[LEAST_SLOPE], row[MOST_SLOPE] = -spread, spread

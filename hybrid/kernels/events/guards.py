@@ -20,6 +20,12 @@ def guard_value(model, transition, t, x, scalar):
     return scalar[0]
 
 
+@njit(**INLINE)
+def size_of_time(model, t):
+    """Largest time whose rounding the phase ``t`` may carry: it has come here from the end of a period."""
+    return max(abs(t), model.period)
+
+
 @njit(**KERNEL)
 def allowed(model, transition, t, x, scalar):
     """Whether the condition of a transition holds; a transition without a condition is always allowed."""
@@ -59,7 +65,8 @@ def rounding_band(model, run, transition, t, x, work):
     """
     if has_program(model, transition):
         share = ROUNDING_OF_STATE * EPSILON
-        band = abs(model.spread(model.programs, transition, t, x, run.scale, share, work.registers))
+        clock = size_of_time(model, t)
+        band = abs(model.spread(model.programs, transition, t, clock, x, run.scale, share, work.registers))
         return band if band >= 0.0 else 0.0
     return smooth_band(model, run, transition, t, x, work)
 
@@ -70,7 +77,8 @@ def may_jump(model, run, transition, t, x, work):
     if not has_program(model, transition):
         return False
     share = ROUNDING_OF_STATE * EPSILON
-    return model.spread(model.programs, transition, t, x, run.scale, share, work.registers) < 0.0
+    clock = size_of_time(model, t)
+    return model.spread(model.programs, transition, t, clock, x, run.scale, share, work.registers) < 0.0
 
 
 @njit(**KERNEL)
@@ -89,7 +97,7 @@ def was_left_behind(model, run, transition, t, x, speed, side, work):
 def smooth_band(model, run, transition, t, x, work):
     """``rounding_band`` from the gradient in ``work.gradient`` and from terms that may cancel."""
     n = model.dimension
-    size = abs(work.gradient[n] * t)
+    size = abs(work.gradient[n]) * size_of_time(model, t)
     for i in range(n):
         size += abs(work.gradient[i]) * run.scale[i]
     program = transition + model.target.shape[0] + model.first_forcing[-1] + model.first_residue[-1]
@@ -102,7 +110,8 @@ def _spread_of_terms(model, run, program, t, x, work):
     if not has_program(model, program):
         return 0.0
     share = ROUNDING_OF_STATE * EPSILON
-    spread = model.spread(model.programs, program, t, x, run.scale, share, work.registers)
+    clock = size_of_time(model, t)
+    spread = model.spread(model.programs, program, t, clock, x, run.scale, share, work.registers)
     return spread if 0.0 < spread < math.inf else 0.0
 
 
@@ -146,7 +155,7 @@ def speed_rounding(model, run, mode, t, work):
     model.field_jacobian(mode, t, run.y, model.parameters, work.jacobian)
     size = abs(work.gradient[n])
     for i in range(n):
-        spread = abs(work.field[i]) + abs(work.jacobian[i, n] * t)
+        spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
         for j in range(n):
             spread += abs(work.jacobian[i, j]) * run.scale[j]
         size += abs(work.gradient[i]) * spread
@@ -176,7 +185,7 @@ def acceleration_rounding(model, run, t, work):
     for i in range(n):
         bend = abs(work.jacobian[i, n])
         for j in range(n):
-            spread = abs(work.field[j]) + abs(work.jacobian[j, n] * t)
+            spread = abs(work.field[j]) + abs(work.jacobian[j, n]) * size_of_time(model, t)
             for k in range(n):
                 spread += abs(work.jacobian[j, k]) * run.scale[k]
             bend += abs(work.jacobian[i, j]) * spread

@@ -125,6 +125,12 @@ def first_in_order(task, fired):
     """
     _, model, _, run, record, work = task_of(task)
     mode, t, before = run.mode, run.phase, run.side[fired]
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if run.rehearsal[3, other] != 0:
+            # It crosses here or later on the step; it may have changed sides before.
+            run.side[other] = run.rehearsal[3, other]
+            run.rehearsal[3, other] = 0
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
     direction = model.direction[fired]
     # For a guard that is not affine, the change of sign is proved.

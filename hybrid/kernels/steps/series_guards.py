@@ -305,7 +305,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
     Returns ``(theta, transition, proved)``, and brings sides up to date, as
-    ``runge_kutta_guards.earliest_crossing`` does. A guard that is a series itself is a polynomial, up to the
+    ``runge_kutta_guards.earliest_crossing`` does, with the sides before crossings kept. A guard that is a series itself is a polynomial, up to the
     remainder of the series; what it is a sum of stands behind the series. For any other guard its own
     expression is bounded on the series of the state.
     """
@@ -316,6 +316,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
+        run.rehearsal[3, transition] = 0
         on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
             if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
@@ -327,7 +328,9 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             proved = min(proved, share)
             if theta == NO_ROOT:
                 run.side[transition] = side
-            elif theta < earliest:
+                continue
+            run.rehearsal[3, transition] = -model.direction[transition]
+            if theta < earliest:
                 earliest, fired = theta, transition
             continue
         column = model.dimension + slot - first
@@ -360,6 +363,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
+            run.rehearsal[3, transition] = -model.direction[transition]
             if theta < earliest:
                 earliest, fired = theta, transition
             continue
@@ -377,6 +381,8 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             note_grazing(run, transition, degree, side, band, work)
         if theta == NO_ROOT:
             run.side[transition] = side
-        elif theta < earliest:
+            continue
+        run.rehearsal[3, transition] = -model.direction[transition]
+        if theta < earliest:
             earliest, fired = theta, transition
     return earliest, fired, proved

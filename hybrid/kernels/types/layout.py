@@ -43,7 +43,7 @@ PROGRAMS = Programs.numba_type
 BOUND = types.FunctionType(
     int64(PROGRAMS, int64, MATRIX, int64, int64, float64, float64, float64, float64, MATRIX)
 )
-SPREAD = types.FunctionType(float64(PROGRAMS, int64, float64, VECTOR, VECTOR, float64, MATRIX))
+SPREAD = types.FunctionType(float64(PROGRAMS, int64, float64, float64, VECTOR, VECTOR, float64, MATRIX))
 
 
 class Model(Structure):
@@ -214,7 +214,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
     - ``recent``: the last transitions that fired; jump ``j`` is at ``j`` modulo the length.
     - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
-    - ``rehearsal (3, transitions)``: scratch for jumps that are only tried.
+    - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
+      guards before the crossings found on the last step.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import hybrid
 import lyapunov
@@ -82,3 +84,55 @@ def test_a_run_whose_steps_are_below_the_rounding_of_its_time(solver):
     near = hybrid.simulate(lorenz(), (1.0, 1.0, 1.0), (0.0, 16.0), solver=solver)
     if arc.status.ok:
         np.testing.assert_allclose(arc.x[-1], near.x[-1], atol=1e-2)
+
+
+@given(
+    period=st.floats(0.1, 30.0),
+    share=st.sampled_from([0.0, 0.25, 0.5, 0.75]),
+    yes_first=st.booleans(),
+)
+@settings(max_examples=25)
+def test_guards_in_time_at_the_end_of_a_period(clocked, period, share, yes_first):
+    """Each switch fires once a period, wherever rounding has left the phase when the period ends."""
+    arc = hybrid.simulate(
+        clocked,
+        (0.3, 1.0),
+        (0.2 * period, 6.2 * period),
+        mode="a",
+        parameters={"T": period, "share": share, "order": 1.0 if yes_first else -1.0},
+    )
+    wanted = np.arange(13) / 2 + share
+    wanted = wanted[(wanted > 0.2) & (wanted < 6.2)] * period
+    # The first switch that leaves mode a is the rising one.
+    rising = np.isclose((wanted / period - share) % 1.0, 0.0) | np.isclose(
+        (wanted / period - share) % 1.0, 1.0
+    )
+    first = int(np.argmax(rising))
+    np.testing.assert_allclose(arc.jumps.t, wanted[first:], rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def clocked():
+    """Two modes switched by the clock; of two transitions on one guard, only one is ever allowed."""
+
+    def clock(t, x, p):
+        return np.sin(2 * np.pi * (t / p.T - p.share))
+
+    return hybrid.HybridSystem(
+        state=("q", "v"),
+        parameters={"T": 2.0, "share": 0.0, "order": 1.0},
+        period=lambda p: p.T,
+        modes=[
+            hybrid.Mode("a", lambda t, x, p: (x.v, -x.q)),
+            hybrid.Mode("b", lambda t, x, p: (x.v, -x.q + 1.0)),
+        ],
+        transitions=[
+            hybrid.Transition(
+                "a", "b", hybrid.Guard(clock, +1, when=lambda t, x, p: p.order > 0), name="first"
+            ),
+            hybrid.Transition(
+                "a", "b", hybrid.Guard(clock, +1, when=lambda t, x, p: p.order < 0), name="second"
+            ),
+            hybrid.Transition("b", "a", hybrid.Guard(clock, -1)),
+        ],
+    )
