@@ -284,7 +284,7 @@ class HybridArc:
     @cached_property
     def part_of(self) -> np.ndarray:
         """Names of the modes before the system was split, ``(N,)``."""
-        return np.array([mode.part_of for mode in self.system.modes])[self._mode_index]
+        return np.array([mode.part_of or mode.name for mode in self.system.modes])[self._mode_index]
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"

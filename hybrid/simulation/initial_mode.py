@@ -12,6 +12,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import Unexplored
 
 # Verdict on a guard that is not finite; those of the kernel are above zero.
 UNDEFINED = -1
@@ -32,7 +33,7 @@ def choose_mode(
     modes = system.mode_names
     if mode is not None:
         within = system.parts_of(mode)
-        verdicts = _verdicts(system, parts, model, run, work, within)
+        verdicts, _ = _verdicts(system, parts, model, run, work, within)
         if len(within) > 1:
             # Guards of the user's may be crossed, as the mode is named; the sides of its parts must be right.
             against = [(tr.part_of, tr.source) for tr in _against(system, verdicts)]
@@ -43,14 +44,13 @@ def choose_mode(
             beyond = [tr for tr, verdict in said if verdict == codes.BEYOND and tr.source == modes[index]]
             return index, tuple(tr.name for tr in beyond)
         return _refused(system, run, verdicts, [modes[i] for i in within])
-    verdicts = _verdicts(system, parts, model, run, work, range(len(modes)))
+    verdicts, undefined = _verdicts(system, parts, model, run, work, range(len(modes)))
     if len(modes) == 1 and codes.BEYOND not in verdicts:
         return 0, ()
-    # A guard may be undefined in modes to which the state does not belong.
-    undefined = {i for i, verdict in enumerate(verdicts) if verdict == UNDEFINED}
     violated = {transition.source for transition in _against(system, verdicts)}
     if undefined and len(violated) == len(modes):
-        raise _undefined(system, model, run, work, min(undefined))
+        # Otherwise it may be a guard of modes to which the state does not belong.
+        raise _undefined(system, run, *min(undefined.items()))
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1:
         return modes.index(allowed[0]), ()
@@ -58,6 +58,12 @@ def choose_mode(
 
 
 def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[str]) -> NoReturn:
+    if not allowed and system.growth is not None:
+        # The state lies on surfaces; a mode along these may not have been made yet. The last is the nearest.
+        for transition in reversed(_against(system, verdicts)):
+            if system.growth.leads_on(transition.name):
+                system.growth.extend(transition.name)
+                raise Unexplored(transition.name)
     if not allowed:
         raise ArgumentError(
             f"{_place(system, run)} is allowed in no mode: {_faults(system, verdicts)}. Start on the other "
@@ -71,23 +77,28 @@ def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[
 
 def _verdicts(
     system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: Sequence[int]
-) -> list[int]:
-    """One code per transition that leaves one of the modes: whether its guard allows the start of the run."""
+) -> tuple[list[int], dict[int, float]]:
+    """One code per transition that leaves one of the modes: whether its guard allows the start of the run.
+
+    Also the values of guards that are not finite, by transition, if there are several modes.
+    """
     verdicts = np.zeros(len(system.transitions), dtype=np.int64)
     kernel = entry(load_kernels("hybrid.kernels.events.initial_mode").try_modes)
+    undefined: dict[int, float] = {}
     for mode in modes:
-        undefined = kernel(parts, model, run, work, mode, mode + 1, verdicts)
-        if undefined != codes.NO_TRANSITION:
-            if len(modes) == 1:
-                raise _undefined(system, model, run, work, undefined)
-            verdicts[undefined] = UNDEFINED
-    return verdicts.tolist()
+        transition = kernel(parts, model, run, work, mode, mode + 1, verdicts)
+        if transition == codes.NO_TRANSITION:
+            continue
+        if len(modes) == 1:
+            raise _undefined(system, run, transition, work.scalar[0])
+        verdicts[transition] = UNDEFINED
+        undefined[transition] = float(work.scalar[0])
+    return verdicts.tolist(), undefined
 
 
-def _undefined(system: HybridSystem, model: Any, run: Any, work: Any, transition: int) -> ArgumentError:
-    model.guard(transition, run.phase, run.y, model.parameters, work.scalar)
+def _undefined(system: HybridSystem, run: Any, transition: int, value: float) -> ArgumentError:
     return ArgumentError(
-        f"Transition {system.transition_names[transition]!r}: the guard is {work.scalar[0]} at "
+        f"Transition {system.transition_names[transition]!r}: the guard is {value} at "
         f"t = {run.phase}, {_place(system, run)}. A guard must be finite wherever its mode runs."
     )
 

@@ -128,7 +128,7 @@ class Mode(Portable):
         Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, each of ``n`` values, or of
         ``n + 1`` with ``D_t f`` last. Derived from ``field`` if omitted.
     part_of
-        Name of the mode that this one is a part of, in a system that has been split; by default its own.
+        Name of the mode that this one is a part of, in a system that has been split; else None.
 
     Raises
     ------
@@ -139,11 +139,7 @@ class Mode(Portable):
     name: str = attrs.field(validator=_nonempty_name)
     field: Function = attrs.field(validator=_callable)
     jacobian: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
-    part_of: str = attrs.field(kw_only=True, validator=_nonempty_name)
-
-    @part_of.default
-    def _default_whole(self) -> str:
-        return self.name
+    part_of: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
 
 
 def _as_guard(value: Any) -> Guard:
@@ -185,8 +181,8 @@ class Transition(Portable):
     name
         Defaults to ``"source->target"``, and to ``"source->(end)"`` without a target.
     part_of
-        Name of the transition that this one is a copy of, in a system that has been split, and None for one
-        between two parts of a mode; by default its own.
+        Name of the transition that this one is a copy of, in a system that has been split; None for one
+        between two parts of a mode, and in other systems.
 
     Raises
     ------
@@ -200,7 +196,7 @@ class Transition(Portable):
     reset: Reset | None = attrs.field(default=None, converter=_as_reset)
     accumulates_to: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
     name: str = attrs.field(kw_only=True, validator=_nonempty_name)
-    part_of: str | None = attrs.field(kw_only=True, validator=_optional_name)
+    part_of: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
 
     @reset.validator
     def _check_reset(self, attribute: attrs.Attribute[Reset | None], value: object) -> None:
@@ -221,10 +217,6 @@ class Transition(Portable):
     @name.default
     def _default_name(self) -> str:
         return f"{self.source}->{END if self.target is None else self.target}"
-
-    @part_of.default
-    def _default_whole(self) -> str:
-        return self.name
 
     @property
     def is_marker(self) -> bool:

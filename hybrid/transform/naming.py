@@ -15,7 +15,7 @@ from hybrid.symbolic.tracing import Symbols, model_symbols
 from hybrid.system.variables import Variables
 
 # A name of more characters than this is replaced by a letter and a number.
-LONGEST = 24
+LONGEST = 20
 # A height written with more operations than this is not taken apart.
 LARGEST = 40
 # One written with more than this is not shown.
@@ -95,6 +95,10 @@ class Names:
         moved = [term for term in left if term.could_extract_minus_sign()]
         right = [-term for term in terms if term not in left or term in moved]
         left = [term for term in left if term not in moved]
+        factor = left[0].as_coeff_Mul()[0]
+        if len(left) == 1 and factor != 1:
+            # A multiple of one term: the name is shorter without the factor.
+            left, right = [left[0] / factor], [sympy.Float(1 / factor) * term for term in right]
         return self._text(sympy.Add(*left)), self._text(sympy.Add(*right))
 
     def _moves(self, term: sympy.Expr) -> bool:

@@ -282,7 +282,7 @@ class Splitter:
     def _edge(self, cell: Cell, target: Cell, guard: Guard, reset: Reset | None = None) -> Edge:
         source, to = self.name_of(cell), self.name_of(target)
         name = f"{source}->{to} at the start" if guard.at_start else f"{source}->{to}"
-        return Edge(Transition(source, to, guard, reset, name=name, part_of=None), target)
+        return Edge(Transition(source, to, guard, reset, name=name), target)
 
     def _departures(self, cell: Cell, number: int) -> Iterator[Edge]:
         """The transitions of a state that slides along a surface and leaves it."""
@@ -301,7 +301,7 @@ class Splitter:
         attraction = self._function(surface.attraction)
         at_start = Guard(attraction, -1, at_start=True)
         for guard, name in (at_start, "two-fold at start"), (Guard(attraction, -1), "two-fold"):
-            yield Edge(Transition(source, None, guard, name=f"{source}: {name}{where}", part_of=None), None)
+            yield Edge(Transition(source, None, guard, name=f"{source}: {name}{where}"), None)
         projection = Reset(expressed(self._traced("the projection", surface.projection)))
         for side, target, extra in ways:
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)

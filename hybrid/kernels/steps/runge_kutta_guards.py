@@ -79,7 +79,8 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
     Returns ``(theta, transition, proved)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses before the
     share ``proved`` of the step, to which the step is to be cut. The sides of guards without a crossing are
     brought up to date, to the end of the step, and guards that were left are no longer held to be zero at its
-    start. For a guard with a crossing, ``run.rehearsal[3]`` holds its side before that, or 0 if it is unknown. ``work.path`` must hold the interpolant if any guard of the mode is not affine.
+    start. For a guard with a crossing, ``run.rehearsal[3]`` holds its side before that, or 0 if unknown.
+    ``work.path`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode, degree_of_path = run.mode, method.powers.shape[0] - 1
     earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0

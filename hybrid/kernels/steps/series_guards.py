@@ -305,9 +305,9 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
     Returns ``(theta, transition, proved)``, and brings sides up to date, as
-    ``runge_kutta_guards.earliest_crossing`` does, with the sides before crossings kept. A guard that is a series itself is a polynomial, up to the
-    remainder of the series; what it is a sum of stands behind the series. For any other guard its own
-    expression is bounded on the series of the state.
+    ``runge_kutta_guards.earliest_crossing`` does, with the sides before crossings kept. A guard that is a
+    series itself is a polynomial, up to the remainder of the series; what it is a sum of stands behind the
+    series. For any other guard its own expression is bounded on the series of the state.
     """
     mode, series = run.mode, work.series
     kind = model.propagator[mode]
