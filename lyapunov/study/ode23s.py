@@ -105,16 +105,21 @@ class Ode23s:
             raise StepTooSmall(f"ode23s at rtol = {self.rtol:g} stopped in period {done}")
         return rates[transient:]
 
-    def fundamental(
-        self, system: HybridSystem, x: ArrayLike, t_span: tuple[float, float], *, omega: float
+    def carry(
+        self,
+        system: HybridSystem,
+        x: ArrayLike,
+        vectors: np.ndarray,
+        t_span: tuple[float, float],
+        *,
+        omega: float,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """State ``(n,)`` at the end and fundamental matrix ``(n, n)``, integrated as one system."""
+        """State ``(n,)`` and tangent vectors ``(n, k)`` of the founding system at the end of ``t_span``."""
         kernels = load_kernels("lyapunov.study.kernels")
         n = system.dimension
-        y = np.concatenate([np.asarray(x, dtype=float), np.eye(n).ravel()])
-        nothing = np.zeros((0, 1))
-        self._integrate(kernels.founding_field, y, t_span, parameters_of(system, omega), nothing)
-        return y[:n], y[n:].reshape(n, n).T
+        y = np.concatenate([np.asarray(x, dtype=float), vectors.T.ravel()])
+        self._integrate(kernels.founding_field, y, t_span, parameters_of(system, omega), np.zeros((0, 1)))
+        return y[:n], y[n:].reshape(-1, n).T
 
 
 def parameters_of(system: HybridSystem, omega: float) -> np.ndarray:

@@ -144,7 +144,7 @@ def test_the_founding_field_is_that_of_the_model():
     system, x0, end = models.vibroimpact(), STARTS[0].x0, 2 * np.pi / 7.40
     arc = simulate(system, x0, (0.0, end), tangent=True)
     assert len(arc.jumps) == 2
-    x, fundamental = Ode23s(1e-9, 1e-11).fundamental(system, x0, (0.0, end), omega=7.40)
+    x, fundamental = Ode23s(1e-9, 1e-11).carry(system, x0, np.eye(4), (0.0, end), omega=7.40)
     np.testing.assert_allclose(x, arc.x[-1], atol=2e-7)
     np.testing.assert_allclose(fundamental, arc.fundamental, atol=2e-3 * np.abs(arc.fundamental).max())
 
