@@ -254,17 +254,16 @@ def integrate(field, p, t, end, y, rtol, atol, record, work, counters):
 
 @njit(int64(FIELD, VECTOR, float64, float64, VECTOR, float64, float64, MATRIX, MATRIX, INTEGERS), **ENTRY)
 def growth_rates(field, p, t, period, y, rtol, atol, rates, work, counters):
-    """Growth rates ``(M, k)`` of tangent vectors in ``y (n (1 + k),)`` over ``M`` periods from time ``t``.
+    """Growth rates ``(M, k)`` of tangent vectors in ``y (n (1 + k),)`` over ``M`` periods from phase ``t``.
 
     State and vectors are one system of ordinary differential equations. The vectors are orthonormalised
-    after each period, where the method starts anew. ``work`` and ``counters`` are those of ``integrate``.
-    Returns the number of completed periods.
+    after each period, where the method starts anew, and so does the clock: the drive has this period.
+    ``work`` and ``counters`` are those of ``integrate``. Returns the number of completed periods.
     """
     k = rates.shape[1]
     n = y.shape[0] // (1 + k)
     for done in range(rates.shape[0]):
-        start = t + done * period
-        if integrate(field, p, start, start + period, y, rtol, atol, work[:0], work, counters) != DONE:
+        if integrate(field, p, t, t + period, y, rtol, atol, work[:0], work, counters) != DONE:
             return done
         for c in range(k):
             rates[done, c] = 0.0

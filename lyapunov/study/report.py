@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.display.tables import table
 from lyapunov.floquet import floquet_exponents
 from lyapunov.statistics import running_tapered_mean
+from lyapunov.study.column import PAPERS, PaperColumn, printed, running, steady
 from lyapunov.study.paper import DOUBTFUL, PAPER, ROWS
 from lyapunov.study.runs import STARTS, Regime
 from lyapunov.study.tangents import TRAP_OMEGA, Explanation, Trap
@@ -163,10 +164,49 @@ def verdict(found: Sequence[Explanation]) -> str:
     left = f"{best.misfit:.4f} of a disagreement of {as_it_is.misfit:.4f}"
     if best.misfit > EXPLAINS * as_it_is.misfit:
         return f"Open: the closest candidate, {best.text}, still leaves {left}."
-    return (
-        f"Closest: {best.text}, which leaves {left}.\n"
-        f"It is one of {len(others)} candidates. Its method and tolerance replace the paper's ode23s, which\n"
+    closest = f"Closest: {best.text}, which leaves {left}.\nIt is one of {len(others)} candidates. "
+    if best.papers_method:
+        return closest + (
+            "It is the paper's method; its tolerances are not printed there and\n"
+            "were chosen here. Its error in the tangent map of one impact predicts these values: "
+            "docs/papers-table.md."
+        )
+    return closest + (
+        "Its method and tolerance replace the paper's ode23s, which\n"
         "integrated across the impacts at an unknown tolerance. This is an indication, not a proof."
+    )
+
+
+def column_text(columns: Sequence[PaperColumn]) -> str:
+    """Table of the paper's Benettin column beside its method from two starts, as far as the runs go."""
+    cells = []
+    for column in columns:
+        sides = [
+            side
+            for label, growths in column.growths.items()
+            for side in (printed(column.omega, label), running(growths))
+        ]
+        reached = [i for i in range(len(ROWS)) if sides[1][i] is not None]
+        omega = f"{column.omega:.2f}"
+        cells += [[omega, str(ROWS[i]), *(number(side[i]) for side in sides)] for i in reached]
+        for i in reached[:-1]:
+            between = [number(steady(side)[i]) for side in sides]
+            cells.append([omega, f"{ROWS[i]} to {ROWS[i + 1]}", *between])
+    title = "The paper's Benettin column by the paper's method"
+    if not cells:
+        return f"{title}: needs at least {ROWS[0]} periods."
+    method = f"ode23s straight through, RelTol = {PAPERS.rtol:.0e}, AbsTol = {PAPERS.atol:.0e}, no transient."
+    return "\n".join(
+        [
+            title,
+            "-" * len(title),
+            method,
+            "The paper does not print its starts. The rows depend on them, the growth between rows does not.",
+            "",
+            table(["omega", "M", "paper I", "ode23s I", "paper II", "ode23s II"], cells, numbers=True),
+            "",
+            "All rows up to M = 10000, and the reason for the difference: docs/papers-table.md.",
+        ]
     )
 
 

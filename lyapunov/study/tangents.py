@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import attrs
@@ -12,12 +13,18 @@ from hybrid import DOP853, HybridSystem, Mode, Taylor, Tsit5, periodic_orbit, si
 from hybrid.solvers import Solver
 from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import lyapunov_spectrum
+from lyapunov.study.ode23s import Ode23s
 from lyapunov.study.paper import DOUBTFUL
 from lyapunov.study.runs import STARTS, Settings
 
 TOLERANCES = tuple(10.0**-digits for digits in range(4, 11))
 LOOSE = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 TRAP_OMEGA = 7.40
+
+# RelTol and AbsTol of the paper's method: MATLAB's defaults first.
+STRAIGHT = ((1e-3, 1e-6), (1e-4, 1e-8), (1e-5, 1e-8), (1e-6, 1e-6), (1e-6, 1e-7), (1e-6, 1e-8))
+# Its runs are slow; without a transient the first periods would add their own growth.
+ENOUGH_OF_ODE23S, SETTLED = 400, 100
 
 # Far below every absolute tolerance, and far above the smallest numbers of double precision.
 UNSEEN = 1e-30
@@ -169,11 +176,34 @@ class Candidate:
 
 
 @attrs.frozen(eq=False)
+class StraightCandidate:
+    """The paper's method as a candidate: ode23s straight through the impacts with one tangent vector."""
+
+    text: str
+    system: HybridSystem
+    x0: tuple[float, ...]
+    method: Ode23s
+
+    def exponent(self, omega: float, settings: Settings) -> float:
+        """The limit of the column at one frequency if this candidate is right."""
+        growths = self.method.growths(
+            self.system,
+            self.x0,
+            omega=omega,
+            k=1,
+            periods=min(settings.intervals, ENOUGH_OF_ODE23S),
+            transient=min(settings.transient, SETTLED),
+        )
+        return float(growths.mean())
+
+
+@attrs.frozen(eq=False)
 class Explanation:
-    """Text of a candidate, and the exponent it gives at each frequency."""
+    """Text of a candidate, the exponent it gives at each frequency, and whether the paper had this method."""
 
     text: str
     exponents: dict[float, float]
+    papers_method: bool = False
 
     @property
     def misfit(self) -> float:
@@ -205,9 +235,27 @@ def candidates(system: HybridSystem, solver: Solver) -> list[Candidate]:
     ]
 
 
+def straight_candidates(system: HybridSystem) -> list[StraightCandidate]:
+    """The paper's method at each pair of tolerances."""
+    return [
+        StraightCandidate(
+            f"(e) ode23s, {rtol:.0e}, {atol:.0e}", system, STARTS[0].x0, Ode23s(rtol=rtol, atol=atol)
+        )
+        for rtol, atol in STRAIGHT
+    ]
+
+
 def explanations(system: HybridSystem, omegas: Sequence[float], settings: Settings) -> list[Explanation]:
     """The exponents of each candidate at the frequencies."""
-    return [
+    found = [
         Explanation(candidate.text, {omega: candidate.exponent(omega, settings) for omega in omegas})
         for candidate in candidates(system, settings.solver)
+    ]
+    straight = straight_candidates(system)
+    tasks = [(candidate, omega) for candidate in straight for omega in omegas]
+    with ThreadPoolExecutor() as pool:
+        values = iter(list(pool.map(lambda task: task[0].exponent(task[1], settings), tasks)))
+    return found + [
+        Explanation(candidate.text, {omega: next(values) for omega in omegas}, papers_method=True)
+        for candidate in straight
     ]

@@ -84,3 +84,20 @@ def test_the_verdict_may_be_that_the_question_is_open():
     good = Explanation("good", {7.40: -0.066, 7.46: -0.010})
     assert report.verdict([as_it_is, poor]).startswith("Open: the closest candidate, poor")
     assert report.verdict([as_it_is, poor, good]).startswith("Closest: good")
+
+
+def test_the_verdict_says_whether_the_method_is_the_paper_s():
+    as_it_is = Explanation("as it is", {7.40: -0.055, 7.46: 0.0})
+    same = Explanation("(e) ode23s", {7.40: -0.066, 7.46: -0.008}, papers_method=True)
+    other = Explanation("(b) loose", {7.40: -0.066, 7.46: -0.013})
+    assert "It is the paper's method" in report.verdict([as_it_is, same, other])
+    assert "replace the paper's ode23s" in report.verdict([as_it_is, other])
+
+
+def test_the_paper_s_method_is_among_the_candidates(short):
+    with (short / "explanations.csv").open(encoding="utf-8") as file:
+        rows = {row["candidate"]: row for row in csv.DictReader(file)}
+    assert sum(name.startswith("(e) ode23s") for name in rows) == 6
+    defaults, tight = rows["(e) ode23s, 1e-03, 1e-06"], rows["(e) ode23s, 1e-06, 1e-08"]
+    assert float(defaults["7.4"]) < -0.15
+    assert float(tight["7.4"]) == pytest.approx(-0.066, abs=0.01)
