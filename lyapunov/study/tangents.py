@@ -115,12 +115,12 @@ def tolerance_study(system: HybridSystem, settings: Settings) -> Trap:
         lyapunov_spectrum(system, x0, parameters=parameters, intervals=periods, solver=solver).exponents
         for solver in solvers
     ]
-    outside = [_uncontrolled_exponents(extended, TRAP_OMEGA, solver, periods) for solver in solvers]
+    outside = [uncontrolled_exponents(extended, TRAP_OMEGA, solver, periods) for solver in solvers]
     truth = floquet_exponents(periodic_orbit(system, x0, parameters=parameters))
     return Trap(truth, np.array(TOLERANCES), np.array(inside), np.array(outside))
 
 
-def _uncontrolled_exponents(extended: HybridSystem, omega: float, solver: Solver, periods: int) -> np.ndarray:
+def uncontrolled_exponents(extended: HybridSystem, omega: float, solver: Solver, periods: int) -> np.ndarray:
     """Exponents ``(4,)`` from start I, by QR of tangent vectors outside the error control.
 
     The columns are computed one at a time. The steps follow the state alone, so all columns have the same.
