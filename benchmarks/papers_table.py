@@ -1,6 +1,7 @@
 """The paper's Benettin column by the paper's method: every printed row, a scan of tolerances, and one impact.
 
-``python -m benchmarks.papers_table rows``, ``scan``, ``prediction`` or ``figure``: each takes a few minutes.
+Run ``python -m benchmarks.papers_table`` with rows, scan, prediction, recurrence or figure.
+Each takes some minutes.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 import models
 from benchmarks.common import heading, table
+from lyapunov import lyapunov_spectrum
 from lyapunov.study.column import LAST_ROW, printed, running, steady
 from lyapunov.study.impact import by_ode23s, impacts, measure
 from lyapunov.study.ode23s import Ode23s
@@ -27,6 +29,8 @@ WORKERS = 2
 SCANNED_RTOLS = (1e-3, 1e-4, 1e-5, 3e-6, 1e-6, 3e-7, 1e-7)
 SCANNED_ATOLS = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 SCANNED_PERIODS, SKIPPED = 600, 100
+# Tolerances at which the chaos of 7.92 may end, and periods to settle and to watch.
+LOOSE, SETTLING, WATCHED = ((1e-6, 1e-8), (3e-7, 5e-6), (3e-7, 6e-6), (1e-6, 1e-5)), 3000, 212
 PREDICTED = ((1e-3, 1e-6), (1e-4, 1e-8), (1e-5, 1e-8), (1e-6, 1e-6), (1e-6, 1e-7), (1e-6, 1e-8), (1e-7, 1e-9))
 
 
@@ -103,20 +107,39 @@ def prediction() -> None:
         ]
 
     tasks = [(*tolerances, at_once) for at_once in (1, 4) for tolerances in PREDICTED]
-    columns = [
-        "RelTol",
-        "AbsTol",
-        "vectors",
-        "shear off",
-        "predicted",
-        "long run",
-        "restitution off",
-        "det off",
-    ]
+    off = ("shear off", "predicted", "long run", "restitution off", "determinant off")
+    columns = ["RelTol", "AbsTol", "vectors", *off]
     table(columns, parallel(both, tasks))
     relative, halfway = windows[0].relative(windows[0].contact), windows[0].halfway()
     print(f"Exact map of gap and rate across the contact: {np.array2string(relative, precision=5)}")
     print(f"Rate per unit of gap halfway: {halfway[1, 0]:.1f} per second, at the end {relative[1, 0]:.4f}.")
+
+
+def recurrence() -> None:
+    """How nearly the numerical orbit at 7.92 repeats itself, and what the library finds from its end."""
+    cells, omega = [], 7.92
+    period = 2 * np.pi / omega
+    for rtol, atol in LOOSE:
+        method, x, vector = Ode23s(rtol, atol), np.array(STARTS[0].x0), np.full((4, 1), 0.5)
+        points, rates = [], []
+        for _ in range(SETTLING + WATCHED):
+            x, vector = method.carry(SYSTEM, x, vector, (0.0, period), omega=omega)
+            length = np.linalg.norm(vector)
+            vector = vector / length
+            points.append(x)
+            rates.append(np.log(length) / period)
+        late = np.array(points[SETTLING:])
+        distances = [np.abs(late[p:] - late[:-p]).max() for p in range(1, WATCHED // 2)]
+        least = int(np.argmin(distances))
+        exact = lyapunov_spectrum(SYSTEM, x, k=1, parameters={"omega": omega}, intervals=10_000)
+        repeats = [str(least + 1), f"{distances[least]:.4f}", f"{np.ptp(late):.2f}"]
+        growth = text(float(np.mean(rates[-WATCHED:])))
+        library = f"{exact.exponents[0]:.4f} +- {exact.standard_error[0]:.4f}"
+        cells.append([f"{rtol:.0e}", f"{atol:.0e}", *repeats, growth, library])
+    table(
+        ["RelTol", "AbsTol", "repeats after", "within", "extent", "exponent", "library from its end"],
+        cells,
+    )
 
 
 def text(value: float | None) -> str:
@@ -125,7 +148,7 @@ def text(value: float | None) -> str:
 
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("part", choices=("rows", "scan", "prediction", "figure"))
+    options.add_argument("part", choices=("rows", "scan", "prediction", "recurrence", "figure"))
     options.add_argument("--rtol", type=float, default=PAPERS.rtol)
     options.add_argument("--atol", type=float, default=PAPERS.atol)
     options.add_argument("--omega", type=float, nargs="+", default=list(PAPER), help="those of the rows")
@@ -139,6 +162,8 @@ def main() -> None:
         scan()
     elif chosen.part == "prediction":
         prediction()
+    elif chosen.part == "recurrence":
+        recurrence()
     else:
         from benchmarks.papers_table_figure import figure
 
