@@ -201,7 +201,7 @@ def column_text(columns: Sequence[PaperColumn]) -> str:
             title,
             "-" * len(title),
             method,
-            "The paper does not print its starts. The rows depend on them, the growth between rows does not.",
+            "The paper does not print its starts. They matter in the first rows, less in the growth between.",
             "",
             table(["omega", "M", "paper I", "ode23s I", "paper II", "ode23s II"], cells, numbers=True),
             "",
