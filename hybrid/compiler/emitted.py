@@ -7,6 +7,9 @@ import attrs
 from hybrid.compiler.opaque import OpaqueFunction
 from hybrid.kernels.types.codes import PROPAGATORS
 
+# A component of a forcing: some parts of the field saturate in the state, so its series is compared with it.
+OF_STATE = -2
+
 
 @attrs.frozen
 class Series:
@@ -164,10 +167,15 @@ class Emitted:
 
     def has_forcing(self, mode: int) -> bool:
         """Whether the field of a mode has parts that depend on time alone and are bounded over each step."""
-        return self.first_forcing[mode] < self.first_forcing[mode + 1]
+        return any(self.forcing_component[i] != OF_STATE for i in self._forcings(mode))
+
+    def _forcings(self, mode: int) -> range:
+        return range(self.first_forcing[mode], self.first_forcing[mode + 1])
 
     def pulses_excluded(self, mode: int) -> bool:
         """Whether all forcing of a mode can be bounded, so that no pulse in time is stepped over."""
         first, guards = self.programs.first, len(self.affine_guard)
-        forcings = range(self.first_forcing[mode], self.first_forcing[mode + 1])
-        return self.traced_field[mode] and all(first[guards + i] < first[guards + i + 1] for i in forcings)
+        return self.traced_field[mode] and all(
+            first[guards + i] < first[guards + i + 1] or self.forcing_component[i] == OF_STATE
+            for i in self._forcings(mode)
+        )

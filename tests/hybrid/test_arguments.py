@@ -242,6 +242,17 @@ def table(made):
             },
         ),
         (call(hybrid.compile_system, BALL), {"system": SYSTEM}),
+        (call(hybrid.split, BALL), {"system": SYSTEM}),
+        (
+            call(hybrid.from_equations, lambda t, x, p: (x.v, -np.abs(x.q)), state=("q", "v")),
+            {
+                "field": [None, *FUNCTION],
+                "state": [None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), {"q", "v"}, math.nan, Odd()],
+                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "period": [*LIMIT[1:], math.inf],
+                "name": TEXT,
+            },
+        ),
         (
             call(
                 hybrid.filippov,
@@ -707,6 +718,8 @@ def test_the_calls_work(made):
         "Transition",
         "Answer",
         "filippov",
+        "split",
+        "from_equations",
         "saltation_matrix",
     )
     for (function, positional, options), _ in table(made):

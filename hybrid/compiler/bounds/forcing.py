@@ -11,7 +11,10 @@ from collections.abc import Iterator, Sequence
 
 import attrs
 import sympy
+from sympy.codegen.cfunctions import exp2, expm1
 
+from hybrid.compiler.emitted import OF_STATE
+from hybrid.symbolic.expressions import Absolute, Maximum
 from hybrid.symbolic.nodes import degree_of, mentions, once
 from hybrid.symbolic.tracing import Symbols
 
@@ -19,13 +22,18 @@ from hybrid.symbolic.tracing import Symbols
 MOST_HARMONICS = 4
 # Used instead of a component of the state if the forcing is not simply a term of the component's rate.
 NO_COMPONENT = -1
+# Functions that may be flat to all digits and change a little further on.
+SATURATING = (sympy.tanh, sympy.atan, sympy.exp, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
 
 
 @attrs.frozen
 class Forcing:
-    """An expression in time and parameters, and the component with this term in its rate or NO_COMPONENT."""
+    """An expression in time and parameters, and the component with this term in its rate or NO_COMPONENT.
 
-    expression: sympy.Expr
+    Without an expression, with the component OF_STATE, it stands for parts that saturate in the state.
+    """
+
+    expression: sympy.Expr | None
     component: int
 
 
@@ -36,8 +44,29 @@ def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forc
     """
     if field is None:
         return ()
-    found = (each for i, entry in enumerate(field) for each in _parts(entry, i, symbols))
-    return tuple(dict.fromkeys(found))
+    found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, symbols))
+    if not found and any(_saturates(entry, symbols.x) for entry in field):
+        found[Forcing(None, OF_STATE)] = None
+    return tuple(found)
+
+
+@once
+def _saturates(node: sympy.Expr, states: tuple[sympy.Symbol, ...]) -> bool:
+    """Whether an expression may change in the state where its series is flat to all digits.
+
+    ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so is ``x/sqrt(x**2 + 1e-8)``. Powers of affine
+    expressions are not: where these vanish, the field is singular.
+    """
+    if not mentions(node, states):
+        return False
+    if isinstance(node, SATURATING):
+        return True
+    if node.is_Pow and not (node.exp.is_Integer and node.exp.is_positive):
+        bases = node.base.args if isinstance(node.base, Maximum | Absolute) else (node.base,)
+        degrees = [degree_of(base, frozenset(states)) for base in bases]
+        if any(degree is None or degree > 1 for degree in degrees):
+            return True
+    return any(_saturates(part, states) for part in node.args)
 
 
 @once

@@ -67,7 +67,7 @@ class NoProgram(Exception):
 
 def programs(
     guards: Sequence[sympy.Expr | None],
-    forcings: Sequence[sympy.Expr],
+    forcings: Sequence[sympy.Expr | None],
     residues: Sequence[sympy.Expr | None],
     symbols: Symbols,
 ) -> Programs:
