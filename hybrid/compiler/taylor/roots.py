@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import attrs
+import numpy as np
 import sympy
 
 from hybrid.compiler.taylor.series import NoSeries
-from hybrid.symbolic.nodes import MOST_EXPANDED, is_larger_than, mentions, nodes_of, replaced
+from hybrid.symbolic.evaluation import Program
+from hybrid.symbolic.nodes import MOST_EXPANDED, is_larger_than, mentions, nodes_of, replaced, symbols_of
 from hybrid.symbolic.tracing import Symbols
 
 ROOT = sympy.Symbol("w", positive=True)
 HALF = sympy.Rational(1, 2)
+# Ratios at two points differ if they do by more than this share.
+DIFFERENT = 1e-6
 
 
 def singular_bases(
@@ -41,9 +45,26 @@ def singular_bases(
 
 def is_multiple(expression: sympy.Expr, other: sympy.Expr, symbols: Symbols) -> bool:
     """Whether an expression is a multiple of another, with a factor that depends on parameters only."""
-    if other == 0 or is_larger_than(MOST_EXPANDED, expression):
+    if other == 0 or is_larger_than(MOST_EXPANDED, expression) or _ratio_varies(expression, other, symbols):
         return False
     return not mentions(sympy.cancel(expression / other), symbols.variables)
+
+
+def _ratio_varies(expression: sympy.Expr, other: sympy.Expr, symbols: Symbols) -> bool:
+    """Whether the ratio has different values at two points, for the same parameters.
+
+    SymPy takes minutes to simplify the ratio of large expressions with many parameters.
+    """
+    names = sorted(symbols_of(expression) | symbols_of(other), key=str)
+    generator = np.random.default_rng(0)
+    point = dict(zip(names, generator.uniform(0.5, 1.5, len(names)), strict=True))
+    moved = {name: value + generator.uniform(0.1, 0.5) for name, value in point.items()}
+    moved |= {name: value for name, value in point.items() if name not in symbols.variables}
+    program = Program([expression, other])
+    with np.errstate(all="ignore"):
+        (one, below), (two, beside) = program.run(point), program.run(moved)
+        # The comparison fails where a value is not finite.
+        return bool(abs(one * beside - two * below) > DIFFERENT * (abs(one * beside) + abs(two * below)))
 
 
 @attrs.frozen

@@ -4,10 +4,15 @@ import math
 
 import numpy as np
 import pytest
+import sympy
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, StatusCode, Transition
+from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.kernels.types import codes
+from hybrid.symbolic.tracing import model_symbols
+
+symbols = model_symbols(2, 2)
 
 
 def tank(field, guard=lambda t, x, p: x.h, state=("h",), direction=-1, **options):
@@ -103,3 +108,25 @@ def test_roots_of_what_keeps_its_sign_have_series():
         transitions=[],
     )
     assert hybrid.compile_system(system).emitted.propagators[0].kind == codes.TAYLOR
+
+
+class TestIsMultiple:
+    x, y, a, b = symbols.x[0], symbols.x[1], *symbols.p
+
+    @pytest.mark.parametrize(
+        ("expression", "other"),
+        [
+            (3 * x, x),
+            (a * x - a * y, x - y),
+            ((x - y) * (a + b) ** 2, b * x - b * y),
+            (x**2 - x, x * (1 - x)),
+        ],
+    )
+    def test_factor_of_parameters(self, expression, other):
+        assert is_multiple(expression, other, symbols)
+
+    @pytest.mark.parametrize(("expression", "other"), [(x + 0.01, x), (x * y, x), (symbols.t * x, x)])
+    def test_factor_of_the_state(self, expression, other, monkeypatch):
+        """The values decide; simplifying the ratio of large expressions would take minutes."""
+        monkeypatch.delattr(sympy, "cancel")
+        assert not is_multiple(expression, other, symbols)
