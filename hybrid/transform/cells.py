@@ -23,6 +23,9 @@ from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
 from hybrid.transform.surface import SwitchingSurface
 
+# Two solutions for the shares on an intersection count as one if their relative difference is less than the
+# square root of this number.
+FOLD = 1e-8
 # By number of a surface: -1 below, 1 above, 0 sliding along it; -2 and 2 on it, with the branch of that side.
 Sides = Mapping[int, int]
 
@@ -69,6 +72,25 @@ class Choice:
     sides: dict[int, int]
 
 
+@attrs.frozen
+class Shares:
+    """The bilinear field on the intersection of two surfaces, and the shares of their sides, -1 to 1.
+
+    Attributes
+    ----------
+    flow
+        The field.
+    of
+        By surface, the share of its sides: -1 below, 1 above.
+    unique
+        Positive where the shares are real and not close to the other solution for them.
+    """
+
+    flow: Function
+    of: dict[int, sympy.Expr]
+    unique: sympy.Expr
+
+
 class Pieces:
     """Cells and fields of one mode.
 
@@ -95,6 +117,7 @@ class Pieces:
         self.surfaces = surfaces
         self._fields: dict[Any, Function] = {}
         self._between: dict[Any, SwitchingSurface] = {}
+        self._shares: dict[Any, Shares | None] = {}
 
     def cells(self, sides: Sides, decide: Callable[[int], int | None] | None = None) -> Iterator[Choice]:
         """The cells where these sides hold; sides that are missing and matter are chosen both ways.
@@ -189,8 +212,9 @@ class Pieces:
         on = [number for number, side in sides.items() if side == 0]
         if not on:
             return expressed(self._vertex_field(sides))
-        if len(on) == 2 and not self._is_additive(sides, *on):
-            return self._bilinear(sides, *on)
+        shares = self.shares(sides)
+        if shares is not None:
+            return shares.flow
         return self.between(sides, on[-1]).sliding_field
 
     def _vertex_field(self, sides: Sides) -> list[sympy.Expr]:
@@ -242,7 +266,17 @@ class Pieces:
         pieces = zip(a, b, c, d, strict=True)
         return all((w - x - y + z).expand() == 0 for w, x, y, z in pieces)
 
-    def _bilinear(self, sides: Sides, one: int, other: int) -> Function:
+    def shares(self, sides: Sides) -> Shares | None:
+        """The shares of the sides of two surfaces whose jumps do not add up; None on other cells."""
+        on = [number for number, side in sides.items() if side == 0]
+        if len(on) != 2:
+            return None
+        key = tuple(sorted(sides.items()))
+        if key not in self._shares:
+            self._shares[key] = None if self._is_additive(sides, *on) else self._bilinear(sides, *on)
+        return self._shares[key]
+
+    def _bilinear(self, sides: Sides, one: int, other: int) -> Shares:
         """The field on an intersection: each side has a share, and the shares of corners are products.
 
         With the rates ``g = p0 + p1 a + p2 b + p3 a b`` and ``h = q0 + q1 a + q2 b + q3 a b`` of the two
@@ -270,10 +304,17 @@ class Pieces:
                 q0 * p3 + q2 * p1 - q1 * p2 - q3 * p0,
                 q0 * p1 - q1 * p0,
             )
-            root = (linear**2 - 4 * square * constant) ** sympy.Rational(1, 2)
-            b = -2 * constant / (linear + root)
-            a = -(p0 + p2 * b) / (p1 + p3 * b)
-            return expressed([c0 + c1 * a + c2 * b + c3 * (a * b) for c0, c1, c2, c3 in field])
+            if square.expand() == 0:
+                b, unique = -constant / linear, linear
+            else:
+                discriminant = linear**2 - 4 * square * constant
+                b = -2 * constant / (linear + discriminant ** sympy.Rational(1, 2))
+                unique = discriminant - FOLD * (linear**2 + square**2)
+            # Both rates give the same share; one of them may not depend on it.
+            p, q = p1 + p3 * b, q1 + q3 * b
+            a = -((p0 + p2 * b) * p + (q0 + q2 * b) * q) / (p**2 + q**2)
+            flow = expressed([c0 + c1 * a + c2 * b + c3 * (a * b) for c0, c1, c2, c3 in field])
+            return Shares(flow, {one: a, other: b}, unique)
 
 
 def _coefficients(mm: sympy.Expr, mp: sympy.Expr, pm: sympy.Expr, pp: sympy.Expr) -> tuple[sympy.Expr, ...]:

@@ -99,7 +99,14 @@ def split(system: HybridSystem) -> HybridSystem:
     Seidman, which Dieci and Lopez study. It is one choice of many: Filippov's convex combinations of four
     fields leave one of them free. If the jumps add up, as for two dry contacts, the combination is
     unique and equals Utkin's equivalent control. Of two solutions ``(a, b)`` the one is taken for which the
-    determinant of the derivatives of the rates of the heights in ``a`` and ``b`` is positive.
+    determinant of the derivatives of the rates of the heights in ``a`` and ``b`` is positive. The run ends
+    (``two-fold``) where the two solutions meet.
+
+    *An orbit that slides and reaches another surface* goes on in the cell around the intersection that is
+    consistent: the orbit slides along the surfaces on which the cell slides, and moves to the side of the
+    cell from the others. So does an orbit whose ``a`` or ``b`` reaches 1 or -1. If several cells are
+    consistent, the future is not unique and the status is AMBIGUOUS_ORDER; if none is, the run ends with the
+    transition ``no way on``.
 
     *On three or more* surfaces whose jumps do not add up, the sliding field on the last surface combines the
     sliding fields on the others, in the order in which the surfaces were found; another order may give

@@ -16,7 +16,7 @@ from sympy.core.parameters import distribute
 
 from hybrid.errors import ModelError
 from hybrid.symbolic.evaluation import Program, expressed, scalar
-from hybrid.symbolic.expressions import ZERO, And, Less, LessEqual
+from hybrid.symbolic.expressions import ZERO, And, Less, LessEqual, Not, Or
 from hybrid.symbolic.nodes import replaced, symbols_of
 from hybrid.symbolic.switches import Resolved, Surfaces, Switches
 from hybrid.symbolic.tracing import TraceError, model_symbols, trace
@@ -24,6 +24,7 @@ from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.cells import Cell, Choice, Pieces
+from hybrid.transform.corners import Corner, attraction, consistent, corners, exits, may_slide, reaches_end
 from hybrid.transform.naming import Names
 
 # Parts may differ from the field by so much of its largest value: other orders of the same sums.
@@ -259,25 +260,50 @@ class Splitter:
         """The transitions of a state that reaches a surface from one side."""
         pieces = self.pieces[cell.mode]
         height = self._height(number)
-        beyond = {**dict(cell.sides), number: -2 * side}
+        beyond, turns = {**dict(cell.sides), number: -2 * side}, False
         for choice in pieces.choices(beyond):
             sides = {**dict(cell.branches), **choice.sides}
             extra = self._on(choice.chosen)
-            if not pieces.jumps(sides, number) or not pieces.may_attract(sides, number):
+            if not pieces.jumps(sides, number) or not (cell.sliding or pieces.may_attract(sides, number)):
                 yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra)))
                 continue
             yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra), at_start=True))
-            surface = pieces.between(sides, number)
-            arrives, crosses = (
-                (surface.arrives_from_below, surface.crosses_up)
-                if side < 0
-                else (surface.arrives_from_above, surface.crosses_down)
-            )
+            if cell.sliding:
+                turns = True
+                continue
+            at = pieces.between(sides, number)
+            up, down = (at.arrives_from_below, at.crosses_up), (at.arrives_from_above, at.crosses_down)
+            arrives, crosses = up if side < 0 else down
             for sliding in pieces.choices({**sides, number: 0}):
                 more = [self._condition(arrives), *extra, *self._on(sliding.chosen)]
                 yield self._edge(cell, sliding.cell, Guard(height, -side, when=_all(more)))
             onwards = [self._condition(crosses), *extra]
             yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)))
+        if turns:
+            yield from self._turns(cell, Guard(height, -side), corners(cell.sliding, number, side))
+
+    def _turns(
+        self, cell: Cell, guard: Guard, ways: Sequence[Corner], reset: Reset | None = None, leaving: int = -1
+    ) -> Iterator[Edge]:
+        """The transitions at an intersection of surfaces, to each cell that is consistent there.
+
+        The run ends if none is. ``leaving`` is a surface that the state is about to leave.
+        """
+        pieces, source = self.pieces[cell.mode], self.name_of(cell)
+        asked = reaches_end(pieces, cell, ways[0], leaving)
+        possible = []
+        for k, corner in enumerate(ways):
+            for choice in pieces.choices({**dict(cell.sides), **{n: 2 * s for n, s in corner.items()}}):
+                sides = {**dict(cell.branches), **choice.sides}
+                if not may_slide(pieces, sides):
+                    continue
+                when = consistent(pieces, sides, [*corner], leaving if k == 0 else None)
+                possible.append(reduce(And, [*when, *self._on(choice.chosen)]))
+                fires = attrs.evolve(guard, when=_all([*asked, possible[-1]]))
+                yield self._edge(cell, choice.cell, fires, reset)
+        where = self.names.cell(self.surfaces.known, [(number, 0) for number in ways[0]])
+        end = attrs.evolve(guard, when=_all([*asked, Not(reduce(Or, possible))]))
+        yield Edge(Transition(source, None, end, name=f"{source}: no way on at {where}", part_of=None), None)
 
     def _edge(self, cell: Cell, target: Cell, guard: Guard, reset: Reset | None = None) -> Edge:
         source, to = self.name_of(cell), self.name_of(target)
@@ -287,9 +313,9 @@ class Splitter:
     def _departures(self, cell: Cell, number: int) -> Iterator[Edge]:
         """The transitions of a state that slides along a surface and leaves it."""
         pieces, source = self.pieces[cell.mode], self.name_of(cell)
-        surface = pieces.between(dict(cell.branches), number)
+        sides = dict(cell.branches)
+        surface = pieces.between(sides, number)
         height = self._height(number)
-        where = f" at {self.names.side(self.surfaces.known, number, 0)}" if len(cell.sliding) > 1 else ""
         ways = [
             (side, choice.cell, self._on(choice.chosen))
             for side in (1, -1)
@@ -298,14 +324,22 @@ class Splitter:
         for side, target, extra in ways:
             off = Guard(height, side, when=_all([self._condition(surface.is_off), *extra]), at_start=True)
             yield self._edge(cell, target, off)
-        attraction = self._function(surface.attraction)
-        at_start = Guard(attraction, -1, at_start=True)
-        for guard, name in (at_start, "two-fold at start"), (Guard(attraction, -1), "two-fold"):
-            yield Edge(Transition(source, None, guard, name=f"{source}: {name}{where}"), None)
+        only = len(cell.sliding) == 1
+        if number == cell.sliding[0]:
+            attracts = self._function(surface.attraction) if only else scalar(attraction(pieces, sides))
+            at_start = Guard(attracts, -1, at_start=True)
+            for guard, name in (at_start, "two-fold at start"), (Guard(attracts, -1), "two-fold"):
+                yield Edge(Transition(source, None, guard, name=f"{source}: {name}"), None)
         projection = Reset(expressed(self._traced("the projection", surface.projection)))
-        for side, target, extra in ways:
+        if only:
+            for side, target, extra in ways:
+                speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
+                yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), projection)
+            return
+        for side in (1, -1):
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
-            yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), projection)
+            ways_on = exits(cell.sliding, number, side)
+            yield from self._turns(cell, Guard(speed, 0), ways_on, projection, leaving=number)
 
     def _height(self, number: int) -> Function:
         if number not in self.heights:

@@ -16,7 +16,7 @@ from hybrid.symbolic.tracing import Symbols
 ROOT = sympy.Symbol("w", positive=True)
 HALF = sympy.Rational(1, 2)
 # Ratios at two points differ if they do by more than this share.
-DIFFERENT = 1e-6
+DIFFERENT = 1e-10
 
 
 def singular_bases(

@@ -1,0 +1,94 @@
+"""Orbits that slide to an intersection of two surfaces, or along it: which way they go on."""
+
+import numpy as np
+import pytest
+
+from hybrid import StatusCode, from_equations, simulate
+
+QUADRANTS = [(-1, -1), (-1, 1), (1, -1), (1, 1)]
+
+
+def plane(rates, slopes=None):
+    """A field with one velocity in each quadrant of the plane; it changes linearly with the third state."""
+    slopes = np.zeros((4, 2)) if slopes is None else slopes
+
+    def field(t, x, p):
+        def of(quadrant, i):
+            return rates[quadrant][i] + slopes[quadrant][i] * x.z
+
+        def at(i):
+            below, above = (np.where(x.y > 0, of(k + 1, i), of(k, i)) for k in (0, 2))
+            return np.where(x.x > 0, above, below)
+
+        return at(0), at(1), 1.0
+
+    return from_equations(field, state=("x", "y", "z"))
+
+
+def visited(arc):
+    """The modes of an arc, in order."""
+    targets = {each.name: each.target for each in arc.system.transitions}
+    return [str(arc.mode[0]), *(targets[str(name)] for name in arc.jumps.transition)]
+
+
+class TestArrival:
+    """An orbit that slides along one surface reaches another one."""
+
+    def test_leaves_the_surface_along_which_it_slid(self):
+        """Both fields beyond push to x < 0, so that there is no sliding beyond ``y = 0`` to go by."""
+        system = plane([(0.63, 1.06), (-1.26, -1.41), (-0.41, -0.26), (-2.81, -3.06)])
+        arc = simulate(system, (0.0, -0.1, 0.0), (0.0, 2.0))
+        assert arc.status.ok
+        assert visited(arc) == ["x=0, y<0", "x<0, y=0"]
+        share = 0.63 / (0.63 + 0.41)
+        assert arc.jumps.t == pytest.approx([0.1 / (1.06 - share * (1.06 + 0.26))])
+
+    def test_goes_back_to_the_other_surface(self):
+        """The run went round in a circle from one surface to the next at one instant."""
+        system = plane([(-0.096, 0.51), (2.02, -1.816), (-2.197, 1.927), (-1.255, 1.136)])
+        arc = simulate(system, (-0.1, 0.0, 0.0), (0.0, 2.0))
+        assert arc.status.ok
+        assert visited(arc) == ["x<0, y=0", "x=0, y>0"]
+
+    def test_crosses_both(self):
+        """From the line ``x = 0`` into a quadrant from which nothing leads back."""
+        system = plane([(1.0, 1.0), (1.0, 1.0), (-1.0, 1.0), (2.0, 1.0)])
+        arc = simulate(system, (0.0, -1.0, 0.0), (0.0, 2.0))
+        assert arc.status.ok
+        assert visited(arc) == ["x=0, y<0", "x>0, y>0"]
+        np.testing.assert_allclose(arc.x[-1], [2.0, 1.0, 2.0], atol=1e-12)
+
+    def test_ends_where_no_future_is_the_only_one(self):
+        """Beyond ``y = 0`` the line ``x = 0`` repels to both sides."""
+        system = plane([(1.0, 1.0), (-1.0, 1.0), (-1.0, 1.0), (1.0, 1.0)])
+        arc = simulate(system, (0.0, -1.0, 0.0), (0.0, 2.0))
+        assert arc.status.code in (StatusCode.AMBIGUOUS_ORDER, StatusCode.TERMINAL)
+
+
+class TestDeparture:
+    """An orbit slides along an intersection while the velocities around it change."""
+
+    before = np.array([(-0.2664, 0.2606), (1.8644, -2.0182), (-2.1782, 1.5982), (-1.3824, 0.9880)])
+    after = np.array([(-0.1801, 0.3870), (1.9440, -1.9157), (-2.1880, 1.7650), (-1.3179, 1.0631)])
+
+    def test_the_other_solution_for_the_shares_does_not_count(self):
+        """The speed of leaving ``x = 0`` vanishes for a share of ``y`` outside of its range."""
+        system = plane(self.before, (self.after - self.before) / 0.2755)
+        arc = simulate(system, (0.0, 0.0, 0.1), (0.0, 0.3), mode="x=0, y=0")
+        assert arc.status.ok
+        assert len(arc.jumps) == 0
+
+    def test_leaves_where_a_share_reaches_its_end(self):
+        """With the sign of y, the rates are ``x' = -sign(x)`` and ``y' = z - sign(y) (1 + sign(x) / 2)``."""
+        rates = [(1.0, 0.5), (1.0, -0.5), (-1.0, 1.5), (-1.0, -1.5)]
+        arc = simulate(plane(rates, [(0.0, 1.0)] * 4), (0.0, 0.0, 0.0), (0.0, 2.0), mode="x=0, y=0")
+        assert visited(arc) == ["x=0, y=0", "x=0, y>0"]
+        assert arc.jumps.t == pytest.approx([1.0])
+
+    def test_ends_where_the_two_solutions_meet(self):
+        """``x' = z - 1/2 - a b`` and ``y' = a - b`` vanish for ``a = b = sqrt(z - 1/2)`` and its opposite."""
+        rates = [(-0.5 - i * j, float(i - j)) for i, j in QUADRANTS]
+        arc = simulate(plane(rates, [(-1.0, 0.0)] * 4), (0.0, 0.0, -1.0), (0.0, 2.0), mode="x=0, y=0")
+        assert arc.status.code == StatusCode.TERMINAL
+        assert str(arc.jumps.transition[-1]) == "x=0, y=0: two-fold"
+        assert arc.t[-1] == pytest.approx(0.5, abs=1e-6)
