@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any
 
 import sympy
 
 from hybrid.symbolic.derivatives import jacobian_of
+from hybrid.symbolic.evaluation import expressed
 from hybrid.symbolic.expressions import ZERO, Less
 from hybrid.symbolic.tracing import trace
 from hybrid.system.elements import Function
@@ -24,7 +26,7 @@ NEARLY = sympy.Float(0.99)
 Corner = dict[int, int]
 
 
-def corners(sliding: Sequence[int], number: int, side: int) -> list[Corner]:
+def arrivals(sliding: Sequence[int], number: int, side: int) -> list[Corner]:
     """The sides to which an orbit may go on that slides along some surfaces and reaches another from a side.
 
     Sliding along all of them comes first, then along the old ones beyond the new one.
@@ -75,6 +77,17 @@ def reaches_end(pieces: Pieces, cell: Cell, way: Corner, leaving: int) -> list[s
     if shares is None or leaving not in shares.of:
         return []
     return [Less(NEARLY, shares.of[leaving] * way[leaving])]
+
+
+def projection(pieces: Pieces, cell: Cell, left: Sequence[int]) -> Function:
+    """The point of the surfaces that an orbit leaves: it slides beside them by rounding."""
+
+    def projected(t: Any, x: Any, p: Any) -> Any:
+        for number in left:
+            x = pieces.between(dict(cell.branches), number).projection(t, x, p)
+        return x
+
+    return expressed(trace(projected, pieces.variables.state, pieces.variables.parameter_names))
 
 
 def may_slide(pieces: Pieces, sides: Sides) -> bool:

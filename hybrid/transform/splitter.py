@@ -23,8 +23,8 @@ from hybrid.symbolic.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
+from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
-from hybrid.transform.corners import Corner, attraction, consistent, corners, exits, may_slide, reaches_end
 from hybrid.transform.naming import Names
 
 # Parts may differ from the field by so much of its largest value: other orders of the same sums.
@@ -280,30 +280,32 @@ class Splitter:
             onwards = [self._condition(crosses), *extra]
             yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)))
         if turns:
-            yield from self._turns(cell, Guard(height, -side), corners(cell.sliding, number, side))
+            yield from self._turns(cell, Guard(height, -side), corners.arrivals(cell.sliding, number, side))
 
     def _turns(
-        self, cell: Cell, guard: Guard, ways: Sequence[Corner], reset: Reset | None = None, leaving: int = -1
+        self, cell: Cell, guard: Guard, ways: Sequence[corners.Corner], leaving: int = -1
     ) -> Iterator[Edge]:
         """The transitions at an intersection of surfaces, to each cell that is consistent there.
 
         The run ends if none is. ``leaving`` is a surface that the state is about to leave.
         """
         pieces, source = self.pieces[cell.mode], self.name_of(cell)
-        asked = reaches_end(pieces, cell, ways[0], leaving)
+        asked = corners.reaches_end(pieces, cell, ways[0], leaving)
         possible = []
         for k, corner in enumerate(ways):
+            left = [number for number in cell.sliding if corner[number]]
+            reset = Reset(corners.projection(pieces, cell, left)) if left else None
             for choice in pieces.choices({**dict(cell.sides), **{n: 2 * s for n, s in corner.items()}}):
                 sides = {**dict(cell.branches), **choice.sides}
-                if not may_slide(pieces, sides):
+                if not corners.may_slide(pieces, sides):
                     continue
-                when = consistent(pieces, sides, [*corner], leaving if k == 0 else None)
+                when = corners.consistent(pieces, sides, [*corner], leaving if k == 0 else None)
                 possible.append(reduce(And, [*when, *self._on(choice.chosen)]))
                 fires = attrs.evolve(guard, when=_all([*asked, possible[-1]]))
                 yield self._edge(cell, choice.cell, fires, reset)
         where = self.names.cell(self.surfaces.known, [(number, 0) for number in ways[0]])
         end = attrs.evolve(guard, when=_all([*asked, Not(reduce(Or, possible))]))
-        yield Edge(Transition(source, None, end, name=f"{source}: no way on at {where}", part_of=None), None)
+        yield Edge(Transition(source, None, end, name=f"{source}: no way on at {where}"), None)
 
     def _edge(self, cell: Cell, target: Cell, guard: Guard, reset: Reset | None = None) -> Edge:
         source, to = self.name_of(cell), self.name_of(target)
@@ -312,8 +314,7 @@ class Splitter:
 
     def _departures(self, cell: Cell, number: int) -> Iterator[Edge]:
         """The transitions of a state that slides along a surface and leaves it."""
-        pieces, source = self.pieces[cell.mode], self.name_of(cell)
-        sides = dict(cell.branches)
+        pieces, source, sides = self.pieces[cell.mode], self.name_of(cell), dict(cell.branches)
         surface = pieces.between(sides, number)
         height = self._height(number)
         ways = [
@@ -326,20 +327,21 @@ class Splitter:
             yield self._edge(cell, target, off)
         only = len(cell.sliding) == 1
         if number == cell.sliding[0]:
-            attracts = self._function(surface.attraction) if only else scalar(attraction(pieces, sides))
+            attracts = (
+                self._function(surface.attraction) if only else scalar(corners.attraction(pieces, sides))
+            )
             at_start = Guard(attracts, -1, at_start=True)
             for guard, name in (at_start, "two-fold at start"), (Guard(attracts, -1), "two-fold"):
                 yield Edge(Transition(source, None, guard, name=f"{source}: {name}"), None)
-        projection = Reset(expressed(self._traced("the projection", surface.projection)))
         if only:
+            reset = Reset(corners.projection(pieces, cell, [number]))
             for side, target, extra in ways:
                 speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
-                yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), projection)
+                yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), reset)
             return
         for side in (1, -1):
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
-            ways_on = exits(cell.sliding, number, side)
-            yield from self._turns(cell, Guard(speed, 0), ways_on, projection, leaving=number)
+            yield from self._turns(cell, Guard(speed, 0), corners.exits(cell.sliding, number, side), number)
 
     def _height(self, number: int) -> Function:
         if number not in self.heights:

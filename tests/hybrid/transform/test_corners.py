@@ -50,6 +50,14 @@ class TestArrival:
         assert arc.status.ok
         assert visited(arc) == ["x<0, y=0", "x=0, y>0"]
 
+    def test_slow_departure(self):
+        """The state is projected onto the surface that it leaves: by rounding it had slid below it."""
+        system = plane([(0.68, 2.23), (1.37, -0.79), (-1.0, 2.38), (-0.62, 0.49)], [(0.0, -1e-4)] * 4)
+        for start in np.linspace(-0.3, -0.2, 11):
+            arc = simulate(system, (start, 3e-17, 0.0), (0.0, 1.0), mode="x<0, y=0")
+            assert arc.status.ok
+            assert visited(arc) == ["x<0, y=0", "x=0, y>0"]
+
     def test_crosses_both(self):
         """From the line ``x = 0`` into a quadrant from which nothing leads back."""
         system = plane([(1.0, 1.0), (1.0, 1.0), (-1.0, 1.0), (2.0, 1.0)])
