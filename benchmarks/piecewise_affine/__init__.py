@@ -1,0 +1,1 @@
+"""Runs of random piecewise-affine fields by `hybrid.split`, compared with an independent event loop."""
