@@ -9,6 +9,7 @@ from hybrid.testing.check import PropertyReport, SystemReport, check_system
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.events import check_jumps, check_sides
+from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields
 from hybrid.testing.functions import check_compiled, check_period
 from hybrid.testing.invariance import (
     check_cut,
@@ -33,6 +34,7 @@ from hybrid.testing.units import check_units
 __all__ = [
     "Case",
     "Engine",
+    "PiecewiseAffineField",
     "PropertyError",
     "PropertyReport",
     "Run",
@@ -60,6 +62,7 @@ __all__ = [
     "check_units",
     "discard",
     "parameters",
+    "piecewise_affine_fields",
     "small_systems",
     "states",
 ]

@@ -522,6 +522,10 @@ def table(made):
             for function in (hybrid.testing.cases, hybrid.testing.check_system)
         ),
         (call(hybrid.testing.small_systems), {}),
+        (
+            call(hybrid.testing.piecewise_affine_fields),
+            {name: [None, 3, "ab", (1,), (0, 1), (2, 1), (1.5, 2)] for name in ("dimensions", "switches")},
+        ),
         *(
             (call(getattr(hybrid.testing, name), None), {"case": [None, "a", 3, BALL]})
             for name in hybrid.testing.__all__
