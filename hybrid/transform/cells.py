@@ -238,7 +238,7 @@ class Pieces:
         """Whether the field is not proved to be continuous across a surface, all other sides as given."""
         height = self.surfaces.known[number].height
         return any(
-            not vanishes_on(change, height) for changes in self._changes(sides, number) for change in changes
+            not vanishes_on(change, height) for changes in self.changes(sides, number) for change in changes
         )
 
     def may_attract(self, sides: Sides, number: int) -> bool:
@@ -246,7 +246,7 @@ class Pieces:
         [normal] = jacobian_of([self.surfaces.known[number].height], self.surfaces.symbols.x)
         return any(
             sympy.Add(*(slope * change for slope, change in zip(normal, changes, strict=True))).expand() != 0
-            for changes in self._changes(sides, number)
+            for changes in self.changes(sides, number)
         )
 
     def _bare_field(self, sides: Sides) -> list[sympy.Expr]:
@@ -254,7 +254,7 @@ class Pieces:
         assert not isinstance(result, int), "the side of a surface is missing"
         return [*result.bare[: self.size]]
 
-    def _changes(self, sides: Sides, number: int) -> Iterator[list[sympy.Expr]]:
+    def changes(self, sides: Sides, number: int) -> Iterator[list[sympy.Expr]]:
         """The change of the field from below a surface to above it, at each vertex of the other sides."""
         for vertex in _vertices(sides, besides=number):
             below, above = (self._bare_field({**vertex, number: side}) for side in (-2, 2))

@@ -90,6 +90,24 @@ def projection(pieces: Pieces, cell: Cell, left: Sequence[int]) -> Function:
     return expressed(trace(projected, pieces.variables.state, pieces.variables.parameter_names))
 
 
+def are_apart(pieces: Pieces, sides: Sides, on: Sequence[int]) -> bool:
+    """Whether the speed through each of some surfaces is the same on both sides of every other one.
+
+    Then an orbit enters and leaves each of them as if it were the only one, as do blocks with a dry contact
+    each.
+    """
+    symbols = pieces.surfaces.symbols
+    for number in on:
+        others = [pieces.surfaces.known[other].height for other in on if other != number]
+        normals = jacobian_of(others, symbols.x) if others else []
+        for changes in pieces.changes(sides, number):
+            for normal in normals:
+                terms = (slope * change for slope, change in zip(normal, changes, strict=True) if slope != 0)
+                if sympy.Add(*terms).expand() != 0:
+                    return False
+    return True
+
+
 def may_slide(pieces: Pieces, sides: Sides) -> bool:
     """Whether an orbit may slide along all surfaces on which a cell does; False if nowhere."""
     on = [number for number, side in sides.items() if side == 0]

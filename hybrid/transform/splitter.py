@@ -108,7 +108,6 @@ class Splitter:
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
         values = self._values(t, x, parameters)
-        # A run that starts on a surface finds out by itself on which side it goes on.
         cells = [
             self._cell_at(pieces, values)
             for pieces, own in zip(self.pieces, self.original.modes, strict=True)
@@ -264,11 +263,12 @@ class Splitter:
         for choice in pieces.choices(beyond):
             sides = {**dict(cell.branches), **choice.sides}
             extra = self._on(choice.chosen)
-            if not pieces.jumps(sides, number) or not (cell.sliding or pieces.may_attract(sides, number)):
+            joined = cell.sliding and not corners.are_apart(pieces, sides, [*cell.sliding, number])
+            if not pieces.jumps(sides, number) or not (joined or pieces.may_attract(sides, number)):
                 yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra)))
                 continue
             yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra), at_start=True))
-            if cell.sliding:
+            if joined:
                 turns = True
                 continue
             at = pieces.between(sides, number)
@@ -325,15 +325,15 @@ class Splitter:
         for side, target, extra in ways:
             off = Guard(height, side, when=_all([self._condition(surface.is_off), *extra]), at_start=True)
             yield self._edge(cell, target, off)
-        only = len(cell.sliding) == 1
-        if number == cell.sliding[0]:
+        apart = corners.are_apart(pieces, sides, cell.sliding)
+        if apart or number == cell.sliding[0]:
             attracts = (
-                self._function(surface.attraction) if only else scalar(corners.attraction(pieces, sides))
+                self._function(surface.attraction) if apart else scalar(corners.attraction(pieces, sides))
             )
             at_start = Guard(attracts, -1, at_start=True)
             for guard, name in (at_start, "two-fold at start"), (Guard(attracts, -1), "two-fold"):
                 yield Edge(Transition(source, None, guard, name=f"{source}: {name}"), None)
-        if only:
+        if apart:
             reset = Reset(corners.projection(pieces, cell, [number]))
             for side, target, extra in ways:
                 speed = self._function(surface.speed_above if side > 0 else surface.speed_below)

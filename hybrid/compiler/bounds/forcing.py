@@ -54,14 +54,15 @@ def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forc
 def _saturates(node: sympy.Expr, states: tuple[sympy.Symbol, ...]) -> bool:
     """Whether an expression may change in the state where its series is flat to all digits.
 
-    ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so is ``x/sqrt(x**2 + 1e-8)``. Powers of affine
-    expressions are not: where these vanish, the field is singular.
+    ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so is ``x/sqrt(x**2 + 1e-16)``. Powers of affine
+    expressions are not: where these vanish, the field is singular. Nor are quotients of polynomials: their
+    series shows poles that are not far closer to the orbit than the tolerance.
     """
     if not mentions(node, states):
         return False
     if isinstance(node, SATURATING):
         return True
-    if node.is_Pow and not (node.exp.is_Integer and node.exp.is_positive):
+    if node.is_Pow and not node.exp.is_Integer:
         bases = node.base.args if isinstance(node.base, Maximum | Absolute) else (node.base,)
         degrees = [degree_of(base, frozenset(states)) for base in bases]
         if any(degree is None or degree > 1 for degree in degrees):
