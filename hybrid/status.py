@@ -32,6 +32,7 @@ class StatusCode(IntEnum):
     DISCONTINUOUS_FIELD = 103
     INTERRUPTED = 104
     INDISTINCT_TANGENTS = 105
+    FAILED = 106
 
 
 @attrs.frozen

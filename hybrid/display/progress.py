@@ -1,7 +1,9 @@
-"""Progress of long computations, shown only on request."""
+"""Progress of long computations."""
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -19,13 +21,31 @@ class _Silent:
         pass
 
 
+# Seconds before a bar appears that nobody has asked for.
+PATIENCE = 2.0
+
+
 @contextmanager
-def progress_bar(total: int, title: str, shown: bool, unit: str = "interval") -> Iterator[Progress]:
-    """A progress bar on standard error, or a silent stand-in if not ``shown``."""
-    if not shown:
+def progress_bar(
+    total: int, title: str, shown: bool | None, unit: str = "interval", done: int = 0
+) -> Iterator[Progress]:
+    """A progress bar with the time left, on standard error or in a notebook; a silent stand-in if False.
+
+    With None a bar appears in a terminal or a notebook after two seconds. ``done`` units are done already.
+    """
+    if shown is False or (shown is None and not _is_watched()):
         yield _Silent()
         return
-    from tqdm import tqdm
+    with warnings.catch_warnings():
+        # Without ipywidgets a notebook gets the bar of a terminal.
+        warnings.simplefilter("ignore")
+        from tqdm.auto import tqdm
 
-    with tqdm(total=total, desc=title, unit=unit, leave=False) as bar:
+    delay = PATIENCE if shown is None else 0.0
+    with tqdm(total=total, initial=done, desc=title, unit=unit, leave=False, delay=delay) as bar:
         yield bar
+
+
+def _is_watched() -> bool:
+    """Whether standard error is a terminal, or the program a notebook."""
+    return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())

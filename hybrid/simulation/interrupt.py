@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -29,12 +30,27 @@ class Stop(Protocol):
     def __exit__(self, *failure: object) -> None: ...
 
 
+# The stop of a thread, if it works for a sweep.
+_OF_THREAD = threading.local()
+
+
+@contextmanager
+def stopped_by(stop: threading.Event) -> Iterator[None]:
+    """Let the runs in this thread end early when ``stop`` is set, as if Ctrl-C had been pressed there."""
+    before = getattr(_OF_THREAD, "stop", None)
+    _OF_THREAD.stop = stop
+    try:
+        yield
+    finally:
+        _OF_THREAD.stop = before
+
+
 class CtrlC:
     """Ctrl-C while the main thread is inside ``with``: asked for between bursts, not raised anywhere.
 
     The question may be nested; whoever is outermost decides how long an interrupt holds. A second Ctrl-C is
     raised at once, and so is one that nobody has asked for. Elsewhere, and where the program has a handler
-    of its own, Ctrl-C stays as it is.
+    of its own, Ctrl-C stays as it is. A thread inside :func:`stopped_by` is asked for its own stop.
     """
 
     def __init__(self) -> None:
@@ -46,7 +62,8 @@ class CtrlC:
         if self.heard and _in_main_thread():
             self.noticed = True
             return True
-        return False
+        stop = getattr(_OF_THREAD, "stop", None)
+        return stop is not None and stop.is_set()
 
     def __enter__(self) -> None:
         if _in_main_thread():
