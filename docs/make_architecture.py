@@ -27,6 +27,7 @@ PATHS = {
         "hybrid.plot",
         "hybrid.orbits",
         "hybrid.accuracy",
+        "hybrid.sweep",
     ),
     "compile": ("hybrid.system", "hybrid.symbolic", "hybrid.transform", "hybrid.compiler"),
     "run": ("hybrid.simulation", "hybrid.kernels", "hybrid.solvers"),

@@ -16,6 +16,8 @@ from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Solver, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.store import open
+from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.filippov import filippov
@@ -52,12 +54,14 @@ __all__ = [
     "filippov",
     "from_equations",
     "global_error",
+    "open",
     "periodic_orbit",
     "poincare_section",
     "saltation_matrix",
     "simulate",
     "split",
     "stroboscopic_section",
+    "sweep",
     "work_precision",
 ]
 

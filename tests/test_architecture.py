@@ -41,6 +41,7 @@ ROOMS = (
     "hybrid.orbits",
     "hybrid.plot",
     "hybrid.accuracy",
+    "hybrid.sweep",
     "hybrid.testing",
     "hybrid.__main__",
     "hybrid",
@@ -51,7 +52,7 @@ KERNEL_ROOMS = tuple(
     f"hybrid.kernels.{name}"
     for name in ("types", "arithmetic", "events", "steps", "jumps", "evaluate", "drive")
 )
-HEAVY = ("matplotlib", "networkx", "numba", "scipy", "sympy")
+HEAVY = ("matplotlib", "networkx", "numba", "pandas", "scipy", "sympy", "xarray")
 MAX_LINES = 500
 
 

@@ -1,0 +1,345 @@
+"""A sweep on disk: results are written as they are made, and a later call takes the sweep up again.
+
+A store is a folder. Inside, ``.sweep/parts`` holds one file per part, which is complete when it gets its name
+and is never changed afterwards; ``.sweep/made_by.json`` says what made the results. So a process that is
+killed leaves a store without the part in hand, and several processes may write into one store. When a call
+ends, the dataset is also laid out as a zarr group in the same folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import uuid
+import warnings
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.errors import ArgumentError, HybridError
+from hybrid.sweep.extra import needed
+from hybrid.sweep.outcome import UNFINISHED, Part
+from hybrid.sweep.parts import DamagedError, read_part, written
+from hybrid.sweep.points import RESERVED, Points, as_points
+from hybrid.sweep.sheet import Labels, Sheet
+
+if TYPE_CHECKING:
+    import xarray
+
+INSIDE, PARTS, MADE_BY, LATEST = ".sweep", "parts", "made_by.json", "latest.json"
+SUFFIX = ".part"
+# The file that makes a folder a zarr group.
+GROUP = "zarr.json"
+
+
+class Store:
+    """The results of a sweep on disk.
+
+    Parameters
+    ----------
+    path
+        The folder, which is made if it does not exist.
+    facts
+        What decides the results, by name.
+    points, along
+        The points of this call, and the axis along which they depend on one another, if any.
+    """
+
+    def __init__(self, path: Any, facts: Mapping[str, str], points: Points, along: str | None) -> None:
+        needed("zarr", "store=")
+        self.path = as_path(path)
+        self.facts = {**facts, "names in over": ", ".join(sorted(points.names))}
+        self.points = points
+        self.along = along
+        self.keys = points.keys(None if along is None else points.lines(along))
+        self.seen: set[str] = set()
+        # Whether the zarr group, if there is one, belongs to another call.
+        self.is_new = True
+
+    def begin(self, sheet: Sheet, date: str, labels: Labels, made_by: Mapping[str, Any]) -> str:
+        """Make the store, or compare it with this call, and read what is there; the date of its making."""
+        folder = self.path / INSIDE
+        if not folder.exists() and self.path.exists() and any(self.path.iterdir()):
+            raise ArgumentError(
+                f"store: the folder {str(self.path)!r} is not empty, and is not the store of a sweep. "
+                "Name a new folder."
+            )
+        try:
+            (folder / PARTS).mkdir(parents=True, exist_ok=True)
+            created = {"facts": self.facts, "date": date}
+            if not (folder / MADE_BY).exists():
+                _write_new(folder / MADE_BY, json.dumps(created, indent=1).encode())
+            known = json.loads((folder / MADE_BY).read_text(encoding="utf-8"))
+        except OSError as failure:
+            raise _unwritable(self.path, failure) from failure
+        self._compare(known["facts"])
+        self.read_into(sheet)
+        latest = {
+            "over": {**_listed(self.points), "along": self.along},
+            "labels": {
+                "dims": {name: list(dims) for name, dims in labels.dims.items()},
+                "coords": {
+                    name: [list(dims), np.asarray(values).tolist()]
+                    for name, (dims, values) in labels.coords.items()
+                },
+                "attrs": {name: dict(each) for name, each in labels.attrs.items()},
+            },
+            "made_by": {**made_by, "date": known["date"]},
+        }
+        self.is_new = _text(latest) != _read(folder / LATEST)
+        if self.is_new or sheet.untouched().any():
+            try:
+                # From here on the zarr group, if there is one, is older than the store.
+                (self.path / GROUP).unlink(missing_ok=True)
+                _replace(folder / LATEST, _text(latest).encode())
+            except OSError as failure:
+                raise _unwritable(self.path, failure) from failure
+        return str(known["date"])
+
+    def _compare(self, known: Mapping[str, str]) -> None:
+        names = [*known, *(name for name in self.facts if name not in known)]
+        differences = [
+            f"{name} was {arguments.shown(known.get(name, '(none)'))}, "
+            f"and is now {arguments.shown(self.facts.get(name, '(none)'))}"
+            for name in names
+            if known.get(name) != self.facts.get(name)
+        ]
+        if differences:
+            raise ArgumentError(
+                f"store: {str(self.path)!r} was made by another call: {'; '.join(differences)}. "
+                "Name another store, or repeat the call that made this one."
+            )
+
+    def read_into(self, sheet: Sheet) -> None:
+        """Put the results that other calls and processes have written so far into the sheet."""
+        rows_of: dict[bytes, list[int]] = {}
+        for row, key in enumerate(self.keys):
+            rows_of.setdefault(key, []).append(row)
+        for path in sorted((self.path / INSIDE / PARTS).glob(f"*{SUFFIX}")):
+            if path.name in self.seen:
+                continue
+            self.seen.add(path.name)
+            try:
+                keys, part = read_part(path)
+            except DamagedError as failure:
+                raise HybridError(
+                    f"store: the file {str(path)!r} is damaged: {failure}. Delete this file and call again: "
+                    "its points are then computed again."
+                ) from None
+            found = [(row, place) for place, key in enumerate(keys) for row in rows_of.get(key, ())]
+            if found:
+                rows, places = np.array(found, dtype=np.int64).T
+                sheet.put(part.at(rows, places))
+
+    def write(self, part: Part) -> None:
+        """Write the finished points of a part, all or nothing."""
+        done = np.flatnonzero(~np.isin(part.codes, UNFINISHED))
+        if not done.size:
+            return
+        kept = part.at(part.rows[done], done)
+        name = f"{uuid.uuid4().hex}{SUFFIX}"
+        try:
+            _replace(
+                self.path / INSIDE / PARTS / name,
+                written(kept, [self.keys[row] for row in kept.rows.tolist()]),
+            )
+        except OSError as failure:
+            raise _unwritable(self.path, failure) from failure
+        self.seen.add(name)
+
+    def finish(self, found: xarray.Dataset, changed: bool) -> None:
+        """Lay the dataset out as a zarr group, unless it is there already."""
+        if not changed and not self.is_new and (self.path / GROUP).exists():
+            return
+        try:
+            with _Lock(self.path / INSIDE / "lock"):
+                _lay_out(found, self.path)
+        except OSError as failure:
+            raise _unwritable(self.path, failure) from failure
+
+
+def open(path: str | os.PathLike[str]) -> xarray.Dataset:
+    """What a sweep saved in a store, also while the sweep runs or after it was killed.
+
+    Parameters
+    ----------
+    path
+        Folder of the store; or a file that ``to_netcdf`` has written.
+
+    Returns
+    -------
+    xarray.Dataset
+        The results of the last call with this store. Points that are not computed have the status
+        ``NOT_RUN``.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no store.
+    """
+    import xarray
+
+    where = as_path(path)
+    if where.is_file():
+        return xarray.open_dataset(where)
+    if (where / GROUP).exists():
+        needed("zarr", "open")
+        # A later call with another grid first removes the file that makes the folder a group.
+        before, found = _read(where / GROUP), None
+        with suppress(FileNotFoundError, KeyError, ValueError):
+            found = xarray.open_zarr(where, chunks=None).load()
+        if found is not None and before and before == _read(where / GROUP):
+            return found[[name for name in found.data_vars if name not in RESERVED] + list(RESERVED)]
+    latest = _read(where / INSIDE / LATEST)
+    if not latest:
+        raise ArgumentError(f"path must be the store of a sweep or a file; got {str(where)!r}.")
+    stored = json.loads(latest)
+    points = as_listed(stored["over"])
+    sheet = Sheet(points)
+    facts = json.loads((where / INSIDE / MADE_BY).read_text(encoding="utf-8"))["facts"]
+    Store(where, facts, points, stored["over"]["along"]).read_into(sheet)
+    return sheet.dataset(Labels.read(json.dumps(stored["labels"])), stored["made_by"])
+
+
+def as_path(path: object) -> Path:
+    """A path, or an ArgumentError."""
+    if not isinstance(path, str | os.PathLike) or not str(path):
+        raise arguments.refusal("store", "be the path of a folder", path)
+    return Path(os.fspath(path))
+
+
+def _listed(points: Points) -> dict[str, Any]:
+    """Points as JSON; numbers keep all their digits."""
+    return {
+        "dims": list(points.dims),
+        "names": list(points.names),
+        "shape": list(points.shape),
+        "coords": {
+            name: [dim, values.tolist(), units] for name, (dim, values, units) in points.coords.items()
+        },
+    }
+
+
+def as_listed(stored: Mapping[str, Any]) -> Points:
+    """The points that :func:`_listed` has written."""
+    coords = {name: (dim, np.array(values), units) for name, (dim, values, units) in stored["coords"].items()}
+    if stored["names"] == stored["dims"]:
+        points = as_points({name: values for name, (_, values, _) in coords.items()})
+    else:
+        points = as_points(
+            [
+                dict(zip(stored["names"], row, strict=True))
+                for row in zip(*(coords[name][1].tolist() for name in stored["names"]), strict=True)
+            ]
+        )
+    return Points(points.names, points.values, tuple(stored["dims"]), tuple(stored["shape"]), coords)
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, default=str)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return ""
+
+
+def _temporary(path: Path) -> Path:
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file that is complete whenever it can be seen, also after a loss of power."""
+    part = _temporary(path)
+    try:
+        _write(part, content)
+        os.replace(part, path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
+    _flush_folder(path.parent)
+
+
+def _write_new(path: Path, content: bytes) -> None:
+    """Write a complete file, unless another process was first."""
+    part = _temporary(path)
+    try:
+        _write(part, content)
+        with suppress(FileExistsError):
+            os.link(part, path)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+    _flush_folder(path.parent)
+
+
+def _write(path: Path, content: bytes) -> None:
+    with path.open("xb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _flush_folder(folder: Path) -> None:
+    # Windows cannot open folders.
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _unwritable(path: Path, failure: OSError) -> HybridError:
+    return HybridError(
+        f"store: {str(path)!r} cannot be written: {failure}. All parts that were complete before are kept. "
+        "Mend the cause, and call again: only what is missing is computed."
+    )
+
+
+def _lay_out(found: xarray.Dataset, path: Path) -> None:
+    """Write a dataset as a zarr group; the file that makes the folder a group comes last."""
+    for left in path.glob(".new-*"):
+        shutil.rmtree(left, ignore_errors=True)
+    new = path / f".new-{uuid.uuid4().hex}"
+    try:
+        with warnings.catch_warnings():
+            # Texts and consolidated metadata are extensions of zarr's format 3.
+            warnings.simplefilter("ignore")
+            found.to_zarr(new, zarr_format=3, consolidated=True)
+        (path / GROUP).unlink(missing_ok=True)
+        for old in path.iterdir():
+            if not old.name.startswith("."):
+                shutil.rmtree(old)
+        for each in new.iterdir():
+            if each.name != GROUP:
+                os.replace(each, path / each.name)
+        os.replace(new / GROUP, path / GROUP)
+        _flush_folder(path)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)
+
+
+class _Lock:
+    """Held by one process at a time; the system gives it back when the process ends, however that ends."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __enter__(self) -> None:
+        self.file = self.path.open("ab")
+        with suppress(ImportError, OSError):
+            import fcntl
+
+            fcntl.flock(self.file, fcntl.LOCK_EX)
+
+    def __exit__(self, *failure: object) -> None:
+        self.file.close()
