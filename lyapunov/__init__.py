@@ -1,14 +1,13 @@
 """Lyapunov and Floquet exponents of hybrid systems."""
 
 from lyapunov import plot
-from lyapunov.chart import Chart, chart
+from lyapunov.chart import chart
 from lyapunov.compare import ModelComparison, compare_models
 from lyapunov.floquet import floquet_exponents
 from lyapunov.spectrum import LyapunovSpectrum, lyapunov_spectrum
 from lyapunov.two_orbit import TwoOrbitExponents, two_orbit_exponents
 
 __all__ = [
-    "Chart",
     "LyapunovSpectrum",
     "ModelComparison",
     "TwoOrbitExponents",

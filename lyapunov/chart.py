@@ -1,86 +1,46 @@
-"""Lyapunov exponents over one or two parameters, on all cores."""
+"""Lyapunov exponents over parameters and starts, as a labelled dataset."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections import Counter
-from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from queue import SimpleQueue
-from typing import Any, Literal
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridError, HybridSystem, Status, StatusCode, arguments, compile_system
+from hybrid import HybridSystem, arguments, sweep
 from hybrid.compiler.cache.loader import load_kernels
-from hybrid.display.progress import progress_bar
+from hybrid.display.progress import silent
+from hybrid.errors import HybridError
 from hybrid.kernels.types import codes
-from hybrid.orbits.sections import strobe
-from hybrid.simulation.interrupt import Told
-from hybrid.simulation.plan import check_solver, plan_of
-from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
-from hybrid.system.graph import as_system
+from hybrid.sweep.rows import At, Place, Rows, rows_of
+from hybrid.sweep.sheet import Labels
 from hybrid.system.growth import growing
-from lyapunov.spectrum import Estimate, first_vectors, interval_length
+from lyapunov.spectrum import Estimate, LyapunovSpectrum, first_vectors, interval_length
 
-UNTOUCHED = Status(
-    StatusCode.NOT_RUN, "The chart was interrupted before this row was complete.", "Compute this row again."
-)
+if TYPE_CHECKING:
+    import xarray
 
-
-@attrs.frozen(eq=False, repr=False)
-class Chart:
-    """Lyapunov exponents over a grid of parameter values; rows that were not run hold nan.
-
-    Attributes
-    ----------
-    system
-        The model.
-    over
-        Maps one or two parameter names to their values, the axes of the grid.
-    exponents, standard_error
-        ``(*grid, k)``, as in :class:`lyapunov.LyapunovSpectrum`.
-    sum_rule, jumps_per_interval
-        ``grid``, as in :class:`lyapunov.LyapunovSpectrum`.
-    x, mode
-        ``(*grid, n)`` and ``grid``: state and name of the mode at the end of each row's spectrum.
-    section
-        ``(*grid, points, n)``: states once per forcing period after ``x``, for a bifurcation diagram.
-    status
-        ``grid`` of :class:`hybrid.Status`.
-    """
-
-    system: HybridSystem
-    over: dict[str, np.ndarray]
-    exponents: np.ndarray
-    standard_error: np.ndarray
-    sum_rule: np.ndarray
-    jumps_per_interval: np.ndarray
-    x: np.ndarray
-    mode: np.ndarray
-    section: np.ndarray
-    status: np.ndarray
-
-    @property
-    def ok(self) -> np.ndarray:
-        """Whether each row is complete and valid: a ``grid`` of booleans."""
-        return np.vectorize(lambda status: status.ok, otypes=[bool])(self.status)
-
-    def __repr__(self) -> str:
-        counts = Counter(status.code.name for status in self.status.flat)
-        ends = ", ".join(f"{count} {name}" for name, count in counts.most_common())
-        return f"<Chart over {' and '.join(self.over)}, {self.status.size} rows: {ends}>"
+DIMS = {
+    "exponents": ("exponent",),
+    "standard_error": ("exponent",),
+    "x_end": ("state",),
+    "section": ("sample", "state"),
+}
+RESULTS = ("exponents", "standard_error", "sum_rule", "jumps_per_interval", "x_end", "mode_end", "section")
 
 
 @growing
 def chart(
     system: HybridSystem,
-    over: Mapping[str, ArrayLike],
-    x0: ArrayLike,
+    over: Any,
+    x0: ArrayLike | Mapping[str, float],
     *,
     mode: str | None = None,
     parameters: Mapping[str, float] | None = None,
@@ -91,24 +51,27 @@ def chart(
     t0: float = 0.0,
     solver: Solver | None = None,
     section: int = 0,
-    continue_from: Literal["previous"] | None = None,
-    threads: int | None = None,
-    progress: bool = False,
-) -> Chart:
-    """Lyapunov exponents at every point of a grid of parameter values, computed in threads.
+    at: At = None,
+    continue_from: str | None = None,
+    store: str | PathLike[str] | None = None,
+    executor: Any = None,
+    progress: bool | None = None,
+) -> xarray.Dataset:
+    """Lyapunov exponents at every point of a grid of parameters and starts, by :func:`hybrid.sweep`.
 
-    The result is the same to the last bit for any number of threads. Ctrl-C ends the chart, not the program:
-    completed rows are returned, and the others have the status ``NOT_RUN``.
+    The result is the same to the last bit for any executor. Ctrl-C ends the chart, not the program: completed
+    rows are returned, and the others have the status ``NOT_RUN``.
 
     Parameters
     ----------
     system
         The model.
     over
-        ``{"omega": values}`` for a line, ``{"omega": values, "e": values}`` for a grid; the last parameter
-        varies fastest.
+        ``{"omega": values, "e": values}`` for a grid of any number of axes, of which the last varies fastest;
+        or a table of points, as for :func:`hybrid.sweep`. A name is that of a parameter, or of a component
+        of the state: the row then starts there.
     x0, mode, t0
-        Start of each row, as for :func:`hybrid.simulate`.
+        Start of each row, as for :func:`hybrid.simulate`. By name, components in ``over`` may be left out.
     parameters
         Values of the other parameters.
     k
@@ -116,20 +79,26 @@ def chart(
     intervals, interval, transient, solver
         As for :func:`lyapunov.lyapunov_spectrum`.
     section
-        Number of points of the stroboscopic section to keep per row, for a bifurcation diagram.
+        Number of points of the section to keep per row, for a bifurcation diagram.
+    at
+        Where the section is taken: by default once per forcing period; ``Guard(...)`` at each crossing of its
+        surface; ``"jumps"`` at each jump, with the state before it.
     continue_from
-        ``"previous"`` follows the attractor along the last axis: the first row starts from ``x0``, each other
-        row from the end of the previous row's transient. A row starts from ``x0`` if it cannot start there or
-        if the previous transient failed. The attractor is followed without tangent vectors ahead of the rows,
-        so that rows still run in parallel; this costs a second transient per row.
-    threads
-        Number of threads; by default the number of cores available to the process.
-    progress
-        Whether to show a progress bar.
+        Name of an axis along which the attractor is followed, or ``"previous"`` for the last axis. The first
+        row starts from ``x0``, each other row from the end of the transient of the row before. A row starts
+        from ``x0`` if it cannot start there or if the transient before failed. The attractor is followed
+        without tangent vectors ahead of the rows, so that rows still run in parallel; this costs a second
+        transient per row.
+    store, executor, progress
+        As for :func:`hybrid.sweep`.
 
     Returns
     -------
-    Chart
+    xarray.Dataset
+        Over the axes of ``over``: ``exponents`` and ``standard_error`` with the axis ``exponent``,
+        ``sum_rule``, ``jumps_per_interval``, the state ``x_end`` (axis ``state``) and mode ``mode_end`` at
+        the end of each row's spectrum, ``section`` (axes ``sample`` and ``state``), ``status`` and
+        ``message``. Rows that were not run hold nan.
 
     Raises
     ------
@@ -141,259 +110,122 @@ def chart(
     --------
     >>> import models
     >>> damping = chart(models.impact_oscillator(), {"c": [0.1, 0.2, 0.4]}, (0.0, 0.0), intervals=200)
-    >>> damping
-    <Chart over c, 3 rows: 3 SUCCESS>
-    >>> bool((damping.exponents[:, 0] < 0).all())
+    >>> dict(damping.exponents.sizes)
+    {'c': 3, 'exponent': 1}
+    >>> bool((damping.exponents.sel(exponent=1) < 0).all())
     True
     """
-    as_system("system", system)
-    axes = _axes(system, over, parameters)
-    vectors = first_vectors(system, k)
-    intervals = arguments.count("intervals", intervals, 1)
-    continue_from = arguments.one_of("continue_from", continue_from, (None, "previous"))
-    transient = arguments.count("transient", transient, 1 if continue_from else 0)
     section = arguments.count("section", section, 0)
-    if interval is not None:
-        interval = arguments.positive("interval", interval, "be a positive time")
-    t0 = arguments.number("t0", t0)
-    threads = None if threads is None else arguments.count("threads", threads, 1)
-    progress = arguments.flag("progress", progress)
-    if section and system.period is None:
-        raise ArgumentError(
-            "section= takes one point per forcing period, but the system declares no period. Give "
-            "HybridSystem period=, or omit section=."
-        )
-    if mode is not None:
-        system.mode_index(mode)
-    work = _Rows(
-        system=system,
-        x0=system.variables.state_values("x0", x0),
+    rows = rows_of(
+        system,
+        over,
+        x0,
         mode=mode,
+        parameters=parameters,
         t0=t0,
-        parameters=arguments.mapping("parameters", parameters),
-        vectors=vectors,
-        intervals=intervals,
-        interval=interval,
-        transient=transient,
-        solver=check_solver(solver),
+        solver=solver,
+        points=section,
+        at=at,
+        continue_from=continue_from,
+        results=(*RESULTS, "exponent", "sample", "state"),
+    )
+    task = Exponents(
+        rows,
+        k=first_vectors(system, k).shape[1],
+        intervals=arguments.count("intervals", intervals, 1),
+        interval=None if interval is None else arguments.positive("interval", interval, "be a positive time"),
+        transient=arguments.count("transient", transient, 1 if rows.along else 0),
         points=section,
     )
-    work.load()
-    sheet = _Sheet(axes, vectors.shape, section)
-    sweep = _Sweep(work, sheet, bool(continue_from))
-    with progress_bar(len(sheet.status), "Chart", progress, "row") as bar:
-        sweep.run(threads or _cores(), bar.update)
-    return sheet.chart(system)
-
-
-def _axes(
-    system: HybridSystem, over: Mapping[str, ArrayLike], parameters: Mapping[str, float] | None
-) -> dict[str, np.ndarray]:
-    wanted = "map one or two parameter names to values"
-    given = arguments.mapping("over", over, wanted)
-    if not 1 <= len(given) <= 2:
-        raise arguments.refusal("over", wanted, over)
-    others = arguments.mapping("parameters", parameters)
-    numbers = "be a list of finite numbers, one or more"
-    axes = {}
-    for name, each in given.items():
-        arguments.known("over: Parameter", name, system.parameters, "Parameters")
-        axes[name] = values = arguments.numbers(f"over[{name!r}]", each, numbers)
-        if values.ndim != 1 or values.size == 0:
-            raise ArgumentError(f"over[{name!r}] must {numbers}; got shape {values.shape}.")
-        if not np.isfinite(values).all():
-            raise arguments.refusal(f"over[{name!r}]", numbers, each)
-        if name in others:
-            raise ArgumentError(f"over: Parameter {name!r} is given twice: in over and in parameters.")
-    system.parameter_values(others)
-    return axes
-
-
-def _cores() -> int:
-    """Number of cores available to this process."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return sweep(task, over, store=store, executor=executor, progress=progress)
 
 
 @attrs.frozen(eq=False)
-class _Rows:
-    """Data common to all rows, and the computation of a row."""
+class Exponents:
+    """The task of a chart: the exponents, and the section after them, at one point."""
 
-    system: HybridSystem
-    x0: np.ndarray
-    mode: str | None
-    t0: float
-    parameters: dict[str, float]
-    vectors: np.ndarray
+    rows: Rows
+    k: int
     intervals: int
     interval: float | None
     transient: int
-    solver: Solver
     points: int
-    stop: Told = attrs.field(factory=Told)
 
-    def load(self) -> None:
-        """Load all kernels that rows need, so that threads do not load them at the same time."""
-        load_kernels("lyapunov.kernels")
-        load_kernels("hybrid.kernels.events.sections")
-        plan_of(compile_system(self.system), self.solver, self.vectors.shape[1])
-
-    def start(
-        self, values: Mapping[str, float], state: np.ndarray, mode: str | None, vectors: np.ndarray | None
-    ) -> tuple[Trajectory, float]:
-        """A trajectory at its start, and the length of an interval."""
-        trajectory = start(
-            self.system,
-            state,
-            self.t0,
-            mode=mode,
-            parameters={**self.parameters, **values},
-            solver=self.solver,
-            tangent=vectors,
-            stop=self.stop,
+    def __call__(self, point: Mapping[str, float], place: Place | None = None) -> dict[str, Any]:
+        """The results of one row."""
+        rows = self.rows
+        trajectory = rows.begin(point, place, self._vectors, rows.system)
+        spectrum = Estimate(trajectory, self._length(trajectory)).run(
+            self.transient, self.intervals, False, silent()
         )
-        return trajectory, interval_length(trajectory, self.interval, self.transient + self.intervals)
+        return {
+            "exponents": spectrum.exponents,
+            "standard_error": spectrum.standard_error,
+            "sum_rule": spectrum.sum_rule,
+            "jumps_per_interval": spectrum.jumps_per_interval,
+            "x_end": spectrum.x,
+            "mode_end": spectrum.mode,
+            "section": self._section(point, trajectory, spectrum),
+            "status": spectrum.status,
+        }
 
-    def carried(
-        self, values: Mapping[str, float], state: np.ndarray, mode: str | None
-    ) -> tuple[np.ndarray, str | None]:
+    def carry(self, point: Mapping[str, float], place: Place | None) -> Place | None:
         """State and mode after the transient, rounded up to whole forcing periods to keep the phase."""
-        try:
-            trajectory, length = self.start(values, state, mode, None)
-        except HybridError:
-            trajectory, length = self.start(values, self.x0, self.mode, None)
+        trajectory = self.rows.begin(point, place, None, self.rows.system)
+        span = self.transient * self._length(trajectory)
         period, clock = trajectory.model.period, trajectory.run
-        span = self.transient * length
         cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
         phase = clock.phase + (0.0 if period else span)
         code = trajectory.advance_to(int(clock.cycle) + cycles, float(phase), trajectory.no_record())
-        if code != codes.DONE:
-            return self.x0, self.mode
-        # With a single mode pass on the caller's mode: None makes the start check that it allows the state.
-        return trajectory.x, self.mode if len(self.system.modes) == 1 else trajectory.mode
+        return self.rows.end_of(trajectory) if code == codes.DONE else None
 
+    def prepare(self) -> None:
+        """Load what the rows need."""
+        load_kernels("lyapunov.kernels")
+        self.rows.prepare(self.k)
 
-class _Sheet:
-    """Results of all rows, stored as rows finish, in any order."""
+    @property
+    def along(self) -> str | None:
+        """The axis along which the attractor is followed."""
+        return self.rows.along
 
-    def __init__(self, axes: dict[str, np.ndarray], shape: tuple[int, ...], points: int) -> None:
-        self.axes = axes
-        self.grid = tuple(len(values) for values in axes.values())
-        rows, (n, k) = math.prod(self.grid), shape
-        self.numbers = np.full((rows, 2 * k + 2), np.nan)
-        self.x = np.full((rows, n), np.nan)
-        self.section = np.full((rows, points, n), np.nan)
-        self.mode = [""] * rows
-        self.status = [UNTOUCHED] * rows
+    @property
+    def system(self) -> HybridSystem:
+        """The model."""
+        return self.rows.system
 
-    def values(self, row: int) -> dict[str, float]:
-        """The parameter values of a row."""
-        place = np.unravel_index(row, self.grid)
-        return {name: float(axis[i]) for (name, axis), i in zip(self.axes.items(), place, strict=True)}
-
-    def fill(self, row: int, trajectory: Trajectory, spectrum: Any, points: int) -> None:
-        """Store a spectrum and the section points that its trajectory reaches, at most ``points``."""
-        states = np.empty((0, len(spectrum.x)))
-        if points and spectrum.status.ok:
-            states, _, code = strobe(trajectory, points)
-            if code == StatusCode.INTERRUPTED:
-                return
-        self.section[row, : len(states)] = states
-        self.numbers[row] = np.concatenate(
-            [
-                spectrum.exponents,
-                spectrum.standard_error,
-                [spectrum.sum_rule, spectrum.jumps_per_interval],
-            ]
-        )
-        self.x[row], self.mode[row] = spectrum.x, spectrum.mode
-        self.status[row] = spectrum.status
-
-    def chart(self, system: HybridSystem) -> Chart:
-        """All rows in the shape of the grid."""
-        k = self.numbers.shape[1] // 2 - 1
-        exponents, errors, rest = np.split(self.numbers.reshape(*self.grid, -1), (k, 2 * k), axis=-1)
-        status = np.empty(len(self.status), dtype=object)
-        status[:] = self.status
-        return Chart(
-            system=system,
-            over=self.axes,
-            exponents=exponents,
-            standard_error=errors,
-            sum_rule=rest[..., 0],
-            jumps_per_interval=rest[..., 1],
-            x=self.x.reshape(*self.grid, -1),
-            mode=np.array(self.mode).reshape(self.grid),
-            section=self.section.reshape(*self.grid, *self.section.shape[1:]),
-            status=status.reshape(self.grid),
+    @property
+    def labels(self) -> Labels:
+        """Names of the inner axes."""
+        labels = self.rows.labels(DIMS)
+        return attrs.evolve(
+            labels, coords={**labels.coords, "exponent": (("exponent",), list(range(1, self.k + 1)))}
         )
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What decides the results."""
+        names = ("k", "intervals", "interval", "transient")
+        return {**self.rows.facts(), **{name: getattr(self, name) for name in names}, "section": self.points}
 
-class _StoppedError(Exception):
-    """The row was not computed because the chart was interrupted."""
+    @cached_property
+    def _vectors(self) -> np.ndarray:
+        return first_vectors(self.rows.system, self.k)
 
+    def _length(self, trajectory: Trajectory) -> float:
+        return interval_length(trajectory, self.interval, self.transient + self.intervals)
 
-class _Sweep:
-    """Rows in a pool of threads, which run in parallel because kernels release the interpreter lock."""
-
-    def __init__(self, work: _Rows, sheet: _Sheet, chained: bool) -> None:
-        self.work = work
-        self.sheet = sheet
-        self.chained = chained
-        self.stop = work.stop
-        self.ended: SimpleQueue[BaseException | None] = SimpleQueue()
-
-    def run(self, threads: int, done: Callable[[], object]) -> None:
-        """Compute all rows, or the rows up to an interrupt."""
-        rows, origin = len(self.sheet.status), (self.work.x0, self.work.mode)
-        chain = self.sheet.grid[-1]
-        with ThreadPoolExecutor(threads) as self.pool:
+    def _section(
+        self, point: Mapping[str, float], trajectory: Trajectory, spectrum: LyapunovSpectrum
+    ) -> np.ndarray:
+        rows = self.rows
+        if not self.points or not spectrum.status.ok:
+            return np.full((self.points, rows.system.dimension), np.nan)
+        if rows.marked is not rows.system:
+            # The system with the surface goes on from here; with a period the phase is all of the time.
+            place, now = (spectrum.x, spectrum.mode), float(trajectory.run.phase)
             try:
-                for row in range(0, rows, chain if self.chained else 1):
-                    self.pool.submit(self._guarded, self._link if self.chained else self._row, row, *origin)
-                for _ in range(rows):
-                    failure = self.ended.get()
-                    if failure is not None:
-                        raise failure
-                    done()
-            except KeyboardInterrupt:
-                pass
-            finally:
-                self.stop.set()
-
-    def update(self, n: float = 1) -> None:
-        """Called by a row to report its intervals; raises to stop the row after an interrupt."""
-        if self.stop.is_set():
-            raise _StoppedError
-
-    def _guarded(self, task: Callable[..., None], row: int, state: np.ndarray, mode: str | None) -> None:
-        try:
-            self.update()
-            task(row, state, mode)
-        except _StoppedError:
-            pass
-        except HybridError as refusal:
-            self.sheet.status[row] = Status(StatusCode.NOT_RUN, f"This row could not start. {refusal}")
-            self.ended.put(None)
-        except BaseException as failure:
-            self.ended.put(failure)
-
-    def _link(self, row: int, state: np.ndarray, mode: str | None) -> None:
-        """Carry the attractor through one row; submit the next link before this row's spectrum."""
-        work = self.work
-        try:
-            state, mode = work.carried(self.sheet.values(row), state, mode)
-        except HybridError:
-            state, mode = work.x0, work.mode
-        if (row + 1) % self.sheet.grid[-1]:
-            self.pool.submit(self._guarded, self._link, row + 1, state, mode)
-        self.pool.submit(self._guarded, self._row, row, state, mode)
-
-    def _row(self, row: int, state: np.ndarray, mode: str | None) -> None:
-        work = self.work
-        trajectory, length = work.start(self.sheet.values(row), state, mode, work.vectors)
-        spectrum = Estimate(trajectory, length).run(work.transient, work.intervals, False, self)
-        self.update()
-        self.sheet.fill(row, trajectory, spectrum, work.points)
-        self.ended.put(None)
+                trajectory = rows.go_on(point, place, None, rows.marked, now)
+            except HybridError:
+                return np.full((self.points, rows.system.dimension), np.nan)
+        return rows.section(trajectory, self.points)[0]

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridArc, arguments
-from hybrid.plot import drawn
+from hybrid import ArgumentError, HybridArc, StatusCode, arguments
+from hybrid.plot import DATASETS, drawn
 from hybrid.plot.style import as_component, axes_for, check_axes, dot_area
-from lyapunov.chart import Chart
 from lyapunov.spectrum import LyapunovSpectrum
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -185,8 +185,16 @@ def axis_labels(labels: object, *names: str) -> tuple[str, str]:
     return texts[0], texts[1]
 
 
-def _as_chart(value: object) -> Chart:
-    return arguments.instance("chart", value, Chart, "Make one with lyapunov.chart.")
+def _as_chart(value: Any) -> Any:
+    """A dataset of :func:`lyapunov.chart`."""
+    if "exponents" not in getattr(value, "data_vars", ()):
+        raise arguments.refusal("chart", "be a dataset made with lyapunov.chart", value)
+    return value
+
+
+def _axes_of(chart: Any) -> tuple[str, ...]:
+    """Names of the axes of the grid."""
+    return tuple(map(str, chart.status.dims))
 
 
 def _dense(arc: HybridArc) -> np.ndarray:
@@ -238,42 +246,43 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
     return ax
 
 
-def plot_exponents(chart: Chart, *, ax: Axes | None = None) -> Axes:
-    """Exponents of a chart over one parameter, with bands of two standard errors and a line at zero.
+def plot_exponents(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Exponents of a chart over one axis, with bands of two standard errors and a line at zero.
 
     Parameters
     ----------
     chart
-        From :func:`lyapunov.chart`, over one parameter.
+        From :func:`lyapunov.chart`, over one axis; ``.sel`` takes a line of a grid.
     ax
         Axes to draw into; by default those of a new figure.
     """
     name, values = _only_axis(_as_chart(chart))
+    exponents, errors = chart.exponents.values, chart.standard_error.values
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
     ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     order = np.argsort(values)
-    for i in range(chart.exponents.shape[-1]):
-        middle, error = chart.exponents[order, i], 2 * chart.standard_error[order, i]
+    for i in range(exponents.shape[-1]):
+        middle, error = exponents[order, i], 2 * errors[order, i]
         middle = np.where(np.isfinite(middle), middle, np.nan)
         colour = COLOURS[i % len(COLOURS)]
         ax.plot(values[order], middle, color=colour, linewidth=0.9, label=f"$\\lambda_{{{i + 1}}}$")
         ax.fill_between(values[order], middle - error, middle + error, color=colour, alpha=0.25, linewidth=0)
-    _mark_failures(ax, chart)
-    ax.set_xlabel(name)
+    _mark_failures(ax, values[chart.status.values != StatusCode.SUCCESS])
+    ax.set_xlabel(_label(chart, name))
     ax.set_ylabel("Lyapunov exponents")
     ax.grid(True, axis="y")
-    if chart.exponents.shape[-1] > 1:
+    if exponents.shape[-1] > 1:
         ax.legend()
     return ax
 
 
-def plot_bifurcation(chart: Chart, component: str | None = None, *, ax: Axes | None = None) -> Axes:
+def plot_bifurcation(chart: xarray.Dataset, component: str | None = None, *, ax: Axes | None = None) -> Axes:
     """Bifurcation diagram: points of the section over the parameter.
 
     Parameters
     ----------
     chart
-        From :func:`lyapunov.chart`, over one parameter and with ``section=``.
+        From :func:`lyapunov.chart`, over one axis and with ``section=``.
     component
         Name of the state component to show; by default the first.
     ax
@@ -282,29 +291,31 @@ def plot_bifurcation(chart: Chart, component: str | None = None, *, ax: Axes | N
     Raises
     ------
     ArgumentError
-        If the chart is over two parameters or has no section.
+        If the chart is over two axes or has no section.
     """
     name, values = _only_axis(_as_chart(chart))
-    points = chart.section.shape[1]
+    points = chart.sizes.get("sample", 0)
     if points == 0:
         raise ArgumentError("chart must have section points; this one has none. Compute it with section=100.")
-    names = chart.system.state_names
-    i = 0 if component is None else as_component("component", chart.system.state_names, component)
+    names = _state_names(chart)
+    i = 0 if component is None else as_component("component", names, component)
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
-    across, up = np.repeat(values, points), chart.section[:, :, i].ravel()
+    across, up = np.repeat(values, points), chart.section.values[:, :, i].ravel()
     ax.scatter(across, up, s=dot_area(len(up)), color=COLOURS[0], linewidths=0, rasterized=True)
-    ax.set_xlabel(name)
+    ax.set_xlabel(_label(chart, name))
     ax.set_ylabel(names[i])
     return ax
 
 
-def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
-    """Map of an exponent over two parameters: red if positive, blue if negative, grey if not computed.
+def plot_map(chart: xarray.Dataset, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
+    """Map of an exponent over two axes: red if positive, blue if negative, grey if not computed.
+
+    An exponent within two standard errors of zero is drawn as zero, in white: noise does not look like chaos.
 
     Parameters
     ----------
     chart
-        From :func:`lyapunov.chart`, over two parameters.
+        From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
     exponent
         Index of the exponent, 0 for the largest.
     ax
@@ -313,24 +324,22 @@ def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes
     Raises
     ------
     ArgumentError
-        If the chart is over one parameter.
+        If the chart is not over two axes.
     """
     check_axes(ax)
-    exponent = arguments.count("exponent", exponent, 0, _as_chart(chart).exponents.shape[-1] - 1)
-    if len(chart.over) != 2:
-        raise ArgumentError(
-            "chart must be over two parameters for a map; this one is over one. Use plot_exponents."
-        )
-    (down, rows), (across, columns) = chart.over.items()
-    values = chart.exponents[..., exponent]
-    finite = np.abs(values[np.isfinite(values)])
+    exponent = arguments.count("exponent", exponent, 0, _as_chart(chart).sizes["exponent"] - 1)
+    down, across = _two_axes(chart)
+    values = chart.exponents.values[..., exponent]
+    uncertain = np.abs(values) <= 2 * chart.standard_error.values[..., exponent]
+    values = np.where(uncertain, 0.0, values)
+    finite = np.abs(values[np.isfinite(values) & ~uncertain])
     # With limits at the extremes, a few large values would leave the rest of the map pale.
     limit = float(np.quantile(finite, 0.98)) if finite.size and finite.max() > 0 else 1.0
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
     ax.set_facecolor("0.75")
     mesh = ax.pcolormesh(
-        columns,
-        rows,
+        chart[across].values,
+        chart[down].values,
         np.ma.masked_invalid(values),
         cmap="RdBu_r",
         vmin=-limit,
@@ -339,18 +348,18 @@ def plot_map(chart: Chart, exponent: int = 0, *, ax: Axes | None = None) -> Axes
         rasterized=True,
     )
     ax.figure.colorbar(mesh, ax=ax, extend="both", label=f"$\\lambda_{{{exponent + 1}}}$")
-    ax.set_xlabel(across)
-    ax.set_ylabel(down)
+    ax.set_xlabel(_label(chart, across))
+    ax.set_ylabel(_label(chart, down))
     return ax
 
 
-def plot_chart(chart: Chart, component: str | None = None) -> Figure:
+def plot_chart(chart: xarray.Dataset, component: str | None = None) -> Figure:
     """A figure of a chart: exponents below a bifurcation diagram, or a map of the largest exponent.
 
     Parameters
     ----------
     chart
-        From :func:`lyapunov.chart`. A chart over one parameter with ``section=`` also gets the bifurcation
+        From :func:`lyapunov.chart`. A chart over one axis with ``section=`` also gets the bifurcation
         diagram.
     component
         Name of the state component in the diagram; by default the first.
@@ -358,12 +367,13 @@ def plot_chart(chart: Chart, component: str | None = None) -> Figure:
     import matplotlib.pyplot as plt
 
     if component is not None:
-        as_component("component", _as_chart(chart).system.state_names, component)
-    if len(_as_chart(chart).over) == 2:
+        as_component("component", _state_names(_as_chart(chart)), component)
+    if len(_axes_of(_as_chart(chart))) > 1:
+        _two_axes(chart)
         figure, ax = plt.subplots(figsize=(5.6, 4.4), layout="constrained")
         plot_map(chart, ax=ax)
         return figure
-    if chart.section.shape[1] == 0:
+    if not chart.sizes.get("sample", 0):
         figure, ax = plt.subplots(figsize=(7.2, 3.2), layout="constrained")
         plot_exponents(chart, ax=ax)
         return figure
@@ -373,17 +383,41 @@ def plot_chart(chart: Chart, component: str | None = None) -> Figure:
     return figure
 
 
-def _only_axis(chart: Chart) -> tuple[str, np.ndarray]:
-    if len(chart.over) != 1:
+def _state_names(chart: xarray.Dataset) -> tuple[str, ...]:
+    return tuple(map(str, chart.state.values))
+
+
+def _label(chart: xarray.Dataset, name: str) -> str:
+    """Name of an axis, with its unit if that is known."""
+    unit = chart[name].attrs.get("units", "")
+    return f"{name} ({unit})" if unit else name
+
+
+def _only_axis(chart: xarray.Dataset) -> tuple[str, np.ndarray]:
+    names = _axes_of(chart)
+    if len(names) != 1:
         raise ArgumentError(
-            f"chart must be over one parameter; this one is over {' and '.join(chart.over)}. Use plot_map."
+            f"chart must be over one parameter; this one is over {' and '.join(names) or 'none'}. Use "
+            "plot_map, or take a line with chart.sel."
         )
-    return next(iter(chart.over.items()))
+    (name,) = names
+    if name not in chart.coords:
+        raise ArgumentError("chart must be over one parameter; this one is over a table of points.")
+    return name, chart[name].values
 
 
-def _mark_failures(ax: Axes, chart: Chart) -> None:
+def _two_axes(chart: xarray.Dataset) -> tuple[str, str]:
+    names = _axes_of(chart)
+    if len(names) != 2:
+        raise ArgumentError(
+            f"chart must be over two parameters for a map; this one is over {' and '.join(names) or 'none'}. "
+            "Use plot_exponents for one, and take a plane of more with chart.sel."
+        )
+    return names[0], names[1]
+
+
+def _mark_failures(ax: Axes, bad: np.ndarray) -> None:
     """Ticks at the bottom of the axes for the rows whose status is not ok."""
-    bad = next(iter(chart.over.values()))[~chart.ok]
     if len(bad):
         ax.plot(
             bad,
@@ -398,4 +432,4 @@ def _mark_failures(ax: Axes, chart: Chart) -> None:
 
 
 drawn.register(LyapunovSpectrum, plot_spectrum)
-drawn.register(Chart, plot_chart)
+DATASETS["exponents"] = plot_chart

@@ -21,6 +21,11 @@ class _Silent:
         pass
 
 
+def silent() -> Progress:
+    """A receiver that shows nothing."""
+    return _Silent()
+
+
 # Seconds before a bar appears that nobody has asked for.
 PATIENCE = 2.0
 

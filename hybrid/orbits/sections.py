@@ -233,36 +233,8 @@ def poincare_section(
 
 
 def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, bar: Any) -> Section:
-    model = trajectory.model
-    record = empty_record(model.dimension, 0, 0, POINTS_AT_ONCE)
-    rows: list[tuple[np.ndarray, ...]] = []
-    found, jumps, steps_at_point, status = 0, 0, 0, None
-    while found < transient + points:
-        limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
-        code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
-        used = record.jumps
-        cycle, transition = record.jump_cycle[:used], record.jump_transition[:used]
-        marked = transition < markers
-        counts = jumps + np.cumsum(~marked)
-        rows.append(
-            (
-                (cycle * model.period + record.jump_phase[:used])[marked],
-                record.jump_states[:used, 0][marked],
-                transition[marked],
-                counts[marked],
-            )
-        )
-        jumps = int(counts[-1]) if used else jumps
-        found += int(marked.sum())
-        if marked.any():
-            steps_at_point = int(trajectory.run.steps)
-        bar.update(int(marked.sum()))
-        record.used[:] = 0
-        if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):
-            status = status_of(trajectory, code)
-            break
-    t, x, index, count = (np.concatenate(column)[: transient + points] for column in zip(*rows, strict=True))
-    steps = np.diff(count, prepend=0)
+    counted = np.arange(len(trajectory.system.transitions)) < markers
+    t, x, index, count, code = crossings(trajectory, counted, transient + points, bar)
     keep = slice(transient, None)
     system = trajectory.system
     return Section(
@@ -271,6 +243,47 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
         t=t[keep],
         x=x[keep],
         mode=np.array(system.mode_names)[index[keep]],
-        jumps=steps[keep],
-        status=status or status_of(trajectory, codes.DONE),
+        jumps=np.diff(count, prepend=0)[keep],
+        status=status_of(trajectory, code),
     )
+
+
+def crossings(
+    trajectory: Trajectory, counted: np.ndarray, points: int, bar: Any = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
+    """The next jumps of the counted transitions: times, states before, transitions, other jumps so far.
+
+    The code says why there may be fewer than ``points``; the trajectory ends at the last one, or soon after.
+    """
+    model, run = trajectory.model, trajectory.run
+    rows: list[tuple[np.ndarray, ...]] = []
+    found, others, steps_at_point, code = 0, 0, int(run.steps), codes.DONE
+    while found < points:
+        # Not more jumps than are wanted, so that the run does not go on beyond the last one.
+        record = empty_record(model.dimension, 0, 0, min(points - found, POINTS_AT_ONCE))
+        limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
+        code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
+        used = record.jumps
+        cycle, transition = record.jump_cycle[:used], record.jump_transition[:used]
+        marked = counted[transition]
+        count = others + np.cumsum(~marked)
+        rows.append(
+            (
+                (cycle * model.period + record.jump_phase[:used])[marked],
+                record.jump_states[:used, 0][marked],
+                transition[marked],
+                count[marked],
+            )
+        )
+        others = int(count[-1]) if used else others
+        found += int(marked.sum())
+        if marked.any():
+            steps_at_point = int(run.steps)
+        if bar is not None:
+            bar.update(int(marked.sum()))
+        if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):
+            break
+    else:
+        code = codes.DONE
+    t, x, index, count = (np.concatenate(column) for column in zip(*rows, strict=True))
+    return t, x, index, count, code

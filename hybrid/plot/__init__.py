@@ -1,5 +1,6 @@
 """Plots: arcs over time, phase portraits, sections, orbits, mode graphs, work-precision diagrams."""
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
@@ -16,6 +17,7 @@ from hybrid.system.graph import HybridSystem
 
 __all__ = [
     "COLOURS",
+    "DATASETS",
     "drawn",
     "plot",
     "plot_arc",
@@ -27,9 +29,16 @@ __all__ = [
 ]
 
 
+# Functions that draw datasets, by the name of a variable that the dataset has.
+DATASETS: dict[str, Callable[..., Any]] = {}
+
+
 @singledispatch
 def drawn(result: Any, **options: Any) -> Any:
     """The plot of a result; register the function that draws a class of results, as below."""
+    for name, draw in DATASETS.items():
+        if name in getattr(result, "data_vars", ()):
+            return draw(result, **options)
     if callable(getattr(result, "plot", None)):
         return result.plot(**options)
     wanted = "be a system, an arc, a section, an orbit, a spectrum or a chart"

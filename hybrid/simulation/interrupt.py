@@ -93,16 +93,6 @@ class CtrlC:
 CTRL_C = CtrlC()
 
 
-class Told(threading.Event):
-    """A stop that another thread asks for."""
-
-    def __enter__(self) -> None:
-        """Nothing to prepare."""
-
-    def __exit__(self, *failure: object) -> None:
-        """Nothing to put back."""
-
-
 class Bursts:
     """How many steps kernels may take before Python asks whether to stop: 20 ms of them.
 

@@ -107,10 +107,21 @@ def run_chunk(
     return perf_counter() - begin, parts
 
 
-@lru_cache(4)
 def _task_of(payload: bytes) -> Any:
-    """The task, with what it has compiled, for all chunks of a sweep."""
-    return needed("cloudpickle", "executor=").loads(payload)
+    """The task, with what it has compiled; one thread of a worker prepares it for all."""
+    with _LOCK:
+        return _prepared(payload)
+
+
+_LOCK = threading.Lock()
+
+
+@lru_cache(4)
+def _prepared(payload: bytes) -> Any:
+    task = needed("cloudpickle", "executor=").loads(payload)
+    if hasattr(task, "prepare"):
+        task.prepare()
+    return task
 
 
 @contextmanager

@@ -66,6 +66,7 @@ class Sheet:
             with self.lock:
                 table = self.tables.get(part.schema)
                 if table is None:
+                    self._check_names(part.schema)
                     table = self.tables[part.schema] = [
                         np.full((len(self.points), *shape), EMPTY[kind], dtype=DTYPES[kind])
                         for _, shape, kind in part.schema.columns
@@ -77,6 +78,14 @@ class Sheet:
         self.messages[part.rows] = part.messages
         self.codes[part.rows] = part.codes
 
+    def _check_names(self, schema: Schema) -> None:
+        """Refuse results with the name of an axis as soon as there is one, not when all are there."""
+        for name, _, _ in schema.columns:
+            if name in self.points.coords or name in self.points.dims:
+                raise ArgumentError(
+                    f"task: the result {name!r} has the name of an axis of over. Rename one of them."
+                )
+
     def untouched(self) -> np.ndarray:
         """Whether each point still has to be computed."""
         return np.isin(self.codes, UNFINISHED)
@@ -86,7 +95,7 @@ class Sheet:
         import xarray
 
         self._refuse_other_schemas()
-        points, used = self.points, set(self.points.dims)
+        points = self.points
         coords: dict[str, Any] = {name: (dim, *rest) for name, (dim, *rest) in points.coords.items()}
         variables: dict[str, Any] = {}
         schema = self._schema()
@@ -94,10 +103,6 @@ class Sheet:
             if schema.labels:
                 labels = Labels.read(schema.labels)
             for (name, shape, _), column in zip(schema.columns, self.tables[schema], strict=True):
-                if name in coords or name in used:
-                    raise ArgumentError(
-                        f"task: the result {name!r} has the name of an axis of over. Rename one of them."
-                    )
                 inner = labels.dims.get(name) or tuple(f"{name}_{i}" for i in range(len(shape)))
                 values = column.reshape(*points.shape, *shape)
                 variables[name] = ((*points.dims, *inner), values, dict(labels.attrs.get(name, {})))

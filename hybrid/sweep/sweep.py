@@ -100,6 +100,9 @@ def sweep(
 
         kept = Store(store, facts_of(task), points, along)
         made_by["date"] = kept.begin(sheet, date, labels, made_by)
+    if hasattr(task, "prepare"):
+        # Once, before threads need the same kernels and functions.
+        task.prepare()
     job = Job(task, points, np.flatnonzero(sheet.untouched()), lines)
 
     def keep(part: Part) -> None:

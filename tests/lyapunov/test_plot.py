@@ -36,8 +36,8 @@ def test_exponents_are_drawn_in_the_order_of_the_parameter(line):
     zero, first, second, failed = ax.lines
     assert set(zero.get_ydata()) == {0.0}
     np.testing.assert_array_equal(first.get_xdata(), [-1.0, 0.5, 0.8, 1.0])
-    np.testing.assert_array_equal(first.get_ydata(), line.exponents[[3, 1, 2, 0], 0])
-    np.testing.assert_array_equal(second.get_ydata(), line.exponents[[3, 1, 2, 0], 1])
+    np.testing.assert_array_equal(first.get_ydata(), line.exponents.values[[3, 1, 2, 0], 0])
+    np.testing.assert_array_equal(second.get_ydata(), line.exponents.values[[3, 1, 2, 0], 1])
     np.testing.assert_array_equal(failed.get_xdata(), [-1.0])
     assert len(ax.collections) == 2
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("d", "Lyapunov exponents")
@@ -48,7 +48,7 @@ def test_the_bifurcation_diagram_has_every_point(line):
     (points,) = ax.collections
     across, up = points.get_offsets().T
     np.testing.assert_array_equal(across, np.repeat([1.0, 0.5, 0.8, -1.0], 3))
-    np.testing.assert_array_equal(up, line.section[:, :, 1].ravel())
+    np.testing.assert_array_equal(up, line.section.values[:, :, 1].ravel())
     assert ax.get_ylabel() == "v"
 
 

@@ -79,11 +79,11 @@ def compared():
     kept(found, found.status.code.name)
 
 def chart():
-    found = lyapunov.chart(system, {"c": [0.1, 0.2, 0.3]}, start, interval=1e8, transient=0, threads=2)
-    kept(None, {status.code.name for status in found.status})
+    found = lyapunov.chart(system, {"c": [0.1, 0.2, 0.3]}, start, interval=1e8, transient=0, executor=2)
+    kept(None, {hybrid.StatusCode(int(code)).name for code in found.status})
 
 hybrid.global_error(system, start, (0.0, 1.0), solver=slow)
-lyapunov.chart(system, {"c": [0.1]}, start, intervals=2, transient=0, section=1, threads=1)
+lyapunov.chart(system, {"c": [0.1]}, start, intervals=2, transient=0, section=1, executor=1)
 lyapunov.lyapunov_spectrum(system, start, intervals=1)
 lyapunov.two_orbit_exponents(system, start, intervals=1)
 hybrid.simulate(system, start, (0.0, 1.0), samples=[0.5, 1.0])

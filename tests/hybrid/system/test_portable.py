@@ -43,6 +43,8 @@ def same(one, other):
     if attrs.has(type(one)) and not isinstance(one, hybrid.Status):
         names = [field.name for field in attrs.fields(type(one))]
         return type(one) is type(other) and all(same(getattr(one, n), getattr(other, n)) for n in names)
+    if hasattr(one, "identical"):
+        return one.identical(other)
     return one == other or (one != one and other != other)
 
 
@@ -71,7 +73,7 @@ def results():
         "orbit": hybrid.periodic_orbit(BALL, (0.0, 4.0), max_iterations=1),
         "spectrum": lyapunov.lyapunov_spectrum(BALL, START, intervals=3, transient=0),
         "two orbits": lyapunov.two_orbit_exponents(BALL, START, intervals=3),
-        "chart": lyapunov.chart(BALL, {"e": [0.7, 0.8]}, START, intervals=2, transient=0, threads=1),
+        "chart": lyapunov.chart(BALL, {"e": [0.7, 0.8]}, START, intervals=2, transient=0, executor=1),
         "status": arc.status,
         "solver": hybrid.DOP853(rtol=1e-8),
         "taylor": hybrid.Taylor(),

@@ -1,0 +1,229 @@
+"""Orbits over a sweep: where each row starts, how it is carried to the next row, and its section."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any, Literal
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import load_kernels
+from hybrid.compiler.compiled import compile_system
+from hybrid.errors import ArgumentError, HybridError
+from hybrid.kernels.types import codes
+from hybrid.orbits.sections import crossings, strobe
+from hybrid.simulation.plan import check_solver, plan_of
+from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.solvers import Solver
+from hybrid.sweep.points import as_points
+from hybrid.sweep.sheet import Labels
+from hybrid.system.elements import Guard
+from hybrid.system.graph import HybridSystem, as_system
+from hybrid.transform.markers import with_section
+
+# Where the points of a section are taken: per forcing period, at crossings of a surface, or at each jump.
+At = Guard | Literal["jumps"] | None
+# State and mode from which a row goes on.
+Place = tuple[np.ndarray, str | None]
+
+
+@attrs.frozen(eq=False)
+class Rows:
+    """What the rows of a sweep over parameters and starts have in common.
+
+    Attributes
+    ----------
+    system, x0, mode, t0, parameters, solver
+        As for :func:`hybrid.simulate`; a name of a swept start overrides its component of ``x0``.
+    starts
+        Names in the sweep that are components of the start; the others are parameters.
+    at, marked
+        Where the section is taken, and the system with the markers of a surface.
+    along
+        The axis along which the attractor is followed, or None.
+    """
+
+    system: HybridSystem
+    x0: np.ndarray
+    mode: str | None
+    t0: float
+    parameters: dict[str, float]
+    solver: Solver
+    starts: tuple[str, ...]
+    at: At
+    marked: HybridSystem
+    along: str | None
+
+    def prepare(self, tangents: int) -> None:
+        """Compile and load all that the rows need, so that threads do not do so at the same time."""
+        load_kernels("hybrid.kernels.events.sections")
+        for system, count in {(self.system, tangents), (self.system, 0), (self.marked, 0)}:
+            plan_of(compile_system(system), self.solver, count)
+
+    def begin(
+        self,
+        point: Mapping[str, float],
+        place: Place | None,
+        tangent: np.ndarray | None,
+        system: HybridSystem,
+    ) -> Trajectory:
+        """A trajectory at the start of a row: at the place, if the system can start there."""
+        if place is not None:
+            with suppress(HybridError):
+                return self.go_on(point, place, tangent, system, self.t0)
+        return self.go_on(point, (self.origin(point), self.mode), tangent, system, self.t0)
+
+    def go_on(
+        self,
+        point: Mapping[str, float],
+        place: Place,
+        tangent: np.ndarray | None,
+        system: HybridSystem,
+        t0: float,
+    ) -> Trajectory:
+        """A trajectory from a place."""
+        values = {name: value for name, value in point.items() if name not in self.starts}
+        state, mode = place
+        return start(
+            system,
+            state,
+            t0,
+            mode=mode,
+            parameters={**self.parameters, **values},
+            solver=self.solver,
+            tangent=tangent,
+        )
+
+    def origin(self, point: Mapping[str, float]) -> np.ndarray:
+        """The start of a row that does not go on from another row."""
+        if not self.starts:
+            return self.x0
+        state = self.x0.copy()
+        for name in self.starts:
+            state[self.system.state_names.index(name)] = point[name]
+        return state
+
+    def end_of(self, trajectory: Trajectory) -> Place:
+        """Where the next row goes on. With a single mode the start checks that it allows the state."""
+        return trajectory.x, self.mode if len(self.system.modes) == 1 else trajectory.mode
+
+    def section(self, trajectory: Trajectory, points: int) -> tuple[np.ndarray, int]:
+        """The next points of the section ``(points, n)``, filled up with nan, and the code of the run."""
+        states = np.full((points, self.system.dimension), np.nan)
+        if not points:
+            return states, codes.DONE
+        if self.at is None:
+            found, _, code = strobe(trajectory, points)
+        else:
+            counted = np.ones(len(trajectory.system.transitions), dtype=bool)
+            if self.at != "jumps":
+                counted = np.arange(len(counted)) < len(self.system.modes)
+            plain = attrs.evolve(trajectory, tangents=0)
+            _, found, _, _, code = crossings(plain, counted, points)
+        states[: len(found)] = found[:points]
+        return states, code
+
+    def facts(self) -> dict[str, Any]:
+        """What decides the rows, by name."""
+        fixed = {
+            name: value
+            for name, value in zip(self.system.state_names, self.x0.tolist(), strict=True)
+            if name not in self.starts
+        }
+        return {
+            "model": self.system,
+            "x0": fixed,
+            "mode": self.mode,
+            "t0": self.t0,
+            **{f"parameter_{name}": value for name, value in self.parameters.items()},
+            "solver": self.solver,
+            "at": self.at,
+            "continue_from": self.along,
+        }
+
+    def labels(self, dims: Mapping[str, tuple[str, ...]]) -> Labels:
+        """Names of the inner axes of results."""
+        return Labels(dims, {"state": (("state",), list(self.system.state_names))})
+
+
+def rows_of(
+    system: HybridSystem,
+    over: Any,
+    x0: Any,
+    *,
+    mode: str | None,
+    parameters: Mapping[str, float] | None,
+    t0: float,
+    solver: Solver | None,
+    points: int,
+    at: At,
+    continue_from: str | None,
+    results: tuple[str, ...],
+) -> Rows:
+    """The rows of a sweep over parameters and components of the start, with every argument checked."""
+    as_system("system", system)
+    swept = as_points(over)
+    names = system.state_names
+    others = arguments.mapping("parameters", parameters)
+    for name in swept.names:
+        if name not in names:
+            arguments.known("over: Parameter", name, system.parameters, "Parameters")
+        if name in others:
+            raise ArgumentError(f"over: Parameter {name!r} is given twice: in over and in parameters.")
+        if name in results:
+            raise ArgumentError(
+                f"over: {name!r} is also the name of a result. Rename the parameter or state of the model."
+            )
+    starts = tuple(name for name in swept.names if name not in system.parameters)
+    if isinstance(x0, Mapping):
+        x0 = {**dict.fromkeys(starts, 0.0), **x0}
+    state = system.variables.state_values("x0", x0)
+    system.parameter_values(others)
+    if mode is not None:
+        system.mode_index(mode)
+    along = _axis(continue_from, swept.dims)
+    if along in starts:
+        raise ArgumentError(
+            f"continue_from must be an axis of parameters, because rows that go on from other rows have no "
+            f"start of their own; got {along!r}."
+        )
+    return Rows(
+        system=system,
+        x0=state,
+        mode=mode,
+        t0=arguments.number("t0", t0),
+        parameters=others,
+        solver=check_solver(solver),
+        starts=starts,
+        at=_place_of_section(system, at, points),
+        marked=with_section(system, at) if isinstance(at, Guard) else system,
+        along=along,
+    )
+
+
+def _axis(continue_from: str | None, dims: tuple[str, ...]) -> str | None:
+    if continue_from is None:
+        return None
+    allowed = (None, "previous", *dims)
+    found = arguments.one_of("continue_from", continue_from, allowed)
+    return dims[-1] if found == "previous" and "previous" not in dims else str(found)
+
+
+def _place_of_section(system: HybridSystem, at: At, points: int) -> At:
+    if at is None:
+        if points and system.period is None:
+            raise ArgumentError(
+                "section= takes one point per forcing period, but the system declares no period. Give "
+                'HybridSystem period=, say where with at=Guard(...) or at="jumps", or omit section=.'
+            )
+        return None
+    if isinstance(at, Guard):
+        return at
+    if isinstance(at, str) and at == "jumps":
+        if points and not system.transitions:
+            raise ArgumentError('at="jumps" takes a point at each jump, but the system has no transitions.')
+        return "jumps"
+    raise arguments.refusal("at", 'be None, a Guard or "jumps"', at)
