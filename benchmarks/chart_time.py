@@ -21,7 +21,7 @@ SOLVER = Taylor(rtol=1e-6, atol=1e-8)
 def measured(rows: int, threads: int, **options: object) -> tuple[float, float]:
     """Wall-clock time and processor time in seconds."""
     over = {"omega": np.linspace(7.0, 8.0, rows)}
-    work = partial(chart, models.vibroimpact(), over, START, solver=SOLVER, threads=threads)
+    work = partial(chart, models.vibroimpact(), over, START, solver=SOLVER, executor=threads)
     clock, processor = time.perf_counter(), time.process_time()
     work(**{"intervals": PERIODS, "transient": TRANSIENT, **options})
     return time.perf_counter() - clock, time.process_time() - processor

@@ -92,7 +92,7 @@ def chart_picture(system: HybridSystem) -> None:
             k=2,
             intervals=1000,
             section=200,
-            continue_from="previous",
+            continue_from="w",
             solver=DOP853(rtol=1e-8, atol=1e-10),
         )
         figure = plot_chart(swept)

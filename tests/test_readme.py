@@ -58,7 +58,7 @@ def test_the_readme_shows_what_it_says():
     assert names["strobe"].x.shape == (2000, 2)
     assert len(names["peaks"]) == 500
     assert names["ball"].status.code == hybrid.StatusCode.ACCUMULATION
-    assert names["swept"].ok.all()
+    assert (names["swept"].status == 0).all()
     assert 0.0 < names["swept"].exponents.max() < 0.4
     assert "accumulate" in printed
     assert names["report"].jumps.keys() == {"impact", "touch", "leave"}

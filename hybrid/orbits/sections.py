@@ -256,13 +256,17 @@ def crossings(
     The code says why there may be fewer than ``points``; the trajectory ends at the last one, or soon after.
     """
     model, run = trajectory.model, trajectory.run
+    record = empty_record(model.dimension, 0, 0, POINTS_AT_ONCE)
     rows: list[tuple[np.ndarray, ...]] = []
     found, others, steps_at_point, code = 0, 0, int(run.steps), codes.DONE
     while found < points:
-        # Not more jumps than are wanted, so that the run does not go on beyond the last one.
-        record = empty_record(model.dimension, 0, 0, min(points - found, POINTS_AT_ONCE))
+        record.used[:] = 0
         limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
-        code = trajectory.advance_to(UNLIMITED if model.period else 0, np.inf, record, max_steps=limit)
+        # Not more jumps than are wanted, so that the run does not go on beyond the last one.
+        most = int(run.jumps) + points - found
+        code = trajectory.advance_to(
+            UNLIMITED if model.period else 0, np.inf, record, max_steps=limit, max_jumps=most
+        )
         used = record.jumps
         cycle, transition = record.jump_cycle[:used], record.jump_transition[:used]
         marked = counted[transition]
@@ -281,9 +285,10 @@ def crossings(
             steps_at_point = int(run.steps)
         if bar is not None:
             bar.update(int(marked.sum()))
-        if code != codes.RECORD_FULL and not (code == codes.MAX_STEPS and marked.any()):
+        goes_on = code in (codes.RECORD_FULL, codes.MAX_JUMPS)
+        if not goes_on and not (code == codes.MAX_STEPS and marked.any()):
             break
     else:
         code = codes.DONE
-    t, x, index, count = (np.concatenate(column) for column in zip(*rows, strict=True))
+    t, x, index, count = (np.concatenate(column)[:points] for column in zip(*rows, strict=True))
     return t, x, index, count, code

@@ -184,7 +184,7 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:
     """
     import xarray
 
-    where = as_path(path)
+    where = as_path(path, "path")
     if where.is_file():
         return xarray.open_dataset(where)
     if (where / GROUP).exists():
@@ -206,10 +206,10 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:
     return sheet.dataset(Labels.read(json.dumps(stored["labels"])), stored["made_by"])
 
 
-def as_path(path: object) -> Path:
+def as_path(path: object, name: str = "store") -> Path:
     """A path, or an ArgumentError."""
     if not isinstance(path, str | os.PathLike) or not str(path):
-        raise arguments.refusal("store", "be the path of a folder", path)
+        raise arguments.refusal(name, "be the path of a folder", path)
     return Path(os.fspath(path))
 
 

@@ -112,6 +112,7 @@ RANGES = [
     {"nope": 1.0},
     *({"q": bad} for bad in ("a", None, math.nan, True, (2.0, 1.0), (0.0,), 1j)),
 ]
+EXECUTOR = [0, -1, 1.5, True, "a", math.nan, Odd(), {}]
 COMPONENT = ["nope", 2, -3, 1.5, True, math.nan, [0], Odd()]
 LABELS = ["a", 3, ("a",), math.nan]
 
@@ -134,7 +135,7 @@ def made():
         "arc": hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.0)),
         "orbit": hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0)),
         "comparison": lyapunov.compare_models({"a": OSCILLATOR}, (0.0, 0.0), reference="a", intervals=5),
-        "chart": lyapunov.chart(OSCILLATOR, {"c": [0.1, 0.2]}, (0.0, 0.0), intervals=5, section=3, threads=1),
+        "chart": lyapunov.chart(OSCILLATOR, {"c": [0.1, 0.2]}, (0.0, 0.0), intervals=5, section=3),
         "work": hybrid.work_precision(
             BALL, (1.0, 0.0), (0.0, 0.3), methods={"T": hybrid.Taylor()}, tolerances=[1e-6], repeats=1
         ),
@@ -384,9 +385,31 @@ def table(made):
                 ],
                 "section": COUNT,
                 "continue_from": ["next", 1, True, math.nan, Odd()],
-                "threads": [0, *COUNT[1:]],
+                "at": ["apex", 3, True, math.nan, Odd()],
+                "store": [3, "", True, Odd()],
+                "executor": EXECUTOR,
+                "progress": FLAG[1:],
             },
         ),
+        (
+            call(hybrid.sweep, lambda p: {"y": p["a"]}, {"a": [1.0]}),
+            {
+                "task": [None, "a", 3],
+                "over": [
+                    None,
+                    "a",
+                    {},
+                    [],
+                    [1.0],
+                    {3: [1.0]},
+                    *({"a": bad} for bad in ("abc", None, 1.0, [], ["1"], [True], [math.nan], [[1.0]], [1j])),
+                ],
+                "store": [3, "", True, Odd()],
+                "executor": EXECUTOR,
+                "progress": FLAG[1:],
+            },
+        ),
+        (call(hybrid.open, "run.zarr"), {"path": [None, 3, "", "no such store", Odd()]}),
         (
             call(lyapunov.compare_models, {"a": OSCILLATOR}, (0.0, 0.0), reference="a"),
             {
@@ -635,7 +658,6 @@ NOT_CALLED = {
     "PeriodicOrbit",
     "Section",
     "WorkPrecision",
-    "Chart",
     "LyapunovSpectrum",
     "ModelComparison",
     "TwoOrbitExponents",

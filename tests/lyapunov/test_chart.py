@@ -268,7 +268,7 @@ def test_attributes_say_what_made_it():
         models.impact_oscillator(), {"A": [1.0]}, REST, parameters={"c": 0.2}, **SHORT
     ).attrs
     assert made_by["task"] == "lyapunov.chart.Exponents"
-    assert made_by["model"] == "impact_oscillator"
+    assert made_by["model"] == "impact oscillator"
     assert (made_by["parameter_c"], made_by["intervals"]) == (0.2, 60)
     assert "DOP853" in made_by["solver"]
 
@@ -323,7 +323,7 @@ def test_spectra_in_threads_of_the_user_are_those_computed_alone():
         ({"section": -1}, "section must be a whole number of at least 0; got -1"),
         ({"executor": 0}, "executor must be a whole number of at least 1; got 0"),
         ({"at": "apex"}, "at must be None, a Guard or"),
-        ({"over": {"q": [1.0]}, "continue_from": "q"}, "continue_from must be an axis of parameters"),
+        ({"over": {"x": [1.0]}, "continue_from": "x"}, "continue_from must be an axis of parameters"),
         ({"continue_from": "next"}, 'continue_from must be None, "previous" or "A"; got \'next\''),
         ({"continue_from": "previous", "transient": 0}, "transient must be a whole number of at least 1"),
         ({"mode": "fligth"}, "Mode 'fligth' does not exist"),
