@@ -16,12 +16,10 @@ from hybrid import HybridSystem, arguments, sweep
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import silent
 from hybrid.errors import HybridError
-from hybrid.kernels.types import codes
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
-from hybrid.system.growth import growing
 from lyapunov.spectrum import Estimate, LyapunovSpectrum, first_vectors, interval_length
 
 if TYPE_CHECKING:
@@ -36,7 +34,6 @@ DIMS = {
 RESULTS = ("exponents", "standard_error", "sum_rule", "jumps_per_interval", "x_end", "mode_end", "section")
 
 
-@growing
 def chart(
     system: HybridSystem,
     over: Any,
@@ -153,7 +150,9 @@ class Exponents:
 
     def __call__(self, point: Mapping[str, float], place: Place | None = None) -> dict[str, Any]:
         """The results of one row."""
-        rows = self.rows
+        return self.rows.grown(lambda rows: self._row(rows, point, place))
+
+    def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
         trajectory = rows.begin(point, place, self._vectors, rows.system)
         spectrum = Estimate(trajectory, self._length(trajectory)).run(
             self.transient, self.intervals, False, silent()
@@ -165,19 +164,22 @@ class Exponents:
             "jumps_per_interval": spectrum.jumps_per_interval,
             "x_end": spectrum.x,
             "mode_end": spectrum.mode,
-            "section": self._section(point, trajectory, spectrum),
+            "section": self._section(rows, point, trajectory, spectrum),
             "status": spectrum.status,
         }
 
     def carry(self, point: Mapping[str, float], place: Place | None) -> Place | None:
         """State and mode after the transient, rounded up to whole forcing periods to keep the phase."""
-        trajectory = self.rows.begin(point, place, None, self.rows.system)
+        return self.rows.grown(lambda rows: self._carried(rows, point, place))
+
+    def _carried(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> Place | None:
+        trajectory = rows.begin(point, place, None, rows.system)
         span = self.transient * self._length(trajectory)
         period, clock = trajectory.model.period, trajectory.run
         cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
         phase = clock.phase + (0.0 if period else span)
         code = trajectory.advance_to(int(clock.cycle) + cycles, float(phase), trajectory.no_record())
-        return self.rows.end_of(trajectory) if code == codes.DONE else None
+        return rows.end_of(trajectory, code)
 
     def prepare(self) -> None:
         """Load what the rows need."""
@@ -216,9 +218,8 @@ class Exponents:
         return interval_length(trajectory, self.interval, self.transient + self.intervals)
 
     def _section(
-        self, point: Mapping[str, float], trajectory: Trajectory, spectrum: LyapunovSpectrum
+        self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, spectrum: LyapunovSpectrum
     ) -> np.ndarray:
-        rows = self.rows
         if not self.points or not spectrum.status.ok:
             return np.full((self.points, rows.system.dimension), np.nan)
         if rows.marked is not rows.system:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cached_property
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 FUNCTION_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
 GRADIENT = 3
 UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
+# Threads that meet a new system compile it once; stages of a growing system share what is written.
+_COMPILING = RLock()
 # Number of parameter vectors to remember.
 REMEMBERED = 10_000
 UNCARRIED = "steps resolve it, tangent vectors are not valid beyond it"
@@ -303,9 +306,12 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     compiled: CompiledSystem | None = system._compiled
     if compiled is None:
         load_kernels()
-        compiled = CompiledSystem(system, emitted_of(system))
-        check_agreement(compiled)
-        object.__setattr__(system, "_compiled", compiled)
+        with _COMPILING:
+            compiled = system._compiled
+            if compiled is None:
+                compiled = CompiledSystem(system, emitted_of(system))
+                check_agreement(compiled)
+                object.__setattr__(system, "_compiled", compiled)
     return compiled
 
 

@@ -147,6 +147,9 @@ def _described(value: Any, seen: set[int]) -> str:
     if isinstance(value, list | tuple):
         return f"({', '.join(_described(each, seen) for each in value)})"
     if isinstance(value, HybridSystem):
+        if value.growth is not None:
+            # The modes made so far decide nothing.
+            return f"split {_described(value.growth.original, seen)}"
         return f"{value.name or 'unnamed'} {_hash(_described_fields(value, seen))}"
     if isinstance(value, CodeType):
         return _described_code(value, seen)

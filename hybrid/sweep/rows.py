@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import attrs
 import numpy as np
@@ -15,6 +15,7 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.orbits.sections import crossings, strobe
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -22,12 +23,14 @@ from hybrid.sweep.points import as_points
 from hybrid.sweep.sheet import Labels
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.growth import Unexplored
 from hybrid.transform.markers import with_section
 
 # Where the points of a section are taken: per forcing period, at crossings of a surface, or at each jump.
 At = Guard | Literal["jumps"] | None
 # State and mode from which a row goes on.
 Place = tuple[np.ndarray, str | None]
+R = TypeVar("R")
 
 
 @attrs.frozen(eq=False)
@@ -56,6 +59,26 @@ class Rows:
     at: At
     marked: HybridSystem
     along: str | None
+    # Stages of a growing system, with the markers of a surface.
+    _stages: dict[int, tuple[HybridSystem, HybridSystem]] = attrs.field(factory=dict, init=False, repr=False)
+
+    def grown(self, work: Callable[[Rows], R]) -> R:
+        """The result of some work, repeated until the system has all modes that the work needs."""
+        growth = self.system.growth
+        while growth is not None:
+            try:
+                return work(self._with(growth.current))
+            except Unexplored:
+                continue
+        return work(self)
+
+    def _with(self, stage: HybridSystem) -> Rows:
+        """The rows on a stage of a growing system; stages are kept, as they hold what is compiled."""
+        marked = self._stages.get(id(stage))
+        if marked is None or marked[0] is not stage:
+            new = with_section(stage, self.at) if isinstance(self.at, Guard) else stage
+            marked = self._stages[id(stage)] = stage, new
+        return attrs.evolve(self, system=stage, marked=marked[1])
 
     def prepare(self, tangents: int) -> None:
         """Compile and load all that the rows need, so that threads do not do so at the same time."""
@@ -106,8 +129,12 @@ class Rows:
             state[self.system.state_names.index(name)] = point[name]
         return state
 
-    def end_of(self, trajectory: Trajectory) -> Place:
+    def end_of(self, trajectory: Trajectory, code: int) -> Place | None:
         """Where the next row goes on. With a single mode the start checks that it allows the state."""
+        # A run that needs a mode which has not been made yet is repeated.
+        status_of(trajectory, code)
+        if code != codes.DONE:
+            return None
         return trajectory.x, self.mode if len(self.system.modes) == 1 else trajectory.mode
 
     def section(self, trajectory: Trajectory, points: int) -> tuple[np.ndarray, int]:
@@ -123,6 +150,7 @@ class Rows:
                 counted = np.arange(len(counted)) < len(self.system.modes)
             plain = attrs.evolve(trajectory, tangents=0)
             _, found, _, _, code = crossings(plain, counted, points)
+        status_of(trajectory, code)
         states[: len(found)] = found[:points]
         return states, code
 

@@ -257,7 +257,9 @@ class HybridSystem(Portable):
                 if name is not None and name not in self.mode_names:
                     what = f"Transition {transition.name!r}: {end} mode"
                     raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
-        self._check_reachable()
+        if self.growth is None:
+            # The modes between those of a stage may not have been made yet.
+            self._check_reachable()
 
     def _check_reachable(self) -> None:
         """Among several modes, one that no transition enters or leaves is assumed to be a mistake."""

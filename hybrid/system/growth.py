@@ -22,10 +22,13 @@ class Growth(Protocol):
 
     Attributes
     ----------
+    original
+        The user's system.
     written
         What the compiler has made of the functions of earlier stages.
     """
 
+    original: Any
     written: dict[Any, Any]
 
     @property

@@ -92,9 +92,10 @@ class Splitter:
     @property
     def current(self) -> HybridSystem:
         """The system with all modes that have been made so far."""
-        if self.stage is None:
-            self.stage = self._assembled()
-        return self.stage
+        with self.lock:
+            if self.stage is None:
+                self.stage = self._assembled()
+            return self.stage
 
     def leads_on(self, transition: str) -> bool:
         """Whether a transition leads to a mode that the system lacks."""
@@ -108,13 +109,13 @@ class Splitter:
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
         values = self._values(t, x, parameters)
-        cells = [
-            self._cell_at(pieces, values)
-            for pieces, own in zip(self.pieces, self.original.modes, strict=True)
-            if mode is None or mode == own.name
-        ]
-        missing = [cell for cell in cells if cell not in self.made]
         with self.lock:
+            cells = [
+                self._cell_at(pieces, values)
+                for pieces, own in zip(self.pieces, self.original.modes, strict=True)
+                if mode is None or mode == own.name
+            ]
+            missing = [cell for cell in cells if cell not in self.made]
             self._make(missing, len(missing))
         return bool(missing)
 
@@ -178,7 +179,7 @@ class Splitter:
     def _assembled(self) -> HybridSystem:
         """The system of all cells that have been made."""
         transitions: list[Transition] = []
-        self.frontier.clear()
+        is_whole = True
         used: set[str] = set()
         for cell in self.made:
             for edge in self._leaving(cell):
@@ -189,13 +190,14 @@ class Splitter:
                 if edge.target is None or edge.target in self.made:
                     transitions.append(attrs.evolve(transition, name=name))
                     continue
-                self.frontier[name] = edge.target
+                # Names of earlier stages stay: a run in another thread may still be on such a stage.
+                self.frontier[name], is_whole = edge.target, False
                 onward = Transition(
                     transition.source, None, transition.guard, name=name, part_of=transition.part_of
                 )
                 transitions.append(onward)
         modes = [self.known[cell][0] for cell in self.made]
-        growth = self if self.frontier else None
+        growth = None if is_whole else self
         notes = (*self.original.notes, *self.names.notes)
         return attrs.evolve(self.original, modes=modes, transitions=transitions, notes=notes, growth=growth)
 
