@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -17,6 +17,7 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
+from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
@@ -28,6 +29,9 @@ from lyapunov.statistics import (
     standard_error_from_batches,
     taper_inflation,
 )
+
+if TYPE_CHECKING:
+    import xarray
 
 # Rounding of the time may be at most this share of an interval.
 FINEST_INTERVAL = 2.0**-10
@@ -61,6 +65,8 @@ class LyapunovSpectrum:
         End of the orbit: name of the mode, and state ``(n,)``.
     status
         How the run ended.
+    names
+        Names of the state's components, and units where the system has them.
     """
 
     exponents: np.ndarray
@@ -74,6 +80,7 @@ class LyapunovSpectrum:
     mode: str
     x: np.ndarray
     status: Status
+    names: Names
 
     @property
     def history(self) -> np.ndarray:
@@ -89,6 +96,28 @@ class LyapunovSpectrum:
     def sum_defect(self) -> float:
         """Sum of the exponents minus the sum rule; it does not detect most errors of the tangents."""
         return float(self.exponents.sum() - self.sum_rule)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The spectrum with the names of a chart; with a history also ``growths`` over the axis ``time``."""
+        import xarray
+
+        variables: dict[str, Any] = {
+            "exponents": ("exponent", self.exponents, self.names.rate),
+            "standard_error": ("exponent", self.standard_error, self.names.rate),
+            "sum_rule": ((), self.sum_rule, self.names.rate),
+            "interval": ((), self.interval, self.names.of("t")),
+            "intervals": self.intervals,
+            "jumps_per_interval": self.jumps_per_interval,
+            "steps_per_interval": self.steps_per_interval,
+            "x_end": ("state", self.x),
+            "mode_end": self.mode,
+        }
+        coords = {"exponent": np.arange(1, len(self.exponents) + 1), **self.names.coords()}
+        if len(self.growths):
+            variables["growths"] = (("time", "exponent"), self.growths, self.names.rate)
+            ends = self.interval * np.arange(1, len(self.growths) + 1)
+            coords["time"] = ("time", ends, self.names.of("t"))
+        return xarray.Dataset(variables, coords, attributes("spectrum", self.status))
 
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.standard_error, strict=True)
@@ -255,6 +284,7 @@ class Estimate:
             mode=trajectory.mode,
             x=trajectory.x,
             status=self._status(code, max(mean.count, 1)),
+            names=Names(trajectory.system.state_names, dict(trajectory.system.units)),
         )
 
     def _collect(

@@ -74,6 +74,11 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
             "P": 500.0, "phi0": 0.0, "omega": 7.40,
             "D": 0.05, **contact.parameters,
         },
+        units={
+            "x1": "m", "x2": "m", "v1": "m/s", "v2": "m/s", "t": "s",
+            "m1": "kg", "m2": "kg", "omega1": "rad/s", "omega2": "rad/s",
+            "P": "N", "phi0": "rad", "omega": "rad/s", "D": "m",
+        },
         modes=contact.modes(bodies),
         transitions=contact.transitions(bodies),
         period=lambda p: 2 * np.pi / p.omega,

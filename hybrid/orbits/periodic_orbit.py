@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -13,6 +14,7 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.orbits.factors import fundamental_factors
+from hybrid.orbits.labelled import labelled_orbit
 from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
@@ -24,6 +26,9 @@ from hybrid.solvers import DOP853, Solver
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
+
+if TYPE_CHECKING:
+    import xarray
 
 # Newton steps are halved at most to this share; then the full step is taken.
 SHORTEST_STEP = 1 / 64
@@ -99,6 +104,10 @@ class PeriodicOrbit:
             f"<PeriodicOrbit period {self.period:.9g}, largest multiplier {abs(self.multipliers[0]):.6g}, "
             f"residual {self.residual:.1e}, {self.status.code.name}>"
         )
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
+        return labelled_orbit(self)
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period."""

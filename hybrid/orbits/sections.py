@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -16,6 +16,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
+from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import empty_record
 from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
 from hybrid.solvers import Solver
@@ -24,6 +25,9 @@ from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
 from hybrid.transform.markers import with_section
+
+if TYPE_CHECKING:
+    import xarray
 
 POINTS_AT_ONCE = 500
 # A surface that is not met within this many steps is taken to be missed for good.
@@ -48,6 +52,8 @@ class Section:
         Jumps since the previous point ``(N,)``, without the crossings of the section.
     status
         How the run ended.
+    units
+        Units by name, where the system has them.
     """
 
     state_names: tuple[str, ...]
@@ -57,9 +63,25 @@ class Section:
     mode: np.ndarray
     jumps: np.ndarray
     status: Status
+    units: Mapping[str, str] = attrs.field(factory=dict)
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The points over the axis ``sample``: ``x`` (axes ``sample`` and ``state``), ``mode``, ``jumps``."""
+        import xarray
+
+        names = Names(self.state_names, self.units)
+        return xarray.Dataset(
+            {
+                "x": (("sample", "state"), self.x),
+                "mode": ("sample", self.mode),
+                "jumps": ("sample", self.jumps),
+            },
+            {"t": ("sample", self.t, names.of("t")), **names.coords()},
+            attributes("section", self.status),
+        )
 
     def __repr__(self) -> str:
         return f"<Section of {len(self)} points, {self.status.code.name}>"
@@ -134,6 +156,7 @@ def stroboscopic_section(
         mode=np.array(system.mode_names)[index],
         jumps=np.diff(count, prepend=before),
         status=status_of(trajectory, code),
+        units=dict(system.units),
     )
 
 
@@ -245,6 +268,7 @@ def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, 
         mode=np.array(system.mode_names)[index[keep]],
         jumps=np.diff(count, prepend=0)[keep],
         status=status_of(trajectory, code),
+        units=dict(system.units),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import attrs
 import numpy as np
@@ -14,9 +14,13 @@ from hybrid import arguments
 from hybrid.compiler.cache.loader import entry, load_kernels
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.saltation import matrices_at
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
 
 # In the order of the kernel's codes.
 KINDS = ("transverse", "grazing", "limit")
@@ -158,6 +162,21 @@ class Jumps(Sequence[Jump]):
         )
         return matrices
 
+    def to_xarray(self) -> xarray.Dataset:
+        """The jumps over the axis ``jump``: times, transitions, kinds, states before and after."""
+        import xarray
+
+        names = Names(self.system.state_names, self.system.units)
+        variables = {
+            "t": ("jump", self.t, names.of("t")),
+            "transition": ("jump", self.transition),
+            "kind": ("jump", self.kind),
+            "x_minus": (("jump", "state"), self.x_minus),
+            "x_plus": (("jump", "state"), self.x_plus),
+            "transversality": ("jump", self.transversality),
+        }
+        return xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
+
     def __len__(self) -> int:
         return len(self._phase)
 
@@ -285,6 +304,26 @@ class HybridArc:
     def part_of(self) -> np.ndarray:
         """Names of the modes before the system was split, ``(N,)``."""
         return np.array([mode.part_of or mode.name for mode in self.system.modes])[self._mode_index]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The points of the arc over time: ``x`` (axes ``t`` and ``state``), ``j``, ``mode``.
+
+        Without ``samples`` a time occurs twice at each jump, with both states; ``arc.jumps.to_xarray()``
+        has the jumps. ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open` reads it.
+        """
+        import xarray
+
+        names = Names(self.system.state_names, self.system.units)
+        variables: dict[str, Any] = {
+            "x": (("t", "state"), self.x),
+            "j": ("t", self.j),
+            "mode": ("t", self.mode),
+        }
+        if self.fundamental is not None:
+            variables["fundamental"] = (("state", "tangent"), self.fundamental)
+        coords = {"t": ("t", self.t, names.of("t")), **names.coords()}
+        made_by = attributes("arc", self.status, self.system, self.parameters)
+        return xarray.Dataset(variables, coords, made_by)
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"

@@ -16,6 +16,7 @@ from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.orbits.sections import crossings, strobe
 from hybrid.simulation.ending import status_of
+from hybrid.simulation.labelled import Names
 from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -173,8 +174,11 @@ class Rows:
         }
 
     def labels(self, dims: Mapping[str, tuple[str, ...]]) -> Labels:
-        """Names of the inner axes of results."""
-        return Labels(dims, {"state": (("state",), list(self.system.state_names))})
+        """Names of the inner axes of results, and units."""
+        names = Names(self.system.state_names, self.system.units)
+        coords = {name: ((dim,), values) for name, (dim, values) in names.coords().items()}
+        rates = dict.fromkeys(("exponents", "standard_error", "sum_rule"), names.rate)
+        return Labels(dims, coords, {**{name: names.of(name) for name in self.system.units}, **rates})
 
 
 def rows_of(

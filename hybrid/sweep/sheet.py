@@ -32,7 +32,7 @@ class Labels:
     coords
         By name: axes, and values.
     attrs
-        Attributes of results, such as units.
+        Attributes of results and of coordinates, such as units.
     """
 
     dims: Mapping[str, tuple[str, ...]] = attrs.field(factory=dict)
@@ -96,7 +96,10 @@ class Sheet:
 
         self._refuse_other_schemas()
         points = self.points
-        coords: dict[str, Any] = {name: (dim, *rest) for name, (dim, *rest) in points.coords.items()}
+        coords: dict[str, Any] = {
+            name: (dim, values, {**labels.attrs.get(name, {}), **given})
+            for name, (dim, values, given) in points.coords.items()
+        }
         variables: dict[str, Any] = {}
         schema = self._schema()
         if schema is not None:

@@ -194,7 +194,8 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:
         with suppress(FileNotFoundError, KeyError, ValueError):
             found = xarray.open_zarr(where, chunks=None).load()
         if found is not None and before and before == _read(where / GROUP):
-            return found[[name for name in found.data_vars if name not in RESERVED] + list(RESERVED)]
+            last = [name for name in RESERVED if name in found.data_vars]
+            return found[[name for name in found.data_vars if name not in RESERVED] + last]
     latest = _read(where / INSIDE / LATEST)
     if not latest:
         raise ArgumentError(f"path must be the store of a sweep or a file; got {str(where)!r}.")

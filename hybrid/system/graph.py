@@ -72,6 +72,9 @@ class HybridSystem(Portable):
         ``t``, which is checked. Time is then stored as a number of whole periods and a phase.
     name
         For reports and figures.
+    units
+        Units by name, of components of the state, of parameters, and of time under the name ``"t"``; any may
+        be left out. Results as datasets and pictures show them; no calculation uses them.
 
     Raises
     ------
@@ -86,6 +89,8 @@ class HybridSystem(Portable):
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
+    # Units decide no result, so systems that differ in them are the same model.
+    units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
     # Lines for `repr`: what short names in a derived system stand for.
     notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, repr=False)
     # What makes further modes, for a system that is made in stages.
@@ -94,6 +99,7 @@ class HybridSystem(Portable):
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
+        object.__setattr__(self, "units", self.variables.as_units(self.units))
         self._check_graph()
         functions = [function for _, function in functions_of(self)]
         check_functions(self.variables, functions, self.period)

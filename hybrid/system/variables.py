@@ -107,6 +107,15 @@ class Variables:
             values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
         return np.array(list(values.values()), dtype=float)
 
+    def as_units(self, value: object) -> Mapping[str, str]:
+        """Units by name of a component, of a parameter or of the time ``t``, read-only."""
+        given = arguments.mapping("HybridSystem: units", value, "map names to texts")
+        for name, unit in given.items():
+            names = [*self.state_names, *self.parameter_names, "t"]
+            arguments.known("HybridSystem: units: Name", name, names, "Names")
+            arguments.instance(f"HybridSystem: units[{name!r}]", unit, str)
+        return MappingProxyType(given)
+
     def state_values(self, name: str, value: object) -> np.ndarray:
         """A finite state ``(n,)`` from the argument ``name``: numbers in order, or a mapping by name.
 

@@ -1,0 +1,32 @@
+"""A periodic orbit as a dataset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.simulation.labelled import Names, attributes
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def labelled_orbit(orbit: Any) -> xarray.Dataset:
+    """The numbers of a :class:`hybrid.PeriodicOrbit` with their names and units."""
+    import xarray
+
+    names = Names(orbit.system.state_names, orbit.system.units)
+    variables: dict[str, Any] = {
+        "x0": ("state", orbit.x0),
+        "mode": orbit.mode,
+        "t0": ((), orbit.t0, names.of("t")),
+        "period": ((), orbit.period, names.of("t")),
+        "multipliers": ("multiplier", np.asarray(orbit.multipliers, dtype=complex)),
+        "log_moduli": ("multiplier", orbit.log_moduli),
+        "fundamental": (("state", "direction"), orbit.fundamental),
+        "residual": orbit.residual,
+        "iterations": orbit.iterations,
+    }
+    made_by = attributes("periodic orbit", orbit.status, orbit.system, orbit.parameters)
+    return xarray.Dataset(variables, names.coords(), {**made_by, "signature": list(orbit.signature)})
