@@ -16,6 +16,7 @@ from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Solver, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard, Mode, Reset, Transition
@@ -59,6 +60,7 @@ __all__ = [
     "poincare_section",
     "saltation_matrix",
     "simulate",
+    "simulate_many",
     "split",
     "stroboscopic_section",
     "sweep",

@@ -115,7 +115,7 @@ class Sheet:
                 for name, (dims, values) in labels.coords.items()
                 if set(dims) <= inside
             }
-        variables["status"] = (points.dims, self.codes.reshape(points.shape), _flags())
+        variables["status"] = (points.dims, self.codes.reshape(points.shape), flags())
         variables["message"] = (points.dims, self.messages.reshape(points.shape))
         return xarray.Dataset(variables, coords, attrs=dict(made_by))
 
@@ -145,7 +145,7 @@ def _described(schema: Schema) -> str:
     return (listed or "nothing") + (" with other labels" if schema.labels else "")
 
 
-def _flags() -> dict[str, Any]:
+def flags() -> dict[str, Any]:
     """Attributes of a status, after the CF conventions."""
     return {
         "flag_values": [int(code) for code in StatusCode],

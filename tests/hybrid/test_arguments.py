@@ -170,6 +170,26 @@ def table(made):
                 "max_jumps": COUNT,
             },
         ),
+        (
+            call(hybrid.simulate_many, OSCILLATOR, [(0.0, 0.0)], (0.0, 1.0)),
+            {
+                **RUN,
+                "x0": [
+                    *NUMBERS[:4],
+                    (0.5, 0.0),
+                    0.5,
+                    [[0.5]],
+                    [(math.nan, 0.0)],
+                    {"x": 1.0},
+                    {3: 1.0},
+                    Odd(),
+                ],
+                "t_span": [*SPAN, (0.0, 1e300), (-1e300, 0.0)],
+                "samples": SAMPLES,
+                "max_jumps": COUNT,
+                "executor": EXECUTOR[:-2],
+            },
+        ),
         (call(hybrid.global_error, *start, (0.0, 1.0)), {**RUN, "t_span": SPAN, "max_jumps": COUNT}),
         (
             call(hybrid.work_precision, *ball, (0.0, 0.1), tolerances=[1e-4], repeats=1),
@@ -309,6 +329,7 @@ def table(made):
                 "transitions": [*LIST, [1], ["a"]],
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
+                "units": [[1], "a", 3, {"nope": "m"}, {3: "m"}, {"q": 3}, {"q": None}, Odd()],
             },
         ),
         (

@@ -6,11 +6,11 @@ from numba import int64, njit
 
 from hybrid.kernels.events.guards import allowed, guard_value
 from hybrid.kernels.types.codes import BEYOND, LEAVES, NO_OBJECTION, NO_TRANSITION
-from hybrid.kernels.types.layout import ENTRY, INDICES, MODEL, PARTS, RUN, WORK
+from hybrid.kernels.types.layout import ENTRY, INDICES, KERNEL, MODEL, PARTS, RUN, WORK
 
 
-@njit(int64(PARTS, MODEL, RUN, WORK, int64, int64, INDICES), **ENTRY)
-def try_modes(parts, model, run, work, first, stop, verdicts):
+@njit(**KERNEL)
+def verdicts_on(parts, model, run, work, first, stop, verdicts):
     """Enter the modes ``first`` to ``stop - 1`` at the start of a run, one after another.
 
     The verdict of each of their guards goes into ``verdicts (transitions,)``, which must be zero before.
@@ -34,3 +34,9 @@ def try_modes(parts, model, run, work, first, stop, verdicts):
         if fires >= 0 and verdicts[fires] == NO_OBJECTION:
             verdicts[fires] = BEYOND
     return NO_TRANSITION
+
+
+@njit(int64(PARTS, MODEL, RUN, WORK, int64, int64, INDICES), **ENTRY)
+def try_modes(parts, model, run, work, first, stop, verdicts):
+    """As :func:`verdicts_on`, for calls from Python."""
+    return verdicts_on(parts, model, run, work, first, stop, verdicts)

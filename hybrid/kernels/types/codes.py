@@ -11,6 +11,8 @@ STUCK = 7
 TERMINAL = 8
 # No end yet.
 GO_ON = -1
+# No mode allows the start, or more than one does.
+REFUSED = -2
 
 # ``Run.stage``: what the driver has to do before it can step: nothing, evaluate the rates anew (the tangent
 # vectors were changed from outside), or take its sides at every guard of a mode.

@@ -190,6 +190,11 @@ class Layout:
         """A structure whose arrays hold what the memory held: for those who write before they read."""
         return self._spare() or self._structure_in(np.empty(self.length + LINE, dtype=np.uint8))
 
+    def words(self, structure):
+        """What the arrays of a structure hold, as one array of words that is a view."""
+        begin = structure._begin
+        return structure._memory[begin + self.head : begin + self.length].view(np.int64)
+
     def take_back(self, structure):
         """Keep a structure of this layout that nobody else holds any more, nor any of its arrays."""
         if len(self.spares) < MOST_SPARES:

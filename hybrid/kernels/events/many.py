@@ -1,0 +1,155 @@
+"""Runs from many starts, one after another, without leaving the compiled code."""
+
+from numba import int64, njit, types
+
+from hybrid.kernels.events.initial_mode import verdicts_on
+from hybrid.kernels.types.codes import (
+    BEYOND,
+    DONE,
+    GO_ON,
+    MAX_STEPS,
+    NO_MODE,
+    NO_OBJECTION,
+    NO_TRANSITION,
+    REFUSED,
+)
+from hybrid.kernels.types.layout import (
+    ADVANCE,
+    CUBE,
+    ENTRY,
+    INDEX_MATRIX,
+    INDICES,
+    KERNEL,
+    MATRIX,
+    PARTS,
+    TASK,
+    VECTOR,
+)
+
+
+@njit(**KERNEL)
+def set_words(words, fresh):
+    """Make a structure's memory what it was when the structure was new."""
+    for i in range(words.shape[0]):
+        words[i] = fresh[i]
+
+
+@njit(**KERNEL)
+def mode_of_start(parts, task, named, verdicts):
+    """The mode in which a run starts: the one named, or the only one that allows the state; else NO_MODE."""
+    model = task.model
+    modes = model.first_outgoing.shape[0] - 1
+    for i in range(verdicts.shape[0]):
+        verdicts[i] = NO_OBJECTION
+    first, stop = (0, modes) if named == NO_MODE else (named, named + 1)
+    if verdicts_on(parts, model, task.run, task.work, first, stop, verdicts) != NO_TRANSITION:
+        return NO_MODE
+    if named != NO_MODE:
+        return named
+    chosen = NO_MODE
+    for mode in range(modes):
+        allowed = True
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            verdict = verdicts[model.outgoing[slot]]
+            # A single mode may be left at once.
+            if verdict == BEYOND or (verdict != NO_OBJECTION and modes > 1):
+                allowed = False
+        if allowed:
+            if chosen != NO_MODE:
+                return NO_MODE
+            chosen = mode
+    return chosen
+
+
+@njit(**KERNEL)
+def is_plain(run, verdicts):
+    """Whether there is nothing to tell of a run that has reached its end."""
+    notes = run.unproved + run.unresolved + run.coarse + run.order_mattered
+    for i in range(verdicts.shape[0]):
+        if verdicts[i] == BEYOND:
+            notes += 1
+    return notes == 0
+
+
+@njit(
+    types.UniTuple(int64, 2)(
+        ADVANCE,
+        PARTS,
+        TASK,
+        INDICES,
+        INDICES,
+        INDICES,
+        INDICES,
+        MATRIX,
+        INDICES,
+        VECTOR,
+        int64,
+        int64,
+        int64,
+        int64,
+        int64,
+        int64,
+        CUBE,
+        INDEX_MATRIX,
+        INDICES,
+    ),
+    **ENTRY,
+)
+def many_runs(
+    advance,
+    parts,
+    task,
+    run_words,
+    fresh_run,
+    work_words,
+    fresh_work,
+    origins,
+    cycles,
+    phases,
+    named,
+    begin,
+    resumed,
+    max_steps,
+    budget,
+    max_jumps,
+    states,
+    places,
+    verdicts,
+):
+    """The states ``(N, S, n)`` of runs from the ``origins (N, n)`` at ``S`` times, the last one their end.
+
+    ``run_words`` and ``work_words`` are the memory of run and work, ``fresh_run`` and ``fresh_work`` what
+    that holds at the start. ``places (N, 3)`` gets the mode, the number of jumps and the number of states
+    reached. Returns the first run that is not complete, or of which there is something to tell, with its
+    code; REFUSED as the code if it cannot start, GO_ON if the ``budget`` of steps was used up, after which
+    the next call resumes the run: ``resumed``.
+    """
+    run, n = task.run, task.model.dimension
+    for i in range(begin, origins.shape[0]):
+        if i > begin or resumed == 0:
+            set_words(run_words, fresh_run)
+            set_words(work_words, fresh_work)
+            for c in range(n):
+                run.y[c] = origins[i, c]
+                run.scale[c] = abs(origins[i, c])
+            places[i, 2] = 0
+            mode = mode_of_start(parts, task, named, verdicts)
+            if mode == NO_MODE:
+                return i, REFUSED
+            run.mode = mode
+        for s in range(places[i, 2], cycles.shape[0]):
+            before = run.steps
+            most = min(max_steps, before + budget)
+            code = advance(parts, task, cycles[s], phases[s], most, max_jumps)
+            budget -= run.steps - before
+            if code == MAX_STEPS and most < max_steps:
+                return i, GO_ON
+            if code != DONE:
+                return i, code
+            for c in range(n):
+                states[i, s, c] = run.y[c]
+            places[i, 2] = s + 1
+        places[i, 0], places[i, 1] = run.mode, run.jumps
+        if not is_plain(run, verdicts):
+            return i, DONE
+    return origins.shape[0], DONE

@@ -1,0 +1,342 @@
+"""Thousands of starts of one system in one call, without a loop in Python."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import arguments
+from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.compiler.compiled import compile_system
+from hybrid.errors import ArgumentError, HybridError
+from hybrid.kernels.types import codes
+from hybrid.simulation.ending import status_of
+from hybrid.simulation.interrupt import CTRL_C, Bursts, stopped_by
+from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.memory import fresh_run, fresh_work
+from hybrid.simulation.periods import check_time, split_time
+from hybrid.simulation.plan import check_solver, plan_of
+from hybrid.simulation.simulate import simulate
+from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.solvers import Solver
+from hybrid.status import Status, StatusCode
+from hybrid.sweep.local import LOOK, cores
+from hybrid.sweep.outcome import text_of
+from hybrid.sweep.sheet import UNTOUCHED, flags
+from hybrid.system.graph import HybridSystem, as_system
+
+if TYPE_CHECKING:
+    import xarray
+
+KERNEL = "hybrid.kernels.events.many"
+# Starts that a thread takes at a time: enough of them that threads end at about the same time.
+BLOCKS_PER_THREAD = 8
+STARTS = "be states of shape (N, n), or map each component to a number or to N of them"
+
+
+def simulate_many(
+    system: HybridSystem,
+    x0: ArrayLike | Mapping[str, ArrayLike],
+    t_span: tuple[float, float],
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    solver: Solver | None = None,
+    samples: ArrayLike | None = None,
+    max_jumps: int = 100_000,
+    executor: int | None = None,
+) -> xarray.Dataset:
+    """Run a system from many starts: where each run ends, and its state at the samples.
+
+    The ends are those of :func:`hybrid.simulate` to the last bit. A run that fails does so alone. Ctrl-C ends
+    the call, not the program: runs that are not complete have the status ``NOT_RUN``.
+
+    Parameters
+    ----------
+    system, t_span, mode, parameters, solver, max_jumps
+        As for :func:`hybrid.simulate`, the same for all starts.
+    x0
+        Starts ``(N, n)``; or a mapping of each component to a number or to ``N`` numbers.
+    samples
+        Increasing times at which to store the state. A step ends at each of them.
+    executor
+        Number of threads; by default all cores.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the axis ``start``: ``x0`` and ``x_end`` (axis ``state``), ``t_end``, ``mode_end``, ``jumps``,
+        ``status`` and ``message``; with samples also ``x`` (axes ``start``, ``t``, ``state``), nan after the
+        end of a run.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Examples
+    --------
+    >>> import models
+    >>> drops = simulate_many(models.bouncing_ball(), {"q": [1.0, 2.0, 3.0], "v": 0.0}, (0.0, 1.0))
+    >>> drops.jumps.values.tolist()
+    [1, 1, 1]
+    """
+    as_system("system", system)
+    t0, t1 = arguments.time_span("t_span", t_span)
+    times = np.empty(0) if samples is None else arguments.increasing_times("samples", samples, t0, t1)
+    origins = _origins(system, x0)
+    most = arguments.count("max_jumps", max_jumps, 0)
+    threads = cores() if executor is None else arguments.count("executor", executor, 1)
+    system.parameter_values(parameters)
+    options = {"mode": mode, "parameters": dict(parameters or {}), "solver": check_solver(solver)}
+    found = _Found(origins, times, t1)
+    if system.growth is not None or (mode is not None and len(system.parts_of(mode)) > 1):
+        work: Any = _OneByOne(system, (t0, t1), options, most, found)
+    else:
+        work = _Runs(system, (t0, t1), options, most, found)
+    size = -(-len(origins) // (BLOCKS_PER_THREAD * threads))
+    blocks = [range(i, min(i + size, len(origins))) for i in range(0, len(origins), max(size, 1))]
+    with CTRL_C:
+        if threads == 1 or len(blocks) == 1:
+            for block in blocks:
+                work.run(block)
+        else:
+            _in_threads(work.run, blocks, threads)
+        # An interrupt that came too late to stop anything is not raised either.
+        CTRL_C.is_set()
+    return found.dataset(system, dict(parameters or {}))
+
+
+def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int) -> None:
+    """Run all blocks; an interrupt in the main thread stops the others."""
+    stop = threading.Event()
+
+    def work(block: range) -> None:
+        with stopped_by(stop):
+            run(block)
+
+    with ThreadPoolExecutor(threads) as pool:
+        waiting: set[Future[None]] = {pool.submit(work, block) for block in blocks}
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=LOOK)
+                if CTRL_C.is_set():
+                    stop.set()
+                for future in done:
+                    future.result()
+        finally:
+            stop.set()
+
+
+def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
+    names = system.state_names
+    if isinstance(x0, Mapping):
+        for name in x0:
+            arguments.known("x0: State component", name, names, "State components")
+        missing = [name for name in names if name not in x0]
+        if missing:
+            raise ArgumentError(f"x0 lacks {', '.join(missing)}. The state is {', '.join(names)}.")
+        columns = [arguments.numbers(f"x0[{name!r}]", x0[name], STARTS) for name in names]
+        try:
+            states = np.stack(np.broadcast_arrays(*columns), axis=-1)
+        except ValueError:
+            raise arguments.refusal("x0", STARTS, x0) from None
+    else:
+        states = arguments.numbers("x0", x0, STARTS)
+    if states.ndim != 2 or states.shape[1] != system.dimension:
+        raise ArgumentError(f"x0 must {STARTS}, here n = {system.dimension}; got shape {states.shape}.")
+    bad = np.flatnonzero(~np.isfinite(states).all(axis=1))
+    if bad.size:
+        raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {states[bad[0]].tolist()}.")
+    return np.ascontiguousarray(states)
+
+
+class _Found:
+    """The results, which threads fill in."""
+
+    def __init__(self, origins: np.ndarray, times: np.ndarray, t1: float) -> None:
+        count, n = origins.shape
+        self.origins, self.times, self.t1 = origins, times, t1
+        # The last time is the end.
+        self.states = np.full((count, len(times) + 1, n), np.nan)
+        self.t_end = np.full(count, np.nan)
+        self.mode = np.full(count, "", dtype=object)
+        self.jumps = np.zeros(count, dtype=np.int64)
+        self.codes = np.full(count, StatusCode.NOT_RUN, dtype=np.int16)
+        self.messages = np.full(count, UNTOUCHED, dtype=object)
+
+    def tell(self, i: int, status: Status) -> None:
+        """Keep how a run ended."""
+        self.codes[i], self.messages[i] = status.code, text_of(status)
+
+    def dataset(self, system: HybridSystem, parameters: Mapping[str, float]) -> xarray.Dataset:
+        """The results with their names."""
+        import xarray
+
+        names = Names(system.state_names, system.units)
+        variables: dict[str, Any] = {
+            "x0": (("start", "state"), self.origins),
+            "x_end": (("start", "state"), self.states[:, -1]),
+            "t_end": ("start", self.t_end, names.of("t")),
+            "mode_end": ("start", self.mode),
+            "jumps": ("start", self.jumps),
+        }
+        coords = {"start": np.arange(len(self.origins)), **names.coords()}
+        if len(self.times):
+            variables["x"] = (("start", "t", "state"), self.states[:, :-1])
+            coords["t"] = ("t", self.times, names.of("t"))
+        variables["status"] = ("start", self.codes, flags())
+        variables["message"] = ("start", self.messages)
+        used = {**system.parameters, **parameters}
+        return xarray.Dataset(variables, coords, attributes("ends", system=system, parameters=used))
+
+
+@attrs.frozen(eq=False)
+class _OneByOne:
+    """Runs by `simulate`, for systems whose modes are made or chosen in Python."""
+
+    system: HybridSystem
+    t_span: tuple[float, float]
+    options: dict[str, Any]
+    max_jumps: int
+    found: _Found
+
+    def run(self, block: range) -> None:
+        """Run from these starts."""
+        found = self.found
+        for i in block:
+            if CTRL_C.is_set():
+                return
+            try:
+                arc = simulate(
+                    self.system,
+                    found.origins[i],
+                    self.t_span,
+                    max_jumps=self.max_jumps,
+                    **self.options,
+                )
+            except HybridError as failure:
+                found.tell(i, Status(StatusCode.FAILED, str(failure)))
+                continue
+            reached = found.times[found.times <= arc.t[-1]]
+            found.states[i, : len(reached)] = arc(reached)
+            found.states[i, -1], found.t_end[i] = arc.x[-1], arc.t[-1]
+            found.mode[i], found.jumps[i] = str(arc.mode[-1]), len(arc.jumps)
+            found.tell(i, arc.status)
+
+
+class _Runs:
+    """Runs in compiled code; Python looks at those that do not simply reach their end."""
+
+    def __init__(
+        self,
+        system: HybridSystem,
+        t_span: tuple[float, float],
+        options: dict[str, Any],
+        max_jumps: int,
+        found: _Found,
+    ) -> None:
+        self.system, self.t_span, self.options, self.found = system, t_span, options, found
+        self.max_jumps = max_jumps
+        compiled = self.compiled = compile_system(system)
+        # Before threads need the same kernels.
+        plan = self.plan = plan_of(compiled, options["solver"], 0)
+        load_kernels(KERNEL)
+        given = options["parameters"]
+        self.model = compiled.at(given, plan.model) if given else plan.model
+        for time in t_span:
+            check_time("t_span", time, self.model.period)
+        mode = options["mode"]
+        self.named = codes.NO_MODE if mode is None else system.mode_index(mode)
+        places = [split_time(time, self.model.period) for time in (*found.times.tolist(), t_span[1])]
+        self.cycles = np.array([cycle for cycle, _ in places], dtype=np.int64)
+        self.phases = np.array([phase for _, phase in places])
+
+    def run(self, block: range) -> None:
+        """Run from these starts, in a memory of this thread."""
+        if not block or CTRL_C.is_set():
+            return
+        plan, found, part = self.plan, self.found, slice(block.start, block.stop)
+        origins, states = found.origins[part], found.states[part]
+        run, phase0 = fresh_run(plan.run_layout, self.model, origins[0], None, self.t_span[0])
+        work = fresh_work(plan.work_layout, plan.method)
+        solver = self.options["solver"]
+        trajectory = Trajectory(
+            self.compiled, plan, self.model, run, work, 0, solver.max_steps, phase0, stop=CTRL_C
+        )
+        memory = [plan.run_layout.words(run), plan.work_layout.words(work)]
+        fresh = [words.copy() for words in memory]
+        places = np.zeros((len(block), 3), dtype=np.int64)
+        verdicts = np.zeros(len(self.system.transitions), dtype=np.int64)
+        kernel = entry(load_kernels(KERNEL).many_runs)
+        advance, task = address(load_kernels().advance), trajectory.task(trajectory.no_record())
+        begin, resumed, told = 0, 0, []
+        bursts = Bursts([trajectory])
+        while begin < len(block):
+            bursts.most()
+            i, code = kernel(
+                advance,
+                plan.parts,
+                task,
+                memory[0],
+                fresh[0],
+                memory[1],
+                fresh[1],
+                origins,
+                self.cycles,
+                self.phases,
+                self.named,
+                begin,
+                resumed,
+                solver.max_steps,
+                bursts.steps,
+                self.max_jumps,
+                states,
+                places,
+                verdicts,
+            )
+            resumed = int(code == codes.GO_ON)
+            if code == codes.REFUSED:
+                self._refuse(block.start + i)
+            elif not resumed and i < len(block):
+                self._tell(block.start + i, trajectory, code, verdicts)
+            if not resumed and i < len(block):
+                told.append(i)
+            begin = i if resumed else i + 1
+            # Only calls that used up their steps say how many steps fit into a burst.
+            if bursts.judged(codes.MAX_STEPS) == StatusCode.INTERRUPTED if resumed else CTRL_C.is_set():
+                break
+        done = np.zeros(len(block), dtype=bool)
+        done[:begin] = True
+        done[told] = False
+        rows = block.start + np.flatnonzero(done)
+        if rows.size:
+            plain = Status(StatusCode.SUCCESS, "Reached the end.")
+            found.codes[rows], found.messages[rows] = plain.code, text_of(plain)
+            found.t_end[rows] = found.t1
+            found.mode[rows] = np.array(self.system.mode_names, dtype=object)[places[done, 0]]
+            found.jumps[rows] = places[done, 1]
+
+    def _tell(self, i: int, trajectory: Trajectory, code: int, verdicts: np.ndarray) -> None:
+        """Keep the end of a run of which there is something to tell."""
+        found, names = self.found, self.system.transition_names
+        if self.named != codes.NO_MODE:
+            beyond = tuple(names[k] for k in np.flatnonzero(verdicts == codes.BEYOND))
+            trajectory = attrs.evolve(trajectory, beyond=beyond)
+        found.states[i, -1] = trajectory.x
+        found.t_end[i] = found.t1 if code == codes.DONE else trajectory.t
+        found.mode[i], found.jumps[i] = trajectory.mode, trajectory.jumps
+        found.tell(i, status_of(trajectory, code))
+
+    def _refuse(self, i: int) -> None:
+        """Keep why a run cannot start, in the words of `simulate`."""
+        try:
+            start(self.system, self.found.origins[i], self.t_span[0], time="t_span", **self.options)
+        except HybridError as failure:
+            self.found.tell(i, Status(StatusCode.FAILED, str(failure)))

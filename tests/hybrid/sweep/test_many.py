@@ -1,0 +1,130 @@
+"""Many starts in one call are those of simulate, one by one, to the last bit."""
+
+import numpy as np
+import pytest
+
+import hybrid
+import models
+from hybrid import ArgumentError, StatusCode, simulate, simulate_many
+from hybrid.sweep import many
+from hybrid.sweep.outcome import text_of
+from hybrid.transform import splitter
+from tests.hybrid import systems
+
+RANDOM = np.random.default_rng(3)
+OSCILLATOR = models.impact_oscillator()
+STARTS = RANDOM.uniform(-1.0, 0.5, (40, 2))
+SPAN = (0.3, 60.0)
+
+
+def assert_one_by_one(found, system, starts, span, **options):
+    for i, x0 in enumerate(starts):
+        arc = simulate(system, x0, span, **options)
+        np.testing.assert_array_equal(found.x_end[i], arc.x[-1])
+        assert (found.jumps[i], found.mode_end[i]) == (len(arc.jumps), arc.mode[-1])
+        assert (found.status[i], found.message[i]) == (arc.status.code, text_of(arc.status))
+        assert found.t_end[i] == arc.t[-1]
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_ends_are_those_of_simulate(threads):
+    options = {"parameters": {"r": 0.75}, "solver": hybrid.Taylor(rtol=1e-8)}
+    found = simulate_many(OSCILLATOR, STARTS, SPAN, executor=threads, **options)
+    assert_one_by_one(found, OSCILLATOR, STARTS, SPAN, **options)
+
+
+@pytest.mark.parametrize("solver", [hybrid.DOP853(rtol=1e-6), hybrid.RadauIIA(rtol=1e-5)])
+def test_runs_know_nothing_of_one_another(solver):
+    options = {"solver": solver, "executor": 1}
+    found = simulate_many(OSCILLATOR, STARTS[:6], (0.0, 12.0), **options)
+    assert_one_by_one(found, OSCILLATOR, STARTS[:6], (0.0, 12.0), solver=solver)
+    again = simulate_many(OSCILLATOR, STARTS[5::-1], (0.0, 12.0), **options)
+    np.testing.assert_array_equal(again.x_end[::-1], found.x_end)
+
+
+def test_long_runs_go_on_after_each_burst():
+    found = simulate_many(OSCILLATOR, STARTS[:2], (0.0, 3000.0), solver=hybrid.DOP853(), executor=1)
+    assert_one_by_one(found, OSCILLATOR, STARTS[:2], (0.0, 3000.0), solver=hybrid.DOP853())
+
+
+def test_runs_that_end_early_say_so():
+    """A chatter, a limit of jumps, and starts that no mode allows."""
+    ball = models.bouncing_ball()
+    starts = np.array([[1.0, 0.0], [5.0, 0.0], [-1.0, 0.0], [200.0, 0.0]])
+    found = simulate_many(ball, starts, (0.0, 9.0), max_jumps=5)
+    assert found.status.values[:2].tolist() == [StatusCode.MAX_JUMPS, StatusCode.MAX_JUMPS]
+    assert found.status[2] == StatusCode.FAILED
+    assert "is allowed in no mode" in found.message.values[2]
+    assert found.status[3] == StatusCode.SUCCESS
+    assert np.isnan(found.x_end[2]).all()
+    assert_one_by_one(found[{"start": [0, 1]}], ball, starts[:2], (0.0, 9.0), max_jumps=5)
+    named = simulate_many(ball, starts[2:3], (0.0, 1.0), mode="flight")
+    assert "The start lies beyond the guard" in named.message.values[0]
+    assert_one_by_one(named, ball, starts[2:3], (0.0, 1.0), mode="flight")
+
+
+def test_samples():
+    times = [0.5, 0.5, 2.0]
+    found = simulate_many(OSCILLATOR, {"x": [0.1, 0.2], "v": 0.0}, (0.0, 2.0), samples=times)
+    assert found.x.dims == ("start", "t", "state")
+    for i, x in enumerate((0.1, 0.2)):
+        arc = simulate(OSCILLATOR, (x, 0.0), (0.0, 2.0), samples=times)
+        np.testing.assert_allclose(found.x[i], arc.x, atol=1e-9)
+    np.testing.assert_array_equal(found.x.sel(t=2.0), found.x_end)
+
+
+def test_systems_that_grow(monkeypatch):
+    monkeypatch.setattr(splitter, "MOST_WHOLE", 1)
+    block = hybrid.from_equations(
+        lambda t, x, p: (x.v, -x.q - p.mu * np.sign(x.v) - 0.2 * np.sign(x.q)),
+        state=("q", "v"),
+        parameters={"mu": 0.3},
+    )
+    starts = [(1.0, -0.1), (2.0, 0.1)]
+    found = simulate_many(block, starts, (0.0, 5.0), executor=2)
+    assert not found.status.any()
+    for i, x0 in enumerate(starts):
+        np.testing.assert_array_equal(found.x_end[i], simulate(block, x0, (0.0, 5.0)).x[-1])
+
+
+class Impatient:
+    """Ctrl-C at the fifth question."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def is_set(self):
+        self.asked += 1
+        return self.asked > 4
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *failure):
+        pass
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_ctrl_c_keeps_what_is_there(threads, monkeypatch):
+    monkeypatch.setattr(many, "CTRL_C", Impatient())
+    starts = np.tile(STARTS, (50, 1))
+    found = simulate_many(OSCILLATOR, starts, (0.0, 600.0), executor=threads)
+    done = found.status == StatusCode.SUCCESS
+    assert 0 < done.sum() < len(starts)
+    assert (found.status[~done] == StatusCode.NOT_RUN).all()
+    assert np.isfinite(found.x_end[done]).all()
+
+
+@pytest.mark.parametrize(
+    ("x0", "message"),
+    [
+        ((1.0, 2.0), r"x0 must be states of shape \(N, n\).*here n = 2; got shape \(2,\)"),
+        ({"q": [1.0]}, "x0 lacks v"),
+        ({"q": [1.0], "w": [1.0]}, "x0: State component 'w' does not exist"),
+        ({"q": [1.0, 2.0], "v": [1.0, 2.0, 3.0]}, "x0 must be states"),
+        ([(1.0, np.nan)], r"x0 must be finite; got x0\[0\]"),
+    ],
+)
+def test_starts_are_checked(x0, message):
+    with pytest.raises(ArgumentError, match=message):
+        simulate_many(systems.ball(), x0, (0.0, 1.0))
