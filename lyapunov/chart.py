@@ -208,7 +208,9 @@ class Exponents:
     def facts(self) -> dict[str, Any]:
         """What decides the results."""
         names = ("k", "intervals", "interval", "transient")
-        return {**self.rows.facts(), **{name: getattr(self, name) for name in names}, "section": self.points}
+        forced = "no" if self.system.period is None else "yes"
+        own = {name: getattr(self, name) for name in names}
+        return {**self.rows.facts(), **own, "section": self.points, "forced": forced}
 
     @cached_property
     def _vectors(self) -> np.ndarray:

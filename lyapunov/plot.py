@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridArc, StatusCode, arguments
 from hybrid.plot import DATASETS, drawn
-from hybrid.plot.style import as_component, axes_for, check_axes, dot_area
+from hybrid.plot.style import as_component, axes_for, dot_area
+from lyapunov.maps import as_chart, axes_of, kinds, label_of, plot_kinds, plot_map, two_axes
 from lyapunov.spectrum import LyapunovSpectrum
 
 if TYPE_CHECKING:
@@ -42,6 +43,19 @@ STYLE: Any = {
     "legend.fontsize": 8,
     "lines.linewidth": 1.3,
 }
+
+__all__ = [
+    "kinds",
+    "plot_bifurcation",
+    "plot_chart",
+    "plot_convergence",
+    "plot_exponents",
+    "plot_kinds",
+    "plot_map",
+    "plot_phase_portrait",
+    "plot_spectrum",
+    "style",
+]
 
 POINTS_OF_A_LINE = 1500
 POINTS_OF_A_PORTRAIT = 40_000
@@ -185,18 +199,6 @@ def axis_labels(labels: object, *names: str) -> tuple[str, str]:
     return texts[0], texts[1]
 
 
-def _as_chart(value: Any) -> Any:
-    """A dataset of :func:`lyapunov.chart`."""
-    if "exponents" not in getattr(value, "data_vars", ()):
-        raise arguments.refusal("chart", "be a dataset made with lyapunov.chart", value)
-    return value
-
-
-def _axes_of(chart: Any) -> tuple[str, ...]:
-    """Names of the axes of the grid."""
-    return tuple(map(str, chart.status.dims))
-
-
 def _dense(arc: HybridArc) -> np.ndarray:
     """Points along an arc in order, dense enough for a smooth line, with both sides of each jump."""
     times = np.linspace(arc.t[0], arc.t[-1], POINTS_OF_A_PORTRAIT)
@@ -256,7 +258,7 @@ def plot_exponents(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
     ax
         Axes to draw into; by default those of a new figure.
     """
-    name, values = _only_axis(_as_chart(chart))
+    name, values = _only_axis(as_chart(chart))
     exponents, errors = chart.exponents.values, chart.standard_error.values
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
     ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
@@ -268,7 +270,7 @@ def plot_exponents(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
         ax.plot(values[order], middle, color=colour, linewidth=0.9, label=f"$\\lambda_{{{i + 1}}}$")
         ax.fill_between(values[order], middle - error, middle + error, color=colour, alpha=0.25, linewidth=0)
     _mark_failures(ax, values[chart.status.values != StatusCode.SUCCESS])
-    ax.set_xlabel(_label(chart, name))
+    ax.set_xlabel(label_of(chart, name))
     ax.set_ylabel("Lyapunov exponents")
     ax.grid(True, axis="y")
     if exponents.shape[-1] > 1:
@@ -293,7 +295,7 @@ def plot_bifurcation(chart: xarray.Dataset, component: str | None = None, *, ax:
     ArgumentError
         If the chart is over two axes or has no section.
     """
-    name, values = _only_axis(_as_chart(chart))
+    name, values = _only_axis(as_chart(chart))
     points = chart.sizes.get("sample", 0)
     if points == 0:
         raise ArgumentError("chart must have section points; this one has none. Compute it with section=100.")
@@ -302,54 +304,8 @@ def plot_bifurcation(chart: xarray.Dataset, component: str | None = None, *, ax:
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
     across, up = np.repeat(values, points), chart.section.values[:, :, i].ravel()
     ax.scatter(across, up, s=dot_area(len(up)), color=COLOURS[0], linewidths=0, rasterized=True)
-    ax.set_xlabel(_label(chart, name))
+    ax.set_xlabel(label_of(chart, name))
     ax.set_ylabel(names[i])
-    return ax
-
-
-def plot_map(chart: xarray.Dataset, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
-    """Map of an exponent over two axes: red if positive, blue if negative, grey if not computed.
-
-    An exponent within two standard errors of zero is drawn as zero, in white: noise does not look like chaos.
-
-    Parameters
-    ----------
-    chart
-        From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
-    exponent
-        Index of the exponent, 0 for the largest.
-    ax
-        Axes to draw into; by default those of a new figure.
-
-    Raises
-    ------
-    ArgumentError
-        If the chart is not over two axes.
-    """
-    check_axes(ax)
-    exponent = arguments.count("exponent", exponent, 0, _as_chart(chart).sizes["exponent"] - 1)
-    down, across = _two_axes(chart)
-    values = chart.exponents.values[..., exponent]
-    uncertain = np.abs(values) <= 2 * chart.standard_error.values[..., exponent]
-    values = np.where(uncertain, 0.0, values)
-    finite = np.abs(values[np.isfinite(values) & ~uncertain])
-    # With limits at the extremes, a few large values would leave the rest of the map pale.
-    limit = float(np.quantile(finite, 0.98)) if finite.size and finite.max() > 0 else 1.0
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
-    ax.set_facecolor("0.75")
-    mesh = ax.pcolormesh(
-        chart[across].values,
-        chart[down].values,
-        np.ma.masked_invalid(values),
-        cmap="RdBu_r",
-        vmin=-limit,
-        vmax=limit,
-        shading="nearest",
-        rasterized=True,
-    )
-    ax.figure.colorbar(mesh, ax=ax, extend="both", label=f"$\\lambda_{{{exponent + 1}}}$")
-    ax.set_xlabel(_label(chart, across))
-    ax.set_ylabel(_label(chart, down))
     return ax
 
 
@@ -367,9 +323,9 @@ def plot_chart(chart: xarray.Dataset, component: str | None = None) -> Figure:
     import matplotlib.pyplot as plt
 
     if component is not None:
-        as_component("component", _state_names(_as_chart(chart)), component)
-    if len(_axes_of(_as_chart(chart))) > 1:
-        _two_axes(chart)
+        as_component("component", _state_names(as_chart(chart)), component)
+    if len(axes_of(as_chart(chart))) > 1:
+        two_axes(chart)
         figure, ax = plt.subplots(figsize=(5.6, 4.4), layout="constrained")
         plot_map(chart, ax=ax)
         return figure
@@ -387,14 +343,8 @@ def _state_names(chart: xarray.Dataset) -> tuple[str, ...]:
     return tuple(map(str, chart.state.values))
 
 
-def _label(chart: xarray.Dataset, name: str) -> str:
-    """Name of an axis, with its unit if that is known."""
-    unit = chart[name].attrs.get("units", "")
-    return f"{name} ({unit})" if unit else name
-
-
 def _only_axis(chart: xarray.Dataset) -> tuple[str, np.ndarray]:
-    names = _axes_of(chart)
+    names = axes_of(chart)
     if len(names) != 1:
         raise ArgumentError(
             f"chart must be over one parameter; this one is over {' and '.join(names) or 'none'}. Use "
@@ -404,16 +354,6 @@ def _only_axis(chart: xarray.Dataset) -> tuple[str, np.ndarray]:
     if name not in chart.coords:
         raise ArgumentError("chart must be over one parameter; this one is over a table of points.")
     return name, chart[name].values
-
-
-def _two_axes(chart: xarray.Dataset) -> tuple[str, str]:
-    names = _axes_of(chart)
-    if len(names) != 2:
-        raise ArgumentError(
-            f"chart must be over two parameters for a map; this one is over {' and '.join(names) or 'none'}. "
-            "Use plot_exponents for one, and take a plane of more with chart.sel."
-        )
-    return names[0], names[1]
 
 
 def _mark_failures(ax: Axes, bad: np.ndarray) -> None:

@@ -526,6 +526,10 @@ def table(made):
             },
         ),
         (
+            call(lyapunov.plot.plot_kinds, chart),
+            {"ax": AXES, "chart": [None, "a", 3, arc, chart]},
+        ),
+        (
             call(lyapunov.plot.plot_map, chart),
             {
                 "ax": AXES,
@@ -702,7 +706,7 @@ def public_functions():
     for module in (hybrid, hybrid.testing, lyapunov):
         found += [getattr(module, name) for name in module.__all__]
     plots = [each for name, each in vars(lyapunov.plot).items() if name.startswith("plot_")]
-    assert len(plots) == 7
+    assert len(plots) == 8
     found += [*plots, lyapunov.plot.style, lyapunov.study.regimes.plot_regimes]
     found += [getattr(hybrid.plot, name) for name in hybrid.plot.__all__ if name.startswith("plot")]
     found += [each for name, each in vars(models).items() if inspect.isfunction(each)]

@@ -3,11 +3,14 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray
 
+import hybrid
 import lyapunov
 import models
 from hybrid import DOP853, ArgumentError
-from lyapunov.plot import plot_bifurcation, plot_chart, plot_exponents, plot_map
+from lyapunov.maps import KINDS
+from lyapunov.plot import kinds, plot_bifurcation, plot_chart, plot_exponents, plot_kinds, plot_map
 
 SHORT = {"intervals": 20, "transient": 5, "solver": DOP853(rtol=1e-6, atol=1e-8)}
 
@@ -54,12 +57,70 @@ def test_the_bifurcation_diagram_has_every_point(line):
 
 def test_a_map_is_white_at_zero_and_grey_where_nothing_is_known(grid):
     ax = plot_map(grid, ax=plt.figure().subplots())
+    # The values of d fall, so there is no image.
     (mesh,) = ax.collections
     assert mesh.norm(0.0) == 0.5
     shown = mesh.get_array()
     np.testing.assert_array_equal(shown[:, 0], grid.exponents[:, 0, 0])
     assert shown.mask[:, 1].all()
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("d", "r")
+
+
+def made(exponents, errors, forced="yes"):
+    """A chart with these exponents over two axes."""
+    shape = np.shape(exponents)[:2]
+    axes = ("b", "a")
+    values = {
+        "exponents": ((*axes, "exponent"), np.array(exponents, dtype=float), {"units": "1/s"}),
+        "standard_error": ((*axes, "exponent"), np.broadcast_to(errors, np.shape(exponents))),
+        "status": (axes, np.zeros(shape, dtype=int)),
+    }
+    coords = {"b": ("b", np.arange(shape[0]), {"units": "m"}), "a": np.arange(shape[1]) / 2}
+    return xarray.Dataset(values, coords, {"forced": forced})
+
+
+ROWS = [
+    [(-1.0, -2.0), (0.1, -2.0), (-0.1, 0.1)],
+    [(1.0, -2.0), (1.0, 0.0), (np.nan, np.nan)],
+]
+
+
+@pytest.mark.parametrize(
+    ("forced", "found"),
+    [
+        ("yes", [["periodic", "torus", "torus"], ["chaotic", "chaotic", "not known"]]),
+        ("no", [["at rest", "periodic", "torus"], ["chaotic", "chaotic", "not known"]]),
+    ],
+)
+def test_signs_tell_the_kinds_of_motion(forced, found):
+    chart = made(ROWS, 0.2, forced)
+    assert [[KINDS[i] for i in row] for row in kinds(chart).values] == found
+    ax = plot_kinds(chart)
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {*found[0], *found[1]}
+
+
+def test_noise_is_white_and_a_few_large_values_leave_colours_to_the_rest():
+    values = np.full((10, 20, 1), -0.5)
+    values[0, 0], values[0, 1] = 1e3, 0.19
+    ax = plot_map(made(values, 0.1))
+    (image,) = ax.images
+    assert (image.norm.vmin, image.norm.vmax) == (-0.5, 0.5)
+    assert image.get_array()[0, 1] == 0.0
+    assert image.get_extent() == [-0.25, 9.75, -0.5, 9.5]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "b (m)")
+    assert ax.figure.axes[1].get_ylabel() == "$\\lambda_{1}$ (1/s)"
+
+
+def test_the_kind_needs_no_forcing():
+    """Van der Pol's oscillator comes to rest, or to its limit cycle."""
+    cycle = hybrid.HybridSystem(
+        state=("x", "y"),
+        parameters={"mu": 1.0},
+        modes=[hybrid.Mode("on", lambda t, x, p: (x.y, p.mu * (1 - x.x**2) * x.y - x.x))],
+    )
+    options = {"k": 2, "intervals": 200, "interval": 5.0, "transient": 20}
+    chart = lyapunov.chart(cycle, {"mu": [-0.5, 1.0]}, (0.5, 0.0), **options)
+    assert [KINDS[i] for i in kinds(chart).values] == ["at rest", "periodic"]
 
 
 def test_a_figure_of_each_kind(line, grid):

@@ -1,0 +1,172 @@
+"""Maps of exponents over two axes of a chart, and what motion their signs tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid import ArgumentError, arguments
+from hybrid.plot.style import axes_for, check_axes
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+FIGURE = (5.6, 4.4)
+KINDS = ("not known", "at rest", "periodic", "torus", "chaotic")
+# Grey where nothing is known; the others are distinct for the colour-blind, and in grey.
+COLOURS_OF_KINDS = ("#BFBFBF", "#FFFFFF", "#56B4E9", "#F0E442", "#B2182B")
+# Share of the values that the colours tell apart: a few large exponents do not leave the rest pale.
+SHOWN = 0.98
+# Share of a step by which equally spaced values may differ.
+EVEN = 1e-6
+
+
+def as_chart(value: Any) -> Any:
+    """A dataset of :func:`lyapunov.chart`."""
+    if "exponents" not in getattr(value, "data_vars", ()):
+        raise arguments.refusal("chart", "be a dataset made with lyapunov.chart", value)
+    return value
+
+
+def axes_of(chart: Any) -> tuple[str, ...]:
+    """Names of the axes of the grid."""
+    return tuple(map(str, chart.status.dims))
+
+
+def label_of(chart: xarray.Dataset, name: str) -> str:
+    """Name of an axis, with its unit if that is known."""
+    unit = chart[name].attrs.get("units", "")
+    return f"{name} ({unit})" if unit else name
+
+
+def settled(chart: xarray.Dataset) -> np.ndarray:
+    """The exponents ``(*grid, k)``; those within two standard errors of zero are zero."""
+    values = chart.exponents.values
+    return np.where(np.abs(values) <= 2 * chart.standard_error.values, 0.0, values)
+
+
+def kinds(chart: xarray.Dataset) -> xarray.DataArray:
+    """What motion each row settles on, by the signs of its exponents: an index into ``KINDS``.
+
+    An exponent within two standard errors of zero counts as zero. Chaotic: some exponent is positive. Torus:
+    an exponent is zero. Periodic: all are negative. A system without a forcing period has one more zero, that
+    of the direction of the flow, unless it comes to rest; so it takes ``k=2`` to tell a torus there.
+
+    Parameters
+    ----------
+    chart
+        From :func:`lyapunov.chart`, over any axes.
+    """
+    values = settled(as_chart(chart))
+    known = np.isfinite(values[..., 0]) | np.isneginf(values[..., 0])
+    zeros = (values == 0.0).sum(axis=-1)
+    if chart.attrs.get("forced", "yes") == "yes":
+        regular = np.where(zeros > 0, KINDS.index("torus"), KINDS.index("periodic"))
+    else:
+        regular = np.choose(np.minimum(zeros, 2), [KINDS.index(name) for name in KINDS[1:4]])
+    found = np.where((values > 0.0).any(axis=-1), KINDS.index("chaotic"), regular)
+    flags = {"flag_values": list(range(len(KINDS))), "flag_meanings": " ".join(KINDS).replace("t k", "t_k")}
+    return chart.status.copy(data=np.where(known, found, 0)).assign_attrs(flags).rename("kind")
+
+
+def plot_map(chart: xarray.Dataset, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
+    """Map of an exponent over two axes: red if positive, blue if negative, grey if not computed.
+
+    An exponent within two standard errors of zero is drawn as zero, in white: noise does not look like chaos.
+    The scale ends at the value that 98 % of the others do not exceed.
+
+    Parameters
+    ----------
+    chart
+        From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
+    exponent
+        Index of the exponent, 0 for the largest.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Raises
+    ------
+    ArgumentError
+        If the chart is not over two axes.
+    """
+    check_axes(ax)
+    exponent = arguments.count("exponent", exponent, 0, as_chart(chart).sizes["exponent"] - 1)
+    two_axes(chart)
+    values = settled(chart)[..., exponent]
+    sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    limit = float(np.quantile(sizes, SHOWN)) if sizes.size else 1.0
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    shades = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
+    picture = _drawn(chart, np.ma.masked_invalid(values), ax, shades)
+    unit = chart.exponents.attrs.get("units", "")
+    label = f"$\\lambda_{{{exponent + 1}}}$" + (f" ({unit})" if unit else "")
+    ax.figure.colorbar(picture, ax=ax, extend="both", label=label)
+    return ax
+
+
+def plot_kinds(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
+    """Map of the kinds of motion over two axes: periodic, torus, chaotic (see :func:`kinds`).
+
+    Parameters
+    ----------
+    chart
+        From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
+    ax
+        Axes to draw into; by default those of a new figure.
+
+    Raises
+    ------
+    ArgumentError
+        If the chart is not over two axes.
+    """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    check_axes(ax)
+    two_axes(as_chart(chart))
+    found = kinds(chart).values
+    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    shades = {"cmap": ListedColormap(COLOURS_OF_KINDS), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
+    _drawn(chart, found, ax, shades)
+    patches = [
+        Patch(facecolor=COLOURS_OF_KINDS[i], edgecolor="0.4", linewidth=0.5, label=KINDS[i])
+        for i in np.unique(found)
+    ]
+    ax.legend(handles=patches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(patches))
+    return ax
+
+
+def _drawn(chart: xarray.Dataset, values: Any, ax: Axes, shades: dict[str, Any]) -> Any:
+    """Values over the two axes of a chart: an image where both are evenly spaced, else a mesh."""
+    down, across = two_axes(chart)
+    x, y = chart[across].values, chart[down].values
+    ax.set_facecolor(COLOURS_OF_KINDS[0])
+    if _is_even(x) and _is_even(y):
+        dx, dy = (x[1] - x[0]) / 2, (y[1] - y[0]) / 2
+        extent = (x[0] - dx, x[-1] + dx, y[0] - dy, y[-1] + dy)
+        options: dict[str, Any] = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
+        picture: Any = ax.imshow(values, extent=extent, **options, **shades)
+    else:
+        picture = ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, **shades)
+    ax.set_xlabel(label_of(chart, across))
+    ax.set_ylabel(label_of(chart, down))
+    return picture
+
+
+def _is_even(values: np.ndarray) -> bool:
+    """Whether values rise in equal steps."""
+    steps = np.diff(values)
+    return len(steps) > 0 and steps.min() > 0 and np.ptp(steps) <= EVEN * steps.max()
+
+
+def two_axes(chart: xarray.Dataset) -> tuple[str, str]:
+    """Names of the two axes of a chart, or an ArgumentError."""
+    names = axes_of(chart)
+    if len(names) != 2:
+        raise ArgumentError(
+            f"chart must be over two parameters for a map; this one is over {' and '.join(names) or 'none'}. "
+            "Use plot_exponents for one, and take a plane of more with chart.sel."
+        )
+    return names[0], names[1]
