@@ -13,7 +13,7 @@ import os
 import shutil
 import uuid
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -138,19 +138,25 @@ class Store:
 
     def write(self, part: Part) -> None:
         """Write the finished points of a part, all or nothing."""
-        done = np.flatnonzero(~np.isin(part.codes, UNFINISHED))
-        if not done.size:
-            return
-        kept = part.at(part.rows[done], done)
-        name = f"{uuid.uuid4().hex}{SUFFIX}"
         try:
-            _replace(
-                self.path / INSIDE / PARTS / name,
-                written(kept, [self.keys[row] for row in kept.rows.tolist()]),
-            )
+            name, _ = write_part(self.path, part, self.keys)
         except OSError as failure:
             raise _unwritable(self.path, failure) from failure
         self.seen.add(name)
+
+    def seal(self) -> str:
+        """What a worker must find in the folder to know that it sees this store."""
+        return _read(self.path / INSIDE / MADE_BY)
+
+    def receive(self, name: str, rows: np.ndarray, sheet: Sheet) -> None:
+        """Put the results of a file that a worker has written into the sheet."""
+        try:
+            _, part = read_part(self.path / INSIDE / PARTS / name)
+        except OSError:
+            # A network may show the file to this machine a little later: it is read when the sweep ends.
+            return
+        self.seen.add(name)
+        sheet.put(part.at(rows, np.arange(len(rows))))
 
     def finish(self, found: xarray.Dataset, changed: bool) -> None:
         """Lay the dataset out as a zarr group, unless it is there already."""
@@ -161,6 +167,22 @@ class Store:
                 _lay_out(found, self.path)
         except OSError as failure:
             raise _unwritable(self.path, failure) from failure
+
+
+def write_part(path: Path, part: Part, keys: Sequence[bytes] | Mapping[int, bytes]) -> tuple[str, np.ndarray]:
+    """Write the finished points of a part, all or nothing: name of the file, if any, and its rows."""
+    done = np.flatnonzero(~np.isin(part.codes, UNFINISHED))
+    if not done.size:
+        return "", part.rows[done]
+    kept = part.at(part.rows[done], done)
+    name = f"{uuid.uuid4().hex}{SUFFIX}"
+    _replace(path / INSIDE / PARTS / name, written(kept, [keys[row] for row in kept.rows.tolist()]))
+    return name, kept.rows
+
+
+def sees_store(path: Path, seal: str) -> bool:
+    """Whether a folder, seen from this machine, is the store with this seal."""
+    return bool(seal) and _read(path / INSIDE / MADE_BY) == seal
 
 
 def open(path: str | os.PathLike[str]) -> xarray.Dataset:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from datetime import UTC, datetime
+from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from hybrid.sweep.job import Job
 from hybrid.sweep.local import run_in_threads
 from hybrid.sweep.outcome import Part
 from hybrid.sweep.points import as_points
-from hybrid.sweep.remote import as_executor, run_on
+from hybrid.sweep.remote import Target, as_executor, run_on
 from hybrid.sweep.sheet import Labels, Sheet
 
 if TYPE_CHECKING:
@@ -53,7 +54,8 @@ def sweep(
         call again computes only the points that the store lacks. Needs the extra ``grid``.
     executor
         By default threads on all cores; a number of threads; a ``concurrent.futures.Executor``; or a
-        ``dask.distributed.Client``, which needs the extra ``grid``.
+        ``dask.distributed.Client``, which needs the extra ``grid``. Workers that see the folder of the store
+        write there themselves.
     progress
         Whether to show a progress bar with the time left; by default in a terminal or a notebook, after two
         seconds.
@@ -117,7 +119,13 @@ def sweep(
             pool = executor if isinstance(executor, ThreadPoolExecutor) else None
             run_in_threads(job, keep, bar.update, stored=kept is not None, pool=pool, threads=threads)
         else:
-            run_on(executor, job, keep, bar.update)
+            target = None
+            if kept is not None:
+                path = str(kept.path.absolute())
+                target = Target(path, kept.seal(), kept.keys, partial(kept.receive, sheet=sheet))
+            run_on(executor, job, keep, bar.update, target)
+    if kept is not None and sheet.untouched().any():
+        kept.read_into(sheet)
     found = sheet.dataset(labels, made_by)
     if kept is not None:
         kept.finish(found, len(job.rows) > 0)

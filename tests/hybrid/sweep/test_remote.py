@@ -18,6 +18,7 @@ import models
 from hybrid import HybridError, StatusCode, sweep
 from hybrid.sweep import job
 from hybrid.sweep.points import as_points
+from hybrid.sweep.store import Store
 
 pytest.importorskip("cloudpickle")
 
@@ -29,6 +30,10 @@ def pool():
     # Fresh interpreters, because the tests have threads.
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
         yield executor
+
+
+def np_sin(p):
+    return {"y": np.sin(p["a"])}
 
 
 def same(one, other):
@@ -63,6 +68,21 @@ def test_charts_travel_with_their_models(pool, continue_from, tmp_path):
     stored = make(executor=pool, store=tmp_path / "s")
     assert same(stored, make())
     assert same(stored, hybrid.open(tmp_path / "s"))
+
+
+def test_workers_write_into_a_store_that_they_see(pool, tmp_path, monkeypatch):
+    pytest.importorskip("zarr")
+    writers = []
+    monkeypatch.setattr(Store, "write", lambda self, part: writers.append(len(part.rows)))
+    over = {"a": np.arange(30.0)}
+    whole = sweep(np_sin, over, store=tmp_path / "s", executor=pool)
+    assert not writers
+    assert same(whole, sweep(np_sin, over))
+    assert same(whole, hybrid.open(tmp_path / "s"))
+    # A worker on a machine where the folder is another one sends its results back.
+    monkeypatch.setattr(Store, "seal", lambda self: "of another store")
+    sweep(np_sin, {"a": np.arange(40.0)}, store=tmp_path / "s", executor=pool)
+    assert sum(writers) == 10
 
 
 def test_a_broken_pool_is_said_and_the_rest_is_computed_later(tmp_path):
