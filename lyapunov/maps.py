@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid import ArgumentError, arguments
+from hybrid import ArgumentError, StatusCode, arguments
 from hybrid.plot.style import axes_for, check_axes
 
 if TYPE_CHECKING:
@@ -52,7 +52,8 @@ def kinds(chart: xarray.Dataset) -> xarray.DataArray:
 
     An exponent within two standard errors of zero counts as zero. Chaotic: some exponent is positive. Torus:
     an exponent is zero. Periodic: all are negative. A system without a forcing period has one more zero, that
-    of the direction of the flow, unless it comes to rest; so it takes ``k=2`` to tell a torus there.
+    of the direction of the flow, unless it comes to rest; so it takes ``k=2`` to tell a torus there. Nothing
+    is known of rows that did not reach their end.
 
     Parameters
     ----------
@@ -61,6 +62,7 @@ def kinds(chart: xarray.Dataset) -> xarray.DataArray:
     """
     values = settled(as_chart(chart))
     known = np.isfinite(values[..., 0]) | np.isneginf(values[..., 0])
+    known &= chart.status.values == StatusCode.SUCCESS
     zeros = (values == 0.0).sum(axis=-1)
     if chart.attrs.get("forced", "yes") == "yes":
         regular = np.where(zeros > 0, KINDS.index("torus"), KINDS.index("periodic"))

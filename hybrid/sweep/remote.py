@@ -24,8 +24,10 @@ from hybrid.sweep.job import Job, computed
 from hybrid.sweep.outcome import UNFINISHED, Part
 from hybrid.sweep.store import sees_store, write_part
 
-# Seconds of work in a chunk, and how many chunks wait for each worker.
+# Seconds of work in a chunk, at least so many for each worker, and how many chunks wait for each worker. The
+# scheduler and the client need about 10 ms per chunk: many workers must not ask for chunks faster than that.
 SECONDS_OF_A_CHUNK = 2.0
+SECONDS_PER_WORKER = 0.02
 CHUNKS_PER_WORKER = 3
 LARGEST_CHUNK = 20_000
 # Seconds between two looks for Ctrl-C.
@@ -209,7 +211,8 @@ class _Chunks:
         size = 1
         if self.seconds_per_unit is not None:
             fair = max(self.left // (CHUNKS_PER_WORKER * self.workers), 1)
-            size = max(1, min(LARGEST_CHUNK, fair, int(SECONDS_OF_A_CHUNK / self.seconds_per_unit)))
+            seconds = max(SECONDS_OF_A_CHUNK, SECONDS_PER_WORKER * self.workers)
+            size = max(1, min(LARGEST_CHUNK, fair, int(seconds / self.seconds_per_unit)))
         chunk = [unit for _ in range(size) if (unit := self.next_unit()) is not None]
         return chunk or None
 

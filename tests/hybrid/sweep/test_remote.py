@@ -16,7 +16,7 @@ import hybrid
 import lyapunov
 import models
 from hybrid import HybridError, StatusCode, sweep
-from hybrid.sweep import job
+from hybrid.sweep import job, remote
 from hybrid.sweep.points import as_points
 from hybrid.sweep.store import Store
 
@@ -139,6 +139,16 @@ def test_a_worker_that_dies_has_its_chunks_done_by_others(client, tmp_path):
     np.testing.assert_array_equal(swept.y, np.sin(over["a"]))
     assert len(set(swept.by.values)) >= 2
     assert same(swept, hybrid.open(tmp_path / "s"))
+
+
+@pytest.mark.parametrize(("workers", "points"), [(2, 2000), (200, 4000)])
+def test_chunks_grow_with_the_number_of_workers(workers, points):
+    """A row of 1 ms: two seconds of work, and 20 ms for each worker."""
+    count = 3 * workers * points
+    over = as_points({"a": np.arange(float(count))})
+    chunks = remote._Chunks(job.Job(None, over, np.arange(count), None), workers)
+    chunks.learn([[0]], 1e-3)
+    assert len(chunks.next()) == points
 
 
 def test_lines_stay_whole_in_chunks():
