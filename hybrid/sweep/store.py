@@ -117,9 +117,13 @@ class Store:
 
     def read_into(self, sheet: Sheet) -> None:
         """Put the results that other calls and processes have written so far into the sheet."""
-        rows_of: dict[bytes, list[int]] = {}
-        for row, key in enumerate(self.keys):
-            rows_of.setdefault(key, []).append(row)
+        row_of = dict(zip(self.keys, range(len(self.keys)), strict=True))
+        # Rows of points that occur again later.
+        earlier: dict[bytes, list[int]] = {}
+        if len(row_of) < len(self.keys):
+            for row, key in enumerate(self.keys):
+                if row_of[key] != row:
+                    earlier.setdefault(key, []).append(row)
         for path in sorted((self.path / INSIDE / PARTS).glob(f"*{SUFFIX}")):
             if path.name in self.seen:
                 continue
@@ -131,10 +135,14 @@ class Store:
                     f"store: the file {str(path)!r} is damaged: {failure}. Delete this file and call again: "
                     "its points are then computed again."
                 ) from None
-            found = [(row, place) for place, key in enumerate(keys) for row in rows_of.get(key, ())]
-            if found:
-                rows, places = np.array(found, dtype=np.int64).T
-                sheet.put(part.at(rows, places))
+            rows = np.array([row_of.get(key, -1) for key in keys], dtype=np.int64)
+            places = np.flatnonzero(rows >= 0)
+            if places.size:
+                sheet.put(part.at(rows[places], places))
+            if earlier:
+                again = [(row, place) for place, key in enumerate(keys) for row in earlier.get(key, ())]
+                if again:
+                    sheet.put(part.at(*np.array(again, dtype=np.int64).T))
 
     def write(self, part: Part) -> None:
         """Write the finished points of a part, all or nothing."""
