@@ -214,6 +214,8 @@ class HybridSystem(Portable):
 
     def parts_of(self, name: str) -> list[int]:
         """Indices of the modes that are parts of a mode, or of the one mode of that name."""
+        if not isinstance(name, str):
+            return [self.mode_index(name)]
         parts = [i for i, mode in enumerate(self.modes) if name in (mode.name, mode.part_of)]
         return parts or [self.mode_index(name)]
 

@@ -61,7 +61,8 @@ def growing(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
 
     @wraps(function)
     def call(system: Any, *args: P.args, **kwargs: P.kwargs) -> R:
-        growth = getattr(system, "growth", None)
+        # The function itself refuses what is no system.
+        growth = None if isinstance(system, type) else getattr(system, "growth", None)
         while growth is not None:
             try:
                 return function(growth.current, *args, **kwargs)

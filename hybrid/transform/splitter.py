@@ -93,8 +93,7 @@ class Splitter:
     def current(self) -> HybridSystem:
         """The system with all modes that have been made so far."""
         with self.lock:
-            if self.stage is None:
-                self.stage = self._assembled()
+            self.stage = self.stage or self._assembled()
             return self.stage
 
     def leads_on(self, transition: str) -> bool:
@@ -179,8 +178,7 @@ class Splitter:
     def _assembled(self) -> HybridSystem:
         """The system of all cells that have been made."""
         transitions: list[Transition] = []
-        is_whole = True
-        used: set[str] = set()
+        used, is_whole = set[str](), True
         for cell in self.made:
             for edge in self._leaving(cell):
                 transition = edge.transition
