@@ -221,7 +221,9 @@ class HybridSystem(Portable):
 
     def copies_of(self, name: str) -> list[int]:
         """Indices of the transitions that are copies of a transition, or of the one of that name."""
-        copies = [i for i, each in enumerate(self.transitions) if name in (each.name, each.part_of)]
+        copies = []
+        if isinstance(name, str):
+            copies = [i for i, each in enumerate(self.transitions) if name in (each.name, each.part_of)]
         return copies or [self.transition_index(name)]
 
     def transition_index(self, name: str | Transition) -> int:

@@ -338,6 +338,7 @@ def table(made):
                 "name": [*TEXT, ""],
                 "field": [None, *FUNCTION],
                 "jacobian": FUNCTION,
+                "part_of": [*TEXT[1:], ""],
             },
         ),
         (
@@ -360,6 +361,7 @@ def table(made):
                 "reset": ["a", 3, lambda t, x, p: x],
                 "accumulates_to": [*TEXT[1:], ""],
                 "name": [*TEXT, ""],
+                "part_of": [*TEXT[1:], ""],
             },
         ),
         (
@@ -641,6 +643,8 @@ def table(made):
         (call(hybrid.HybridArc.__call__, arc, 0.5), {"t": [*NUMBERS, math.nan, -1.0, 2.0, [0.5, math.nan]]}),
         (call(hybrid.PeriodicOrbit.arc, made["orbit"]), {"solver": SOLVER}),
         (call(HybridSystem.mode_index, BALL, "flight"), {"name": [None, *NAME]}),
+        (call(HybridSystem.parts_of, BALL, "flight"), {"name": [None, *NAME]}),
+        (call(HybridSystem.copies_of, BALL, "bounce"), {"name": [None, *NAME]}),
         (call(HybridSystem.transition_index, BALL, "bounce"), {"name": [None, *NAME]}),
         (call(HybridSystem.parameter_values, BALL), {"overrides": OF_BALL}),
         (call(HybridSystem.forcing_period, OSCILLATOR), {"overrides": PARAMETERS}),
@@ -669,6 +673,7 @@ def table(made):
 
 # Classes that only the library creates, and errors.
 NOT_CALLED = {
+    "PiecewiseAffineField",
     "Status",
     "StatusCode",
     "HybridError",
@@ -695,7 +700,7 @@ NOT_CALLED = {
     "Panel",
 }
 # Classes whose methods only the library and its properties call.
-WITHOUT_METHODS = {"Case", "CompiledSystem", "Engine", "Run"}
+WITHOUT_METHODS = {"Case", "CompiledSystem", "Engine", "PiecewiseAffineField", "Run"}
 # Arguments of methods that have another name in the function called.
 ALSO_CALLED = {"overrides": "parameters", "name": "mode", "flip": "elastic"}
 
@@ -720,6 +725,10 @@ def public_functions():
     return [each for each in found if each.__name__ not in NOT_CALLED]
 
 
+# What only a system that has been split has.
+BY_SPLIT = ("notes", "growth")
+
+
 def arguments_of(function):
     """Names of the arguments that a caller gives."""
     if not callable(function):
@@ -727,7 +736,7 @@ def arguments_of(function):
     return [
         name
         for name in inspect.signature(function).parameters
-        if name not in ("self", "cls", "args", "kwargs", "options")
+        if name not in ("self", "cls", "args", "kwargs", "options", *BY_SPLIT)
     ]
 
 
