@@ -6,8 +6,11 @@ import ast
 import linecache
 from functools import reduce
 from itertools import islice, pairwise
+from threading import Lock
 from types import FrameType
 
+# Python 3.11 reports an error if two threads build syntax trees at the same time.
+PARSER = Lock()
 CANNOT = "a branch cannot be traced"
 OTHERWISE = (
     "make its sides modes joined by a guard, or write np.where(condition, a, b) in place of if, "
@@ -37,7 +40,8 @@ def _replacement(frame: FrameType) -> tuple[int, str, str] | None:
         return None
     line, _, column, _ = place
     try:
-        tree = ast.parse("".join(linecache.getlines(code.co_filename, frame.f_globals)))
+        with PARSER:
+            tree = ast.parse("".join(linecache.getlines(code.co_filename, frame.f_globals)))
     except SyntaxError:
         return None
     following: dict[ast.AST, ast.AST] = {}
@@ -127,8 +131,10 @@ def _chosen(test: ast.expr, a: ast.expr, b: ast.expr) -> ast.expr:
         pairs = zip(a.elts, b.elts, strict=True)
         entries = [c if ast.dump(c) == ast.dump(d) else _chosen(test, c, d) for c, d in pairs]
         return ast.Tuple(entries, ast.Load())
-    condition = ast.parse(_condition(test), mode="eval").body
-    return ast.Call(ast.parse("np.where", mode="eval").body, [condition, a, b], [])
+    with PARSER:
+        condition = ast.parse(_condition(test), mode="eval").body
+    where = ast.Attribute(ast.Name("np", ast.Load()), "where", ast.Load())
+    return ast.Call(where, [condition, a, b], [])
 
 
 def _statement(node: ast.If, following: ast.AST | None) -> str | None:

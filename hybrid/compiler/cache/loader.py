@@ -15,6 +15,7 @@ from typing import Any
 
 from hybrid.compiler.cache import second_process
 from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, source_key
+from hybrid.symbolic.branches import PARSER
 
 DRIVER = "hybrid.kernels.drive"
 # Every run needs these kernels too. A second process compiles them while this one compiles the driver.
@@ -34,6 +35,7 @@ ALL_KERNELS = (
     "hybrid.kernels.events.initial_mode",
     "hybrid.kernels.steps.step",
     "lyapunov.kernels",
+    "lyapunov.study.kernels",
 )
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
@@ -132,7 +134,9 @@ def _own_sources(module: str) -> set[Path]:
         if path is None or path in found or path.name == "__init__.py":
             continue
         found.add(path)
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        with PARSER:
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == package:
                 left += [str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):

@@ -20,6 +20,7 @@ from hybrid.compiler.llvm.builder import Builder
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE, Call
 from hybrid.kernels.arithmetic.lanes import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
+from hybrid.symbolic.branches import PARSER
 
 TRUTH = ir.IntType(1)
 LANES = vector_of(NARROW)
@@ -414,5 +415,6 @@ def _is_at_hand(node: ast.expr) -> bool:
 
 def parsed(source: str) -> dict[str, ast.FunctionDef]:
     """The functions of a text, by name."""
-    nodes: Sequence[ast.stmt] = ast.parse(source).body
+    with PARSER:
+        nodes: Sequence[ast.stmt] = ast.parse(source).body
     return {node.name: node for node in nodes if isinstance(node, ast.FunctionDef)}
