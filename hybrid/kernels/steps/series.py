@@ -292,13 +292,17 @@ def series_step(task, remaining):
             h *= theta
             evaluate_with_sizes(series, order, h, 0, front)
             run.pending = fired
+    finest = 4.0 * EPSILON * measured_time(model, run, mode)
     span = h if clock < 0 else min(series[order + 1, clock], remaining)
+    if clock >= 0 and fired == NO_TRANSITION and not cut:
+        # The clock shows the end up to its rounding; no step leads through what would be left.
+        if remaining - span <= max(finest, 4.0 * EPSILON * series[order + 2, clock]):
+            span = remaining
     if clock >= 0:
         crawls = fired == NO_TRANSITION and span <= CRAWL * run.since_entry and span < remaining
         run.crawling = run.crawling + 1 if crawls else 0
         if run.crawling > MOST_CRAWLING:
             return STEP_TOO_SMALL, 0.0
-    finest = 4.0 * EPSILON * measured_time(model, run, mode)
     if fired == NO_TRANSITION and not span > finest and span < remaining:
         return STEP_TOO_SMALL, 0.0
     if record.step_phase.shape[0] > 0 and span > 0.0:

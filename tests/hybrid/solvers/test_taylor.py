@@ -3,6 +3,8 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import hybrid
 import models
@@ -10,6 +12,19 @@ from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition,
 from tests.reference.load import reference
 
 FOUNDING = reference("founding_system")
+# A point that is pushed against a Hertz contact, with no forcing: every stay has a clock of its own.
+CONTACT = HybridSystem(
+    state=("z", "v"),
+    parameters={"K": 1.0, "F": 1.0},
+    modes=[
+        Mode("free", lambda t, x, p: (x.v, p.F)),
+        Mode("contact", lambda t, x, p: (x.v, p.F - p.K * np.maximum(x.z, 0.0) ** 1.5)),
+    ],
+    transitions=[
+        Transition("free", "contact", Guard(lambda t, x, p: x.z, +1)),
+        Transition("contact", "free", Guard(lambda t, x, p: x.z, -1)),
+    ],
+)
 
 
 def ulps(found, exact):
@@ -135,23 +150,30 @@ def test_a_run_may_end_and_resume_inside_a_contact():
 
 def test_a_contact_entered_at_rest():
     """A constant push from zero depth and speed doubles the static depth of a Hertz contact."""
-    system = HybridSystem(
-        state=("z", "v"),
-        parameters={"K": 1.0, "F": 1.0},
-        modes=[
-            Mode("free", lambda t, x, p: (x.v, p.F)),
-            Mode("contact", lambda t, x, p: (x.v, p.F - p.K * np.maximum(x.z, 0.0) ** 1.5)),
-        ],
-        transitions=[
-            Transition("free", "contact", Guard(lambda t, x, p: x.z, +1)),
-            Transition("contact", "free", Guard(lambda t, x, p: x.z, -1)),
-        ],
-    )
-    arc = simulate(system, (0.0, 0.0), (0.0, 6.0), mode="contact")
+    arc = simulate(CONTACT, (0.0, 0.0), (0.0, 6.0), mode="contact")
     assert arc.status.ok
     z, v = arc(np.linspace(0.0, 6.0, 50)).T
     np.testing.assert_allclose(v**2 / 2 + 0.4 * np.maximum(z, 0.0) ** 2.5 - z, 0.0, atol=1e-9)
     assert z.max() == pytest.approx(2.5 ** (2 / 3), rel=1e-2)
+
+
+@given(
+    end=st.floats(-3.0, 2.0).map(lambda power: 10.0**power),
+    z=st.sampled_from((0.0, -1.0, -0.01)),
+    v=st.floats(0.0, 2.0),
+    tangent=st.booleans(),
+)
+def test_a_run_may_end_anywhere_in_a_contact(end, z, v, tangent):
+    """The clock of the contact shows the end of a run to rounding, and the run is then complete.
+
+    It was not: where the clock ended one rounding short, no step led through what was left.
+    """
+    arc = simulate(CONTACT, (z, v), (0.0, end), mode="contact" if z == 0.0 else "free", tangent=tangent)
+    assert arc.status.ok
+    assert arc.t[-1] == end
+    z_end, v_end = arc.x[-1]
+    energy = v_end**2 / 2 + 0.4 * max(z_end, 0.0) ** 2.5 - z_end
+    assert energy == pytest.approx(v**2 / 2 - z, rel=1e-8, abs=1e-9)
 
 
 def test_modes_without_series_run_beside_those_with():
