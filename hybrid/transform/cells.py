@@ -21,6 +21,7 @@ from hybrid.symbolic.expressions import ZERO
 from hybrid.symbolic.switches import Surfaces, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
+from hybrid.transform import additive
 from hybrid.transform.surface import SwitchingSurface
 
 # Two solutions for the shares on an intersection count as one if their relative difference is less than the
@@ -215,7 +216,13 @@ class Pieces:
         shares = self.shares(sides)
         if shares is not None:
             return shares.flow
-        return self.between(sides, on[-1]).sliding_field
+        field = self._additive_field(sides, on)
+        return self.between(sides, on[-1]).sliding_field if field is None else expressed(field)
+
+    def _additive_field(self, sides: Sides, on: Sequence[int]) -> list[sympy.Expr] | None:
+        symbols, known = self.surfaces.symbols, self.surfaces.known
+        gradients = jacobian_of([known[number].height for number in on], symbols.variables)
+        return additive.sliding_field(lambda own: self._vertex_field({**sides, **own}), on, gradients)
 
     def _vertex_field(self, sides: Sides) -> list[sympy.Expr]:
         return self._resolved(sides)[: self.size]

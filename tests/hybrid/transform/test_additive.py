@@ -1,0 +1,59 @@
+"""Sliding along several surfaces whose jumps add up, against the linear system for the shares."""
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hybrid import from_equations, simulate
+from hybrid.transform.additive import sliding_field
+
+
+@given(size=st.integers(1, 4), seed=st.integers(0, 10**6))
+def test_the_shares_solve_the_linear_system(size, seed):
+    """Surfaces ``n_i x + t = 0``, fields ``f + sum_i s_i d_i`` at the corners."""
+    rng = np.random.default_rng(seed)
+    n = size + 1
+    middle = rng.integers(-4, 5, n)
+    jumps = rng.integers(-3, 4, (size, n))
+    normals = rng.integers(-3, 4, (size, n))
+
+    def vertex_field(sides):
+        return [sympy.Integer(int(middle[i])) + sum(
+            sympy.Integer(int(np.sign(side) * jumps[number, i])) for number, side in sides.items()
+        ) for i in range(n)]  # fmt: skip
+
+    matrix = normals @ jumps.T
+    gradients = [[*map(sympy.Integer, map(int, normal)), sympy.Integer(1)] for normal in normals]
+    found = sliding_field(vertex_field, range(size), gradients)
+    if abs(np.linalg.det(matrix)) < 0.5:
+        assert found is None
+        return
+    shares = np.linalg.solve(matrix, -(normals @ middle) - 1.0)
+    assert [float(each) for each in found] == pytest.approx(middle + shares @ jumps)
+
+
+def test_jumps_that_do_not_add_up_have_no_such_field():
+    def vertex_field(sides):
+        a, b = (np.sign(side) for side in sides.values())
+        return [sympy.Integer(int(a * b)), sympy.Integer(int(a)), sympy.Integer(int(b))]
+
+    gradients = [[sympy.Integer(int(i == k)) for i in range(4)] for k in (1, 2)]
+    assert sliding_field(vertex_field, [0, 1], gradients) is None
+
+
+def test_contacts_that_share_a_mass_matrix():
+    """Two dry contacts on coupled masses stick together; the forces that hold them are not one's own each."""
+    M = np.array([[2.0, 0.7], [0.7, 1.0]])
+    inverse = np.linalg.inv(M)
+
+    def rates(t, x, p):
+        force = np.array([p.A * np.cos(t), 0.5 * p.A * np.sin(t)]) - p.mu * np.sign(x[2:])
+        return np.concatenate([x[2:], inverse @ force])
+
+    system = from_equations(rates, state=4, parameters={"A": 0.3, "mu": 1.0})
+    arc = simulate(system, [0.0, 0.0, 1.0, -0.5], (0.0, 20.0))
+    assert arc.status.ok
+    assert arc.x[-1, 2:] == pytest.approx([0.0, 0.0], abs=1e-14)
+    assert "=0" in str(arc.mode[-1])
