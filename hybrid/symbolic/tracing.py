@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import lru_cache
 from typing import Any
 
 import attrs
@@ -59,6 +60,7 @@ class Symbols:
         return (*self.x, self.t)
 
 
+@lru_cache(maxsize=1000)
 def model_symbols(n: int, m: int) -> Symbols:
     """Real symbols ``t``, ``x[0] ... x[n-1]`` and ``p[0] ... p[m-1]``."""
     x = tuple(sympy.Symbol(f"x[{i}]", real=True) for i in range(n))

@@ -52,6 +52,15 @@ def test_periodic_functions_of_many_kinds(force):
     forced(right, force)
 
 
+@pytest.mark.parametrize("size", [1.0, 1e4, 1e8])
+def test_terms_that_cancel_are_compared_up_to_their_rounding(size):
+    """Large terms leave a rounding error, which is not the same one period later."""
+    forced(right, lambda t, p: (size + np.cos(p.w * t)) ** 2 - size**2 - 2 * size * np.cos(p.w * t))
+    forced(right, lambda t, p: size * np.cos(p.w * t + 0.1) - size * np.cos(p.w * t + 0.1 + 1e-9))
+    with pytest.raises(ModelError, match="is not a period"):
+        forced(right, lambda t, p: size * np.cos(p.w * t) + 1e-6 * size * np.cos(1.01 * p.w * t))
+
+
 @pytest.mark.parametrize("period", [4.83, 4.8332, 2 * np.pi / 1.3 * (1 + 1e-9), 2 * np.pi, 1e-3])
 def test_a_wrong_period_is_refused_when_the_system_is_made(period):
     with pytest.raises(ModelError, match=r"period = .* is not a period of the functions. Mode 'a': field is"):
