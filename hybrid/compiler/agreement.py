@@ -68,8 +68,7 @@ def check_agreement(compiled: Compiled) -> None:
     growth = compiled.system.growth
     known = {} if growth is None else growth.written
     for index, function in functions_of(compiled.system):
-        key = "agrees", function.value, function.derivative
-        if known.setdefault(key, key) is not key:
+        if known.setdefault(("agrees", *function.identity), function) is not function:
             # An earlier stage of the system, or another transition, has this function too.
             continue
         for t, x, values in points:

@@ -133,10 +133,14 @@ class CompiledSystem:
         """
         if part not in self.parts:
             # LLVM is imported only when a model is compiled.
-            from hybrid.compiler.llvm.functions import compiled_part
+            from hybrid.compiler.llvm.functions import compiled_part, compiled_stage
 
+            growth = self.system.growth
             with announced(f"hybrid: compiling {self.system.name or 'the model'} ..."):
-                self.parts[part] = compiled_part(self.emitted, part, self._own)
+                if growth is None or self._own:
+                    self.parts[part] = compiled_part(self.emitted, part, self._own)
+                else:
+                    self.parts[part] = compiled_stage(self.emitted, part, growth.written)
         found: dict[str, Any] = self.parts[part]
         return found
 

@@ -20,6 +20,7 @@ import sympy
 from hybrid.compiler.bounds.forcing import forcings
 from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
+from hybrid.compiler.cases import function_of_index
 from hybrid.compiler.emitted import Emitted, Propagator, Series
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
@@ -86,23 +87,29 @@ def _emitted(system: HybridSystem) -> Emitted:
     boundaries = [_boundaries(system, mode.name, guards, writer.symbols) for mode in system.modes]
     propagators = [
         writer.remembered(
-            ("propagator", mode.field, tuple(around)),
+            ("propagator", id(mode.field), tuple(around)),
             partial(propagator, field.expressions, around, writer.symbols),
         )
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
     n = system.dimension
     series = [each.series for each in propagators]
+    places = _places(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
         "field": [field.value for field in fields],
         "field_jacobian": [_zeros_first(field.derivative, n) for field in fields],
-        "variational_field": [_variational(field, n) for field in fields],
+        "variational_field": [
+            writer.remembered(
+                ("variational", id(mode.field), id(mode.jacobian)), partial(_variational, field, n)
+            )
+            for mode, field in zip(system.modes, fields, strict=True)
+        ],
         "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
         "guard_gradient": [guard.derivative for guard in guards],
         "reset": [reset.value for reset in resets],
         "reset_jacobian": [_zeros_first(reset.derivative, n) for reset in resets],
-        "series": _placed(series, [each.statements for each in series]),
-        "tangent_series": _placed(series, [each.tangent_statements for each in series]),
+        "series": _placed(places, [each.statements for each in series]),
+        "tangent_series": _placed(places, [each.tangent_statements for each in series]),
     }
     symbols = writer.symbols
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
@@ -118,7 +125,7 @@ def _emitted(system: HybridSystem) -> Emitted:
     not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
     return Emitted(
         texts={
-            part: "\n\n".join((IMPORTS, *(_function(name, bodies[name]) for name in names)))
+            part: "\n\n".join((IMPORTS, *(function_of_index(name, bodies[name]) for name in names)))
             for part, names in PARTS.items()
         },
         opaque=writer.opaque,
@@ -144,27 +151,46 @@ def _emitted(system: HybridSystem) -> Emitted:
         proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
         timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
         propagators=tuple(map(_without_text, propagators)),
-        tangent_start=_tangent_start(series),
+        tangent_start=places.vectors,
     )
 
 
-def _placed(series: Sequence[Series], statements: Sequence[Sequence[str]]) -> list[Sequence[str]]:
-    """The bodies of the series of all modes, each with its columns in the matrix that they share.
+@attrs.frozen
+class _Places:
+    """The columns of the series of all modes in the matrix that they share.
 
     Every mode has a table of its own, which stays when another mode writes its series.
+
+    Attributes
+    ----------
+    tables
+        By mode, the first column of its table; all are behind the columns of the state.
+    vectors
+        The first column of tangent vectors, behind all tables.
     """
-    table, vectors = max(each.columns for each in series), _tangent_start(series)
-    bodies: list[Sequence[str]] = []
-    for each, lines in zip(series, statements, strict=True):
-        bodies.append([f"table = {table}", f"vectors = {vectors}", *lines] if lines else [])
-        table += each.table_columns
-    return bodies
+
+    tables: tuple[int, ...]
+    vectors: int
 
 
-def _tangent_start(series: Sequence[Series]) -> int:
-    """The first column of tangent vectors: behind those of the state and behind all tables."""
-    whole = max(each.columns for each in series) + sum(each.table_columns for each in series)
-    return padded(whole, WIDE)
+def _places(series: Sequence[Series], *, with_room: bool) -> _Places:
+    """The columns of all series; ``with_room``, further modes seldom move those of the modes before them."""
+    size = _power_of_two_from if with_room else int
+    first = size(max(each.columns for each in series))
+    tables = [*accumulate((each.table_columns for each in series), initial=first)]
+    return _Places(tuple(tables[:-1]), padded(size(tables[-1]), WIDE))
+
+
+def _power_of_two_from(count: int) -> int:
+    return 1 << (count - 1).bit_length()
+
+
+def _placed(places: _Places, statements: Sequence[Sequence[str]]) -> list[Sequence[str]]:
+    """The bodies of the series of all modes, each with its columns."""
+    return [
+        [f"table = {table}", f"vectors = {places.vectors}", *lines] if lines else []
+        for table, lines in zip(places.tables, statements, strict=True)
+    ]
 
 
 def _without_text(propagator: Propagator) -> Propagator:
@@ -195,7 +221,10 @@ class _Writer:
         self._known: dict[Any, Any] = {} if system.growth is None else system.growth.written
 
     def remembered(self, key: Any, make: Callable[[], Result]) -> Result:
-        """What ``make`` returns; the same as the last time for the same key."""
+        """What ``make`` returns; the same as the last time for the same key.
+
+        A key may hold identities: the system, or what makes it grow, keeps its functions.
+        """
         if key not in self._known:
             self._known[key] = make()
         found: Result = self._known[key]
@@ -203,9 +232,7 @@ class _Writer:
 
     def write(self, function: ModelFunction) -> _Written:
         """Statements for a function and its derivative."""
-        return self.remembered(
-            (function.value, function.derivative, function.size), lambda: self._write(function)
-        )
+        return self.remembered(("written", *function.identity), lambda: self._write(function))
 
     def _write(self, function: ModelFunction) -> _Written:
         targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
@@ -224,7 +251,7 @@ class _Writer:
 
     def condition(self, function: ModelFunction) -> _Written:
         """Statements for the condition of a guard; a truth value becomes 1 or 0."""
-        return self.remembered((CONDITION, function.value), lambda: self._condition(function))
+        return self.remembered((CONDITION, *function.identity), lambda: self._condition(function))
 
     def _condition(self, function: ModelFunction) -> _Written:
         try:
@@ -237,6 +264,9 @@ class _Writer:
 
     def identity(self) -> _Written:
         """The reset of a transition that has none."""
+        return self.remembered("identity", self._identity)
+
+    def _identity(self) -> _Written:
         n = self.system.dimension
         value = assignments([f"out[{i}]" for i in range(n)], self.symbols.x)
         cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
@@ -406,23 +436,6 @@ def _ends_mode(transition: Transition) -> bool:
 def _written_condition(writer: _Writer, transition: Transition) -> _Written:
     function = condition_function(transition)
     return _Written([], [], []) if function is None else writer.condition(function)
-
-
-def _function(name: str, branches: Iterable[Sequence[str]]) -> str:
-    """Source of a function with a branch for each index; indices share one if their statements are equal."""
-    order = "order, " if name.endswith("series") else ""
-    lines = [f"def {name}(index, t, x, p, {order}out):"]
-    indices: dict[tuple[str, ...], list[int]] = {}
-    for index, statements in enumerate(branches):
-        indices.setdefault(tuple(statements), []).append(index)
-    for body, places in indices.items():
-        if body:
-            condition = " or ".join(f"index == {place}" for place in places)
-            lines.append(f"    {'if' if len(lines) == 1 else 'elif'} {condition}:")
-            lines += [f"        {statement}" for statement in body]
-    if len(lines) == 1:
-        lines.append("    pass")
-    return "\n".join(lines) + "\n"
 
 
 def _zeros_first(statements: list[str], n: int) -> list[str]:

@@ -27,9 +27,12 @@ def surfaces(
     that is constant has no zero set that another could share.
     """
     known: dict[Any, int] = {}
+    scaled: dict[sympy.Expr, tuple[Any, int]] = {}
     numbers, signs = [], []
     for i, (function, expression) in enumerate(zip(functions, expressions, strict=True)):
-        key, sign = (id(function), 1) if expression is None else _without_factor(expression)
+        if expression is not None and expression not in scaled:
+            scaled[expression] = _without_factor(expression)
+        key, sign = (id(function), 1) if expression is None else scaled[expression]
         numbers.append(known.setdefault((i, "constant") if key is None else key, len(known)))
         signs.append(sign)
     return tuple(numbers), tuple(signs)

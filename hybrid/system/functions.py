@@ -37,6 +37,14 @@ class ModelFunction:
     size: int | None
 
     @property
+    def identity(self) -> tuple[int, int, int | None]:
+        """A key for what is known of the function, valid for as long as the function is kept.
+
+        What the user gives need not be hashable.
+        """
+        return id(self.value), id(self.derivative), self.size
+
+    @property
     def rows(self) -> int:
         """Number of rows of the derivative."""
         return 1 if self.size is None else self.size

@@ -101,8 +101,21 @@ class HybridSystem(Portable):
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "units", self.variables.as_units(self.units))
         self._check_graph()
-        functions = [function for _, function in functions_of(self)]
-        check_functions(self.variables, functions, self.period)
+        check_functions(self.variables, self._unchecked(), self.period)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the system has all its modes; one that grows may lack some that no run has reached."""
+        growth = self.growth
+        return growth is None or not any(
+            each.target is None and growth.leads_on(each.name) for each in self.transitions
+        )
+
+    def _unchecked(self) -> list[ModelFunction]:
+        """Every model function once, without those of earlier stages of a system that grows."""
+        checked = {} if self.growth is None else self.growth.written
+        functions = (function for _, function in functions_of(self))
+        return [each for each in functions if checked.setdefault(("checked", *each.identity), each) is each]
 
     def __repr__(self) -> str:
         """The system in one table: state, parameters, modes and transitions."""
@@ -131,7 +144,7 @@ class HybridSystem(Portable):
             inside = "; ".join(f"{', '.join(names)} in mode {mode}" for mode, names in self.switching.items())
             lines.append(f"kinks or jumps inside of modes: {inside} (hybrid.split makes modes of them)")
         lines += self.notes
-        if self.growth is not None:
+        if not self.is_whole:
             lines.append("A run adds the modes that it needs.")
         return lines
 
@@ -267,7 +280,7 @@ class HybridSystem(Portable):
                 if name is not None and name not in self.mode_names:
                     what = f"Transition {transition.name!r}: {end} mode"
                     raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
-        if self.growth is None:
+        if self.is_whole:
             # The modes between those of a stage may not have been made yet.
             self._check_reachable()
 
@@ -278,7 +291,7 @@ class HybridSystem(Portable):
             ends = {transition.source, transition.target, transition.accumulates_to} - {None}
             linked |= ends if len(ends) > 1 else set()
         lonely = [name for name in self.mode_names if name not in linked]
-        if len(self.modes) > 1 and lonely and self.growth is None:
+        if len(self.modes) > 1 and lonely:
             raise ModelError(
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."

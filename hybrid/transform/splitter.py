@@ -178,7 +178,7 @@ class Splitter:
     def _assembled(self) -> HybridSystem:
         """The system of all cells that have been made."""
         transitions: list[Transition] = []
-        used, is_whole = set[str](), True
+        used = set[str]()
         for cell in self.made:
             for edge in self._leaving(cell):
                 transition = edge.transition
@@ -189,14 +189,14 @@ class Splitter:
                     transitions.append(attrs.evolve(transition, name=name))
                     continue
                 # Names of earlier stages stay: a run in another thread may still be on such a stage.
-                self.frontier[name], is_whole = edge.target, False
+                self.frontier[name] = edge.target
                 onward = Transition(
                     transition.source, None, transition.guard, name=name, part_of=transition.part_of
                 )
                 transitions.append(onward)
         modes = [self.known[cell][0] for cell in self.made]
-        growth = None if is_whole else self
         notes = (*self.original.notes, *self.names.notes)
+        growth = self if self.frontier else None
         return attrs.evolve(self.original, modes=modes, transitions=transitions, notes=notes, growth=growth)
 
     def name_of(self, cell: Cell) -> str:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.compiler.cache.folder import keep, kept, say, source_key
 from hybrid.compiler.cache.store import models_folder
+from hybrid.compiler.cases import cases_of, function_text
 from hybrid.compiler.llvm.lowering import (
     MATRIX_SIGNATURE,
     SERIES_SIGNATURE,
     VECTOR_SIGNATURE,
+    KnownCase,
     OwnFunction,
     parsed,
 )
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
     from hybrid.compiler.llvm.machine import Compiled
 
+# Between the name of a function and the number of a case of it.
+CASE = "_case_"
 # Number of texts whose machine code stays in memory after their systems are deleted.
 MOST_SOURCES = 128
 SIGNATURES = {
@@ -55,27 +59,57 @@ def own_functions(emitted: Emitted) -> dict[str, tuple[Any, int]]:
 def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]]) -> dict[str, Compiled]:
     """The compiled functions of a part of ``PARTS`` by name; ``own`` are those of ``own_functions``."""
     if not own:
-        return shared_functions(emitted.texts[part], part)
+        return shared_functions(emitted.texts[part], PARTS[part])
     # The user's functions have addresses of this process, so code that calls them is not cached.
     calls = {name: OwnFunction(code.address, size) for name, (code, size) in own.items()}
     code = _code(emitted.texts[part], PARTS[part], calls)
     return load(code, PARTS[part], needs=[each for each, _ in own.values()])
 
 
+def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any]) -> dict[str, Compiled]:
+    """The compiled functions of a part, for a stage of a system that grows.
+
+    Each case of a function is compiled by itself, once for all stages; ``known`` keeps them. A stage adds
+    a function for each name that calls its cases.
+    """
+    cases = {name: cases_of(emitted.texts[part], name) for name in PARTS[part]}
+    new = dict.fromkeys(
+        (name, body) for name, each in cases.items() for _, body in each if (name, body) not in known
+    )
+    if new:
+        named = {f"{name}{CASE}{number}": (name, body) for number, (name, body) in enumerate(new)}
+        source = "\n\n".join(function_text(name, [("", body)]) for name, (_, body) in named.items())
+        compiled = shared_functions(source, tuple(named))
+        known |= {key: compiled[name] for name, key in named.items()}
+    calls, texts = {}, []
+    for name, each in cases.items():
+        called = []
+        for number, (condition, body) in enumerate(each):
+            calls[f"{name}{CASE}{number}"] = KnownCase(known[name, body].address)
+            called.append((condition, (f"{name}{CASE}{number}()",)))
+        texts.append(function_text(name, called))
+    needs = [known[name, body] for name, each in cases.items() for _, body in each]
+    return load(_code("\n\n".join(texts), PARTS[part], calls), PARTS[part], needs)
+
+
 @lru_cache(maxsize=MOST_SOURCES)
-def shared_functions(source: str, part: str) -> dict[str, Compiled]:
+def shared_functions(source: str, names: tuple[str, ...]) -> dict[str, Compiled]:
     """The compiled functions of a text that calls no user function, shared by all systems with it."""
     path = models_folder() / f"model_{source_key(source, processor())}.o"
     code = _checked(path)
     if code is None:
-        code = _code(source, PARTS[part], {})
+        code = _code(source, names, {})
         keep(path, hashlib.sha256(code).digest() + code)
-    return load(code, PARTS[part])
+    return load(code, names)
 
 
-def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction]) -> bytes:
+def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | KnownCase]) -> bytes:
     functions = parsed(source)
-    wanted = [(functions[name], SIGNATURES.get(name, VECTOR_SIGNATURE), name in FUSED) for name in names]
+    kinds = [name.partition(CASE)[0] for name in names]
+    wanted = [
+        (functions[name], SIGNATURES.get(kind, VECTOR_SIGNATURE), kind in FUSED)
+        for name, kind in zip(names, kinds, strict=True)
+    ]
     return machine_code(wanted, calls)
 
 

@@ -64,7 +64,17 @@ class OwnFunction:
     size: int
 
 
-NO_CALLS: Mapping[str, OwnFunction] = {}
+@attrs.frozen
+class KnownCase:
+    """One case of a function that is compiled already: the address of its machine code.
+
+    It takes the arguments of the function.
+    """
+
+    address: int
+
+
+NO_CALLS: Mapping[str, OwnFunction | KnownCase] = {}
 
 
 @attrs.frozen
@@ -86,7 +96,7 @@ def lower(
     signature: Signature,
     *,
     fused: bool,
-    calls: Mapping[str, OwnFunction] = NO_CALLS,
+    calls: Mapping[str, OwnFunction | KnownCase] = NO_CALLS,
 ) -> None:
     """Add a function to an LLVM module.
 
@@ -101,7 +111,7 @@ def lower(
     fused
         Whether multiplications and additions may be fused.
     calls
-        Functions of the user that the text may also call.
+        Functions of the user, and cases compiled before, that the text may also call.
 
     Raises
     ------
@@ -121,7 +131,11 @@ class _Body:
     """Writes the instructions of one function."""
 
     def __init__(
-        self, function: Any, signature: Signature, flags: tuple[str, ...], calls: Mapping[str, OwnFunction]
+        self,
+        function: Any,
+        signature: Signature,
+        flags: tuple[str, ...],
+        calls: Mapping[str, OwnFunction | KnownCase],
     ) -> None:
         self.flags, self.calls = flags, calls
         self.arguments = dict(zip(signature.names, function.args, strict=True))
@@ -358,8 +372,11 @@ class _Body:
         if name == "len":
             [array] = (self.value(each) for each in node.args)
             return array.length
-        if name in self.calls:
-            return self._own_call(self.calls[name], node.args)
+        known = self.calls.get(name)
+        if isinstance(known, KnownCase):
+            return self._called(known.address, [*self.arguments.values()])
+        if known is not None:
+            return self._own_call(known, node.args)
         call: Call | None = CALLS.get(name)
         if call is None:
             return self._unknown(node)
@@ -380,9 +397,13 @@ class _Body:
         for place, part in ((SHAPE, size), (SHAPE + 1, width)):
             row = self.builder.insert_value(row, part, [place, 0])
         arguments.append(row)
-        kind = ir.FunctionType(ir.VoidType(), [each.type for each in arguments])
-        self.builder.call(self.builder.inttoptr(WHOLE(function.address), kind.as_pointer()), arguments)
+        self._called(function.address, arguments)
         return tuple(self.builder.load(self.builder.gep(numbers, [WHOLE(i)])) for i in range(function.size))
+
+    def _called(self, address: int, arguments: Sequence[Any]) -> None:
+        """A call of machine code of this process."""
+        kind = ir.FunctionType(ir.VoidType(), [each.type for each in arguments])
+        self.builder.call(self.builder.inttoptr(WHOLE(address), kind.as_pointer()), arguments)
 
     def _argument(self, call: Call, place: int, node: ast.expr) -> Any:
         if place in call.known:

@@ -294,9 +294,10 @@ def series_step(task, remaining):
             run.pending = fired
     finest = 4.0 * EPSILON * measured_time(model, run, mode)
     span = h if clock < 0 else min(series[order + 1, clock], remaining)
-    if clock >= 0 and fired == NO_TRANSITION and not cut:
-        # The clock shows the end up to its rounding; no step leads through what would be left.
-        if remaining - span <= max(finest, 4.0 * EPSILON * series[order + 2, clock]):
+    if clock >= 0:
+        # Where the clock shows the end up to its rounding, no step leads through what would be left.
+        rounding = max(finest, 4.0 * EPSILON * series[order + 2, clock])
+        if fired == NO_TRANSITION and not cut and remaining - span <= rounding:
             span = remaining
     if clock >= 0:
         crawls = fired == NO_TRANSITION and span <= CRAWL * run.since_entry and span < remaining

@@ -92,6 +92,33 @@ def test_construction_errors(make, text):
         make()
 
 
+def test_functions_need_not_be_hashable():
+    """Objects with values that can be compared, such as those of attrs, may be model functions."""
+
+    @attrs.define
+    class Sum:
+        rows: list
+        shift: float = 0.0
+
+        def __call__(self, t, x, p):
+            sums = [sum(a * b for a, b in zip(row, x, strict=True)) + self.shift for row in self.rows]
+            return sums if len(sums) > 1 else sums[0]
+
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("a", Sum([[0.0, 1.0], [-1.0, 0.0]]))],
+        transitions=[
+            Transition("a", "a", Guard(Sum([[1.0, 0.0]]), -1, when=Sum([[0.0, -1.0]])),
+                       Reset(Sum([[1.0, 0.0], [0.0, -0.5]])))
+        ],
+    )  # fmt: skip
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(system.modes[0].field)
+    arc = hybrid.simulate(system, (1.0, 0.0), (0.0, 6.0), tangent=True)
+    assert arc.jumps.t == pytest.approx([np.pi / 2, np.pi * 1.5])
+    assert hybrid.split(system).mode_names == ("a",)
+
+
 def test_periods():
     assert ball().forcing_period() is None
     assert ball(period=2.5).forcing_period() == 2.5
