@@ -84,7 +84,11 @@ def draw(system, rng):
 
 
 def independent_spikes(system, parameters, start, end):
-    """Times of the spikes by ``solve_ivp``, with one call per spike."""
+    """Times of the spikes by ``solve_ivp``, with one call per spike.
+
+    Beyond the peak the voltage rises steadily: the exponential would overflow within a trial step, which ends
+    ``solve_ivp`` before it sees the spike.
+    """
     names = type("Values", (), {})
     state, p = names(), names()
     vars_of = dict(parameters)
@@ -97,15 +101,16 @@ def independent_spikes(system, parameters, start, end):
             setattr(state, name, value)
         return state
 
+    def rates(t, x):
+        return mode.field(t, at((min(x[0], p.peak + 1.0), x[1])), p)
+
     def event(t, x):
         return spike.guard.function(t, at(x), p)
 
     event.terminal, event.direction = True, 1
     t, x, times = 0.0, np.array(start), []
     while t < end:
-        run = solve_ivp(
-            lambda t, x: mode.field(t, at(x), p), (t, end), x, "DOP853", rtol=1e-10, atol=1e-10, events=event
-        )
+        run = solve_ivp(rates, (t, end), x, "DOP853", rtol=1e-10, atol=1e-10, events=event)
         if not len(run.t_events[0]):
             break
         t = float(run.t_events[0][0])

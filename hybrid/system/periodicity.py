@@ -69,8 +69,8 @@ def _rounding(
     rng = np.random.default_rng(0)
     largest = np.zeros_like(here)
     for _ in range(SHAKES):
-        moved = (each * (1.0 + EPSILON * rng.uniform(-2.0, 2.0, np.shape(each))) for each in (t, x, values))
-        near = evaluate(variables, function.value, *moved)
+        moved = [each * (1.0 + EPSILON * rng.uniform(-2.0, 2.0, np.shape(each))) for each in (t, x, values)]
+        near = evaluate(variables, function.value, float(moved[0]), *moved[1:])
         if near is not None:
             largest = np.maximum(largest, np.abs(near - here))
     return 16.0 * largest
