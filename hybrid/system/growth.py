@@ -41,7 +41,7 @@ class Growth(Protocol):
         ...
 
     def extend(self, transition: str) -> None:
-        """Make the mode to which a transition leads, and some around it."""
+        """Make the mode to which a transition leads."""
         ...
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:

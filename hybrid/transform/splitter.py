@@ -31,8 +31,8 @@ from hybrid.transform.naming import Names
 AGREEMENT = 1e-9
 # Sizes of the states at which they are compared.
 SIZES = (0.1, 1.0, 10.0)
-# A system of more modes than this is made in stages, of at least so many more modes each.
-MOST_WHOLE, FEWEST_MORE = 12, 3
+# A system of more modes than this is made in stages. Of the many modes around a mode a run visits few.
+MOST_WHOLE = 12
 
 
 @attrs.frozen
@@ -101,9 +101,9 @@ class Splitter:
         return transition in self.frontier
 
     def extend(self, transition: str) -> None:
-        """Make the mode to which a transition leads, and some around it."""
+        """Make the mode to which a transition leads."""
         with self.lock:
-            self._make([self.frontier[transition]], max(FEWEST_MORE, len(self.made) // 3))
+            self._make([self.frontier[transition]], 1)
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""

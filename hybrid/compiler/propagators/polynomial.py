@@ -11,6 +11,7 @@ from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import ELEMENTARY, Equations, columns_of_guards
 from hybrid.compiler.propagators.writing import write_series
 from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER
+from hybrid.symbolic.derivatives import partial_derivatives
 from hybrid.symbolic.nodes import contains, degree_of, mentions, replaced, symbols_of
 from hybrid.symbolic.tracing import Symbols
 
@@ -50,7 +51,7 @@ def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]
     # x^(k + 1) = J x^(k) + d^k f/dt^k
     rate, forcing = list(field), list(field)
     for degree in range(1, 2 * len(field) + 4):
-        forcing = [entry.diff(symbols.t) for entry in forcing]
+        forcing = [row[0] for row in partial_derivatives(forcing, [symbols.t])]
         rate = [
             (push + sympy.Add(*(a * r for a, r in zip(row, rate, strict=True)))).expand()
             for row, push in zip(jacobian, forcing, strict=True)

@@ -16,6 +16,7 @@ import sympy
 from hybrid.compiler.taylor.loops import indented, padded
 from hybrid.kernels.types.codes import NARROW
 from hybrid.symbolic.constants import Constants
+from hybrid.symbolic.derivatives import partial_derivatives
 from hybrid.symbolic.nodes import degree_of, mentions, replaced
 from hybrid.symbolic.tracing import Symbols
 
@@ -54,9 +55,11 @@ def linear_form(
 ) -> LinearForm | None:
     """The linear form of an affine mode, if it has one; ``harmonics`` are the functions that drive it."""
     variables = [*symbols.x, *harmonics.values()]
-    turning = [function.diff(symbols.t) for function in harmonics]
+    if len(variables) >= LARGEST:
+        return None
+    turning = [row[0] for row in partial_derivatives(harmonics, [symbols.t])]
     rows = [_row(replaced(entry, harmonics), variables, symbols.t) for entry in (*field, *turning, *guards)]
-    if len(variables) >= LARGEST or any(row is None for row in rows):
+    if any(row is None for row in rows):
         return None
     starts = [*symbols.x, *harmonics, sympy.Integer(1)]
     whole = [row for row in rows if row is not None]
@@ -69,7 +72,7 @@ def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbo
     # Derivatives alone do not tell: the derivative of a sign is zero too.
     if degree_of(entry, frozenset(variables)) is None:
         return None
-    slopes = [entry.diff(variable) for variable in variables]
+    [slopes] = partial_derivatives([entry], variables)
     rest = replaced(entry, dict.fromkeys(variables, sympy.Integer(0)))
     if any(mentions(each, (time, *variables)) for each in (*slopes, rest)):
         return None
