@@ -314,8 +314,10 @@ class _Runner:
         elif before == 0 and any(other.resting for other, _ in same):
             raise Open("at rest on a guard that was watched the other way")
         else:
-            # Keep the side that the other watch recorded; an unwatched crossing is complete.
-            watch.beyond = before > 0 or (before == 0 and not any(other.beyond for other, _ in same))
+            # Keep the side that the other watch recorded; an unwatched crossing is complete. What fired in
+            # both directions has its near side where the state was to move.
+            unwatched = edge.direction != 0 and not any(other.beyond for other, _ in same)
+            watch.beyond = before > 0 or (before == 0 and unwatched)
         due = watch.due
         self._asked(watch, before)
         if edge.marks:

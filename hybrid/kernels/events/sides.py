@@ -109,25 +109,29 @@ def crossed_by_landing(model, transition, known, own, was_on, before, now, order
 
 
 @njit(**KERNEL)
-def is_held(model, run, transition, mode, t, x, work):
+def is_held(model, run, transition, mode, t, x, towards, work):
     """Whether a reset removes or reverses the speed that pushes a state at rest through a guard.
 
-    The speed is evaluated a moment after ``t``; ``work.field`` is current.
+    The speed, which has the sign ``towards``, is evaluated two moments after ``t``: a push may begin at ``t``
+    and have moved nothing after one. ``work.field`` is current.
     """
     n = model.dimension
     size, pace = 0.0, 0.0
     for i in range(n):
         size, pace = max(size, abs(x[i]), run.scale[i]), max(pace, abs(work.field[i]))
     moment = 1e-7 * (size if size > 0.0 else 1.0) / (pace if pace > 0.0 else 1.0)
-    later, after = work.settled, work.state
+    later, after, end = work.settled, work.state, t + 2.0 * moment
     for i in range(n):
         later[i] = x[i] + moment * work.field[i]
-    model.reset(transition, t + moment, later, model.parameters, after)
     model.field(mode, t + moment, later, model.parameters, work.field_after)
-    speed = guard_speed(model, transition, t + moment, later, work.field_after, work.gradient)
-    model.field(mode, t + moment, after, model.parameters, work.field_after)
-    kept = guard_speed(model, transition, t + moment, after, work.field_after, work.gradient)
-    return not kept * speed > KEPT * speed * speed
+    for i in range(n):
+        later[i] += moment * work.field_after[i]
+    model.reset(transition, end, later, model.parameters, after)
+    model.field(mode, end, later, model.parameters, work.field_after)
+    speed = guard_speed(model, transition, end, later, work.field_after, work.gradient)
+    model.field(mode, end, after, model.parameters, work.field_after)
+    kept = guard_speed(model, transition, end, after, work.field_after, work.gradient)
+    return speed * towards > 0.0 and not kept * speed > KEPT * speed * speed
 
 
 @njit(**KERNEL)
@@ -153,6 +157,15 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         was_on = known and zero[transition] > 0
         own = came == LANDED and left == mode and transition == fired
         now, order = side_of(model, run, mode, transition, t, x, before, was_on, work)
+        # A root of third order, crossed without speed: the next step shows the side.
+        flat = (
+            own
+            and order == BY_STEP
+            and abs(run.last_transversality) <= speed_rounding(model, run, mode, t, work)
+        )
+        if own and order == BY_STEP and direction != 0 and not flat:
+            # Its own reset has stopped the state on the guard, as a plastic impact does.
+            now = -direction
         if came == STARTED:
             crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
@@ -166,21 +179,18 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             came == LANDED and left == mode and was_on and not crossed and beyond and order == BY_ACCELERATION
         )
         if pushed and due[transition] == 0 and model.marker[transition] == 0:
-            pushed = is_held(model, run, transition, mode, t, x, work)
+            pushed = is_held(model, run, transition, mode, t, x, now, work)
             # Another transition's reset left the state at rest: the guard's own reset must hold it again.
             crossed = pushed and not own
             rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
+        elif flat and direction != 0 and is_held(model, run, transition, mode, t, x, direction, work):
+            # A push that only begins: it has no acceleration yet.
+            rests = rests or allowed(model, transition, t, x, work.scalar)
         pending = came == LANDED and due[transition] == 1 and beyond
         if model.marker[transition] == 1 and came != FLOWED:
             # A marker fires where the flow crosses it. After a jump it fires only if the flow has reached it
             # together with the first jump.
             crossed, pending = False, pending and was_on and order > 0
-        # A root of third order, crossed without speed: the next step shows the side.
-        flat = (
-            own
-            and order == BY_STEP
-            and abs(run.last_transversality) <= speed_rounding(model, run, mode, t, work)
-        )
         side[transition], zero[transition] = 0 if flat else now, order
         due[transition] = 1 if crossed or pending else 0
         if due[transition] == 1 and chosen == NO_TRANSITION and allowed(model, transition, t, x, work.scalar):
