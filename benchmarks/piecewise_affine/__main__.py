@@ -17,7 +17,7 @@ from benchmarks.piecewise_affine.trial import Outcome, compare, start_of
 FAMILIES = [
     *(Family(n, m, kind) for n in (2, 3, 4) for m in (1, 2) for kind in KINDS),
     *(Family(n, 2, "additive", parallel=True) for n in (2, 3)),
-    Family(3, 3, "additive"),
+    *(Family(n, m, "additive") for n, m in ((3, 3), (4, 3), (4, 4))),
 ]
 
 

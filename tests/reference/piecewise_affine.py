@@ -259,8 +259,12 @@ def _until_event(surface, run, t1, samples, fresh) -> tuple[int, int] | None:
 
 
 def _grid(length: float, count: int) -> np.ndarray:
-    """Times from 0 to ``length``, close together at the ends so that a minimum there is seen."""
-    return length * np.concatenate([[0, 1e-4], np.arange(1, count) / count, [1 - 1e-4, 1]])
+    """Times from 0 to ``length``, close together at the ends so that a minimum there is seen.
+
+    One comes just after `FRESH`, where an orbit that has left a surface is first looked for on it again.
+    """
+    grid = length * np.concatenate([[0, 1e-4], np.arange(1, count) / count, [1 - 1e-4, 1]])
+    return np.unique(np.append(grid, 1.01 * FRESH)) if 1.01 * FRESH < length else grid
 
 
 def _cell(surface: _Surface, t: float, x: np.ndarray) -> Iterator[tuple]:
