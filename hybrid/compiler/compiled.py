@@ -140,7 +140,8 @@ class CompiledSystem:
                 if growth is None or self._own:
                     self.parts[part] = compiled_part(self.emitted, part, self._own)
                 else:
-                    self.parts[part] = compiled_stage(self.emitted, part, growth.written)
+                    indices = max(len(self.system.modes), 2 * len(self.system.transitions))
+                    self.parts[part] = compiled_stage(self.emitted, part, growth.written, indices)
         found: dict[str, Any] = self.parts[part]
         return found
 

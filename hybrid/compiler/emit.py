@@ -114,7 +114,7 @@ def _emitted(system: HybridSystem) -> Emitted:
     symbols = writer.symbols
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
-    surface, orientation = surfaces([transition.guard.function for transition in system.transitions], traced)
+    surface, orientation = writer.surfaces(traced)
     pulses = [forcings(field.expressions, symbols) for field in fields]
     forcing = [each for of_mode in pulses for each in of_mode]
     residual = [
@@ -261,6 +261,11 @@ class _Writer:
         value = Select(value, ONE, ZERO) if value.is_Boolean else value
         # It is evaluated at crossings only, so it is not worth a long search for common parts.
         return _Written(assignments(["out[0]"], [value], thorough=False), [], [value])
+
+    def surfaces(self, traced: Sequence[sympy.Expr | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The zero sets of all guards, as `hybrid.compiler.surfaces.surfaces` numbers them."""
+        scaled = self.remembered("surfaces", dict[sympy.Expr, Any])
+        return surfaces([each.guard.function for each in self.system.transitions], traced, scaled)
 
     def identity(self) -> _Written:
         """The reset of a transition that has none."""

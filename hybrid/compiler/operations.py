@@ -45,7 +45,7 @@ def operations_of(system: HybridSystem) -> str | None:
     None if they cannot be listed: a function fails, or asks for more than the results of operations.
     """
     try:
-        functions = [_listed(system, function) for _, function in functions_of(system)]
+        functions = [_remembered(system, function) for _, function in functions_of(system)]
         period = _listed_period(system)
     except Exception:
         return None
@@ -65,8 +65,17 @@ def operations_of(system: HybridSystem) -> str | None:
     return json.dumps([system.state, [*system.parameters], [*system.mode_names], graph, functions, period])
 
 
+def _remembered(system: HybridSystem, function: ModelFunction) -> list[Any]:
+    """What `_listed` returns; an earlier stage of a system that grows may have listed the operations."""
+    known = {} if system.growth is None else system.growth.written
+    key = "operations", *function.identity
+    if key not in known:
+        known[key] = function, _listed(system, function)
+    return [function.owner, function.kind, *known[key][1]]
+
+
 def _listed(system: HybridSystem, function: ModelFunction) -> list[Any]:
-    """Owner and kind of a function; for it and for its derivative the operations and the results."""
+    """For a function and for its derivative the operations and the results."""
     names = tuple(system.parameters)
     lists: list[Any] = []
     for called in (function.value, function.derivative):
@@ -79,7 +88,7 @@ def _listed(system: HybridSystem, function: ModelFunction) -> list[Any]:
         p = [operations.listed("p", i) for i in range(len(names))]
         values = values_of(called, system.state, names, operations, (t, x, p))
         lists.append([[*operations.places], values])
-    return [function.owner, function.kind, *lists]
+    return lists
 
 
 def _listed_period(system: HybridSystem) -> Any:

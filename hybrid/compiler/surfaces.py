@@ -19,15 +19,17 @@ DIGITS = 12
 
 
 def surfaces(
-    functions: Iterable[Callable[..., Any]], expressions: Iterable[sympy.Expr | None]
+    functions: Iterable[Callable[..., Any]],
+    expressions: Iterable[sympy.Expr | None],
+    scaled: dict[sympy.Expr, tuple[Any, int]],
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """The number of the zero set of each guard, and the sign of the guard's factor.
 
     ``expressions`` are None for functions that could not be traced: these are compared as objects. A guard
     that is constant has no zero set that another could share.
+    ``scaled`` keeps what is found of each expression.
     """
     known: dict[Any, int] = {}
-    scaled: dict[sympy.Expr, tuple[Any, int]] = {}
     numbers, signs = [], []
     for i, (function, expression) in enumerate(zip(functions, expressions, strict=True)):
         if expression is not None and expression not in scaled:

@@ -264,7 +264,7 @@ def _grid(length: float, count: int) -> np.ndarray:
     One comes just after `FRESH`, where an orbit that has left a surface is first looked for on it again.
     """
     grid = length * np.concatenate([[0, 1e-4], np.arange(1, count) / count, [1 - 1e-4, 1]])
-    return np.unique(np.append(grid, 1.01 * FRESH)) if 1.01 * FRESH < length else grid
+    return np.unique(np.append(grid, 1.01 * FRESH)) if length > 1.01 * FRESH else grid
 
 
 def _cell(surface: _Surface, t: float, x: np.ndarray) -> Iterator[tuple]:

@@ -8,14 +8,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hybrid.compiler.cache.folder import keep, kept, say, source_key
 from hybrid.compiler.cache.store import models_folder
-from hybrid.compiler.cases import cases_of, function_text
+from hybrid.compiler.cases import Case, cases_of, function_text
 from hybrid.compiler.llvm.lowering import (
     MATRIX_SIGNATURE,
     SERIES_SIGNATURE,
     VECTOR_SIGNATURE,
-    KnownCase,
+    CaseTable,
     OwnFunction,
     parsed,
 )
@@ -29,6 +31,8 @@ if TYPE_CHECKING:
 
 # Between the name of a function and the number of a case of it.
 CASE = "_case_"
+# The case of indices without statements.
+NOTHING: Case = (), ("pass",)
 # Number of texts whose machine code stays in memory after their systems are deleted.
 MOST_SOURCES = 128
 SIGNATURES = {
@@ -66,30 +70,32 @@ def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]
     return load(code, PARTS[part], needs=[each for each, _ in own.values()])
 
 
-def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any]) -> dict[str, Compiled]:
+def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int) -> dict[str, Compiled]:
     """The compiled functions of a part, for a stage of a system that grows.
 
-    Each case of a function is compiled by itself, once for all stages; ``known`` keeps them. A stage adds
-    a function for each name that calls its cases.
+    Each case of a function is compiled by itself, once for all stages; ``known`` keeps them. For each name a
+    stage adds a table of the ``size`` addresses of its cases, and a function that calls them by the table.
     """
-    cases = {name: cases_of(emitted.texts[part], name) for name in PARTS[part]}
+    cases = {name: [*cases_of(emitted.texts[part], name), NOTHING] for name in PARTS[part]}
     new = dict.fromkeys(
         (name, body) for name, each in cases.items() for _, body in each if (name, body) not in known
     )
     if new:
         named = {f"{name}{CASE}{number}": (name, body) for number, (name, body) in enumerate(new)}
-        source = "\n\n".join(function_text(name, [("", body)]) for name, (_, body) in named.items())
+        source = "\n\n".join(function_text(name, [((), body)]) for name, (_, body) in named.items())
         compiled = shared_functions(source, tuple(named))
         known |= {key: compiled[name] for name, key in named.items()}
-    calls, texts = {}, []
+    tables: dict[str, CaseTable] = {}
+    needs: list[Any] = []
     for name, each in cases.items():
-        called = []
-        for number, (condition, body) in enumerate(each):
-            calls[f"{name}{CASE}{number}"] = KnownCase(known[name, body].address)
-            called.append((condition, (f"{name}{CASE}{number}()",)))
-        texts.append(function_text(name, called))
-    needs = [known[name, body] for name, each in cases.items() for _, body in each]
-    return load(_code("\n\n".join(texts), PARTS[part], calls), PARTS[part], needs)
+        addresses = np.full(size, known[name, NOTHING[1]].address, dtype=np.int64)
+        for indices, body in each:
+            addresses[[*indices]] = known[name, body].address
+            needs.append(known[name, body])
+        needs.append(addresses)
+        tables[f"{name}{CASE}"] = CaseTable(addresses.ctypes.data)
+    source = "\n\n".join(function_text(name, [((), (f"{name}{CASE}()",))]) for name in PARTS[part])
+    return load(_code(source, PARTS[part], tables), PARTS[part], needs)
 
 
 @lru_cache(maxsize=MOST_SOURCES)
@@ -103,7 +109,7 @@ def shared_functions(source: str, names: tuple[str, ...]) -> dict[str, Compiled]
     return load(code, names)
 
 
-def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | KnownCase]) -> bytes:
+def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | CaseTable]) -> bytes:
     functions = parsed(source)
     kinds = [name.partition(CASE)[0] for name in names]
     wanted = [

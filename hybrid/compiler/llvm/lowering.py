@@ -65,16 +65,16 @@ class OwnFunction:
 
 
 @attrs.frozen
-class KnownCase:
-    """One case of a function that is compiled already: the address of its machine code.
+class CaseTable:
+    """The cases of a function that are compiled already: where the address of each, by index, is stored.
 
-    It takes the arguments of the function.
+    They take the arguments of the function.
     """
 
     address: int
 
 
-NO_CALLS: Mapping[str, OwnFunction | KnownCase] = {}
+NO_CALLS: Mapping[str, OwnFunction | CaseTable] = {}
 
 
 @attrs.frozen
@@ -96,7 +96,7 @@ def lower(
     signature: Signature,
     *,
     fused: bool,
-    calls: Mapping[str, OwnFunction | KnownCase] = NO_CALLS,
+    calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,
 ) -> None:
     """Add a function to an LLVM module.
 
@@ -111,7 +111,7 @@ def lower(
     fused
         Whether multiplications and additions may be fused.
     calls
-        Functions of the user, and cases compiled before, that the text may also call.
+        Functions of the user, and tables of cases, that the text may also call.
 
     Raises
     ------
@@ -135,7 +135,7 @@ class _Body:
         function: Any,
         signature: Signature,
         flags: tuple[str, ...],
-        calls: Mapping[str, OwnFunction | KnownCase],
+        calls: Mapping[str, OwnFunction | CaseTable],
     ) -> None:
         self.flags, self.calls = flags, calls
         self.arguments = dict(zip(signature.names, function.args, strict=True))
@@ -373,8 +373,10 @@ class _Body:
             [array] = (self.value(each) for each in node.args)
             return array.length
         known = self.calls.get(name)
-        if isinstance(known, KnownCase):
-            return self._called(known.address, [*self.arguments.values()])
+        if isinstance(known, CaseTable):
+            table = self.builder.inttoptr(WHOLE(known.address), WHOLE.as_pointer())
+            address = self.builder.load(self.builder.gep(table, [self.arguments["index"]]))
+            return self._called(address, [*self.arguments.values()])
         if known is not None:
             return self._own_call(known, node.args)
         call: Call | None = CALLS.get(name)
@@ -397,13 +399,13 @@ class _Body:
         for place, part in ((SHAPE, size), (SHAPE + 1, width)):
             row = self.builder.insert_value(row, part, [place, 0])
         arguments.append(row)
-        self._called(function.address, arguments)
+        self._called(WHOLE(function.address), arguments)
         return tuple(self.builder.load(self.builder.gep(numbers, [WHOLE(i)])) for i in range(function.size))
 
-    def _called(self, address: int, arguments: Sequence[Any]) -> None:
+    def _called(self, address: Any, arguments: Sequence[Any]) -> None:
         """A call of machine code of this process."""
         kind = ir.FunctionType(ir.VoidType(), [each.type for each in arguments])
-        self.builder.call(self.builder.inttoptr(WHOLE(address), kind.as_pointer()), arguments)
+        self.builder.call(self.builder.inttoptr(address, kind.as_pointer()), arguments)
 
     def _argument(self, call: Call, place: int, node: ast.expr) -> Any:
         if place in call.known:

@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 from llvmlite import binding, ir
 
-from hybrid.compiler.llvm.lowering import NO_CALLS, KnownCase, OwnFunction, Signature, lower
+from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, OwnFunction, Signature, lower
 
 # LLVM's highest optimisation level.
 SPEED = 3
@@ -50,12 +50,12 @@ def processor() -> str:
 
 def machine_code(
     functions: Sequence[tuple[ast.FunctionDef, Signature, bool]],
-    calls: Mapping[str, OwnFunction | KnownCase] = NO_CALLS,
+    calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,
 ) -> bytes:
     """The contents of an object file with these functions.
 
     The truth value of each function says whether its multiplications and additions may be fused; ``calls``
-    are what they call of the user's functions and of cases compiled before.
+    are what they call of the user's functions and of tables of cases.
     """
     module = ir.Module("model")
     module.triple = binding.get_default_triple()

@@ -13,8 +13,8 @@ BODIES = [["out[0] = 1.0"], ["for i in range(2):", "    out[i] = x[i]"], [], ["o
 def test_indices_with_equal_statements_share_a_case():
     text = function_of_index("field", BODIES) + "\n\n" + function_of_index("reset", [])
     assert cases_of(text, "field") == [
-        ("index == 0 or index == 3", ("out[0] = 1.0",)),
-        ("index == 1", ("for i in range(2):", "    out[i] = x[i]")),
+        ((0, 3), ("out[0] = 1.0",)),
+        ((1,), ("for i in range(2):", "    out[i] = x[i]")),
     ]
     assert cases_of(text, "reset") == []
 

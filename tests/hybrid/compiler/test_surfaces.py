@@ -9,7 +9,7 @@ q, v, e = sympy.symbols("q v e", real=True)
 
 
 def test_a_factor_is_divided_out_with_its_sign():
-    found, signs = surfaces([print] * 5, [2 * q - v, v / 3 - 2 * q / 3, q + v, -5 * q - 5 * v, e * q])
+    found, signs = surfaces([print] * 5, [2 * q - v, v / 3 - 2 * q / 3, q + v, -5 * q - 5 * v, e * q], {})
     assert found == (0, 0, 1, 1, 2)
     assert signs[0] == -signs[1]
     assert signs[2] == -signs[3]
@@ -22,7 +22,9 @@ def test_constants_and_untraced_functions():
     def other():
         """Not traced either."""
 
-    found, signs = surfaces([one, other, one, one, one], [None, None, None, sympy.Float(2), sympy.Float(2)])
+    found, signs = surfaces(
+        [one, other, one, one, one], [None, None, None, sympy.Float(2), sympy.Float(2)], {}
+    )
     assert found == (0, 1, 0, 2, 3)
     assert signs == (1, 1, 1, 1, 1)
 
