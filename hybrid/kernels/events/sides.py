@@ -30,7 +30,8 @@ KEPT = 1e-3
 def inherit(model, left, transition, side, due, zero):
     """Take over what the mode just left knew of a transition's guard; returns whether it has the guard.
 
-    A crossing is still due only if no transition on that guard in that direction has fired for it.
+    A crossing is still due only if no transition on that guard in that direction has fired for it. On a guard
+    at rest each direction has its own near side: the side for the same direction counts, if there is one.
     """
     known, pending, now, order = False, -1, 0, 0
     for slot in range(model.first_outgoing[left], model.first_outgoing[left + 1]):
@@ -40,9 +41,10 @@ def inherit(model, left, transition, side, due, zero):
         known = True
         turned = model.orientation[other] * model.orientation[transition]
         order = max(order, zero[other])
-        if side[other] != 0:
+        alike = turned * model.direction[other] == model.direction[transition]
+        if side[other] != 0 and (alike or pending < 0):
             now = turned * side[other]
-        if turned * model.direction[other] == model.direction[transition]:
+        if alike:
             pending = due[other] if pending < 0 else min(pending, due[other])
     side[transition], due[transition], zero[transition] = now, max(pending, 0), order
     return known
@@ -160,6 +162,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         # A root of third order, crossed without speed: the next step shows the side.
         flat = (
             own
+            and was_on
             and order == BY_STEP
             and abs(run.last_transversality) <= speed_rounding(model, run, mode, t, work)
         )
@@ -189,8 +192,9 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         pending = came == LANDED and due[transition] == 1 and beyond
         if model.marker[transition] == 1 and came != FLOWED:
             # A marker fires where the flow crosses it. After a jump it fires only if the flow has reached it
-            # together with the first jump.
-            crossed, pending = False, pending and was_on and order > 0
+            # together with the first jump, and has not been stopped there.
+            stopped = order == BY_STEP and zero[transition] != BY_STEP
+            crossed, pending = False, pending and was_on and order > 0 and not stopped
         side[transition], zero[transition] = 0 if flat else now, order
         due[transition] = 1 if crossed or pending else 0
         if due[transition] == 1 and chosen == NO_TRANSITION and allowed(model, transition, t, x, work.scalar):
