@@ -258,7 +258,9 @@ class _Runner:
         elif value == 0 and speed == 0 and before == 0:
             return
         else:
-            watch.due = watch.beyond = watch.fired = False
+            # With direction 0 the near side is where the crossing has led: it stays the one that has fired.
+            watch.due = watch.beyond = False
+            watch.fired = watch.fired and watch.turned
             return
         watch.due, watch.beyond = watch.due or crossed, True
         watch.fired = watch.fired and not crossed
