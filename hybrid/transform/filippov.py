@@ -20,6 +20,7 @@ def filippov(
     *,
     period: float | Function | None = None,
     name: str = "",
+    units: Mapping[str, str] | None = None,
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
 
@@ -50,7 +51,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    period, name
+    period, name, units
         As for `HybridSystem`.
 
     Returns
@@ -133,6 +134,7 @@ def filippov(
         transitions=transitions,
         period=period,
         name=name,
+        units={} if units is None else units,
     )
 
 

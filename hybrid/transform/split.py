@@ -16,6 +16,7 @@ def from_equations(
     parameters: Mapping[str, float] | None = None,
     period: Period = None,
     name: str = "",
+    units: Mapping[str, str] | None = None,
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
 
@@ -25,7 +26,7 @@ def from_equations(
     ----------
     field
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
-    state, parameters, period, name
+    state, parameters, period, name, units
         As for `HybridSystem`.
 
     Raises
@@ -50,7 +51,12 @@ def from_equations(
     """
     return split(
         HybridSystem(
-            state=state, parameters=parameters or {}, modes=[Mode("smooth", field)], period=period, name=name
+            state=state,
+            parameters=parameters or {},
+            modes=[Mode("smooth", field)],
+            period=period,
+            name=name,
+            units={} if units is None else units,
         )
     )
 

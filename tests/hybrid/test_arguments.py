@@ -96,6 +96,7 @@ TANGENT = [
     np.zeros((2, 2, 2)),
 ]
 NAME = ["nope", 3, 1.5, True, math.nan, [1], np.array(["a", "b"]), Odd()]
+UNITS = [[1], "a", 3, {"nope": "m"}, {3: "m"}, {"q": 3}, {"q": None}, Odd()]
 TEXT = [None, 3, True, [1], Odd()]
 SYSTEM = [None, "a", 3, models.bouncing_ball, HybridSystem, [BALL], Odd()]
 PARAMETERS = [[1], "a", 3, True, ["c"], {"nope": 1.0}, {3: 1.0}, Odd(), *({"c": value} for value in NUMBER)]
@@ -272,6 +273,7 @@ def table(made):
                 "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
+                "units": UNITS,
             },
         ),
         (
@@ -291,6 +293,7 @@ def table(made):
                 "switching": [None, *FUNCTION],
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
+                "units": UNITS,
             },
         ),
         (
@@ -329,7 +332,7 @@ def table(made):
                 "transitions": [*LIST, [1], ["a"]],
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
-                "units": [[1], "a", 3, {"nope": "m"}, {3: "m"}, {"q": 3}, {"q": None}, Odd()],
+                "units": UNITS,
             },
         ),
         (

@@ -367,6 +367,14 @@ def chain():
     return from_equations(friction_chain, state=6, parameters={"belt": 0.2})
 
 
+def test_units_are_those_of_the_split_system():
+    units = {"q": "m", "v": "m/s", "t": "s"}
+    system = from_equations(lambda t, x, p: (x.v, -x.q - np.sign(x.v)), state=("q", "v"), units=units)
+    assert dict(system.units) == units
+    arc = simulate(system, (2.0, 0.0), (0.0, 1.0))
+    assert arc.to_xarray().t.attrs["units"] == "s"
+
+
 class TestStages:
     def test_a_large_system_shows_a_few_modes(self, chain):
         assert chain.growth is not None
