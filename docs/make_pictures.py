@@ -20,16 +20,18 @@ from lyapunov.plot import plot_chart, style
 
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
+PLAIN = HERE / "plain-equations.md"
+PLAIN = HERE / "plain-equations.md"
 STYLE = {"font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.dpi": 160}
 
 
-def model_of_the_readme() -> HybridSystem:
-    """Run the first Python block of the README and take its model."""
-    block = re.search(r"^```python\n(.*?)^```", README.read_text(encoding="utf-8"), re.M | re.S)
+def model_of(page: Path, name: str) -> HybridSystem:
+    """Run the first Python block of a page and take its model."""
+    block = re.search(r"^```python\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
     assert block is not None
     namespace: dict[str, Any] = {}
-    exec(compile(block[1], str(README), "exec"), namespace)
-    return namespace["rattler"]
+    exec(compile(block[1], str(page), "exec"), namespace)
+    return namespace[name]
 
 
 def rattler_picture(system: HybridSystem) -> None:
@@ -82,6 +84,12 @@ def graph_picture(system: HybridSystem) -> None:
     save(figure, HERE / "graph.png")
 
 
+def split_picture(system: HybridSystem) -> None:
+    figure, axes = plt.subplots(figsize=(6.4, 4.6), layout="constrained")
+    plot_graph(system, ax=axes)
+    save(figure, HERE / "split_graph.png")
+
+
 def chart_picture(system: HybridSystem) -> None:
     """Sections and exponents over the forcing frequency, with the attractor followed from row to row."""
     with style():
@@ -119,9 +127,10 @@ def quantise(path: Path) -> None:
 
 def main() -> None:
     with plt.rc_context(STYLE):
-        system = model_of_the_readme()
+        system = model_of(README, "rattler")
         rattler_picture(system)
         graph_picture(system)
+        split_picture(model_of(PLAIN, "oscillator"))
         chart_picture(system)
 
 

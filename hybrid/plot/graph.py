@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 DIRECTIONS = {-1: "↓", 0: "↕", 1: "↑"}
 # Angle between the loops of one mode, in degrees.
 FAN = 60.0
+# Sizes of a figure, by the number of modes, in inches.
+SIZES = ((4.0, 2.6), (6.0, 2.8), (7.0, 6.0), (7.0, 6.0), (8.5, 7.0))
+# A graph of so many modes is drawn with less detail.
+CROWD = 5
+Ends = tuple[str, str]
 LABEL: dict[str, Any] = {"fontsize": 10, "bbox": {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}}
 
 
@@ -28,6 +33,8 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
 
     A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. Dashed
     edges reset the state. Modes have the same colours as in the other plots. A dot is the end of a run.
+    Transitions that only fire at the start of a run are left out. In a graph of more than a few modes, the
+    transitions between the same two modes share an arrow, and names such as ``a->b`` are not repeated on it.
 
     Parameters
     ----------
@@ -42,7 +49,7 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
     """
     graph = as_system("system", system).graph
     crowd = len(graph)
-    (ax,) = axes_for(ax, 1, figsize=((4.0, 2.6), (6.0, 2.8), (7.0, 6.0))[min(crowd, 3) - 1])
+    (ax,) = axes_for(ax, 1, figsize=SIZES[min(crowd, len(SIZES)) - 1])
     where = _places(graph)
     boxes = {
         mode: _draw_mode(ax, mode, where[mode], colour_of(system.mode_index(mode)))
@@ -50,24 +57,16 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
     }
     if END in graph:
         boxes[END] = _draw_end(ax, where[END])
+    edges, loops = _edges_and_loops(system)
     parallel: Counter[tuple[str, str]] = Counter()
-    loops: defaultdict[str, list[Transition]] = defaultdict(list)
-    for transition in system.transitions:
-        ends = (transition.source, END if transition.target is None else transition.target)
-        if ends[0] == ends[1]:
-            loops[ends[0]].append(transition)
-            continue
-        bend = 0.28 + 0.3 * parallel[ends]
+    for ends, bundle in _bundles(edges, crowd):
+        bend = (0.28 if crowd < CROWD else 0.12) + 0.3 * parallel[ends]
         parallel[ends] += 1
         # With many modes the edges cross near their middles, so the labels are placed nearer the source.
-        _draw_edge(
-            ax,
-            transition,
-            [where[end] for end in ends],
-            bend,
-            0.5 if crowd <= 2 else 0.38,
-            [boxes[end] for end in ends],
-        )
+        along = 0.5 if crowd <= 2 else 0.38
+        label = "\n".join(dict.fromkeys(_label(each, short=crowd >= CROWD) for each in bundle))
+        style = _arrow(bundle[0])
+        _draw_edge(ax, label, style, [where[end] for end in ends], bend, along, [boxes[end] for end in ends])
     for mode, around in loops.items():
         outward = where[mode] if crowd > 2 else np.array([0.0, 1.0])
         middle = np.degrees(np.arctan2(outward[1], outward[0]))
@@ -79,13 +78,41 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def _edges_and_loops(
+    system: HybridSystem,
+) -> tuple[dict[Ends, list[Transition]], dict[str, list[Transition]]]:
+    """The transitions between each two modes, and those from each mode to itself."""
+    edges: defaultdict[Ends, list[Transition]] = defaultdict(list)
+    loops: defaultdict[str, list[Transition]] = defaultdict(list)
+    for transition in system.transitions:
+        if transition.guard.at_start:
+            continue
+        ends = (transition.source, END if transition.target is None else transition.target)
+        if ends[0] == ends[1]:
+            loops[ends[0]].append(transition)
+        else:
+            edges[ends].append(transition)
+    return edges, loops
+
+
+def _bundles(edges: Mapping[Ends, list[Transition]], crowd: int) -> Iterator[tuple[Ends, list[Transition]]]:
+    """The transitions that share an arrow."""
+    for ends, transitions in edges.items():
+        if crowd < CROWD:
+            yield from ((ends, [transition]) for transition in transitions)
+        else:
+            yield ends, transitions
+
+
 def _places(graph: nx.MultiDiGraph) -> dict[str, np.ndarray]:
-    """Places of the nodes: one or two in a row, more on a circle."""
+    """Places of the nodes: one or two in a row, a few on a circle, of more the neighbours near each other."""
     import networkx as nx
 
     if len(graph) <= 2:
         return {mode: np.array([2.2 * i, 0.0]) for i, mode in enumerate(graph)}
-    return dict(nx.circular_layout(graph))
+    if len(graph) < CROWD:
+        return dict(nx.circular_layout(graph))
+    return dict(nx.kamada_kawai_layout(nx.Graph(graph)))
 
 
 def _key(system: HybridSystem) -> str:
@@ -110,7 +137,8 @@ def _draw_end(ax: Axes, place: np.ndarray) -> Any:
 
 def _draw_edge(
     ax: Axes,
-    transition: Transition,
+    label: str,
+    arrow: dict[str, Any],
     places: Sequence[np.ndarray],
     bend: float,
     along: float,
@@ -119,7 +147,7 @@ def _draw_edge(
     """A bent arrow between two boxes, with its label at the fraction ``along`` of its Bezier curve."""
     start, end = places
     style = {
-        **_arrow(transition),
+        **arrow,
         "connectionstyle": f"arc3,rad={bend}",
         "patchA": boxes[0],
         "patchB": boxes[1],
@@ -130,7 +158,7 @@ def _draw_edge(
     across = end - start
     control = (start + end) / 2 + bend * np.array([across[1], -across[0]])
     middle = (1 - along) ** 2 * start + 2 * along * (1 - along) * control + along**2 * end
-    ax.text(middle[0], middle[1], _label(transition), ha="center", va="center", zorder=3, **LABEL)
+    ax.text(middle[0], middle[1], label, ha="center", va="center", zorder=3, **LABEL)
 
 
 def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float) -> None:
@@ -178,15 +206,21 @@ def _arrow(transition: Transition) -> dict[str, Any]:
     }
 
 
-def _label(transition: Transition) -> str:
-    return f"{transition.name} {DIRECTIONS[transition.guard.direction]}"
+def _label(transition: Transition, *, short: bool = False) -> str:
+    direction = DIRECTIONS[transition.guard.direction]
+    name = transition.name
+    if short and name.startswith(f"{transition.source}->{transition.target}"):
+        return direction
+    return f"{name.removeprefix(f'{transition.source}: ')} {direction}"
 
 
 def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:
     """Set limits with room for labels and loops, and hide the axes."""
     low, high = places.min(axis=0), places.max(axis=0)
     row = high[1] - low[1] < 1e-9
-    ax.set_xlim(low[0] - 0.7, high[0] + 0.7)
-    ax.set_ylim(low[1] - (0.65 if row else 0.6), high[1] + (1.0 if loops and row else 0.65))
+    beside = 0.7 if len(places) < CROWD else 0.4
+    ax.set_xlim(low[0] - beside, high[0] + beside)
+    above = 1.0 if loops and row else 0.65 if loops or len(places) < CROWD else 0.2
+    ax.set_ylim(low[1] - (0.65 if row else 0.6 if loops or len(places) < CROWD else 0.2), high[1] + above)
     ax.set_aspect("equal", adjustable="box")
     ax.set_axis_off()

@@ -106,6 +106,19 @@ def test_graph_shows_loops_at_many_modes():
     assert len(axes.patches) == 2
 
 
+def test_graph_of_many_modes_has_one_arrow_for_two_modes():
+    """Six modes of a split system: no names that repeat the modes, no transitions of a start."""
+    system = hybrid.from_equations(
+        lambda t, x, p: (x.v, np.cos(t) - 0.3 * np.sign(x.v) - 4.0 * np.maximum(x.q - 1, 0)), state=("q", "v")
+    )
+    axes = plot_graph(system)
+    axes.get_figure().canvas.draw()
+    arrows = {(each.source, each.target) for each in system.transitions if not each.guard.at_start}
+    shown = [text.get_text() for text in axes.texts if text.get_text().strip()]
+    assert {*system.mode_names, "two-fold ↓"} <= set(shown)
+    assert len([text for text in shown if text in "↑↓"]) + shown.count("two-fold ↓") == len(arrows)
+
+
 def test_graph_shows_the_end_of_a_run():
     system = HybridSystem(
         state=("q",),
