@@ -16,7 +16,6 @@ SHORT = {"intervals": 20, "transient": 5, "solver": hybrid.DOP853(rtol=1e-7, ato
 @pytest.fixture(autouse=True)
 def _few_modes_at_first(monkeypatch):
     monkeypatch.setattr(splitter, "MOST_WHOLE", 2)
-    monkeypatch.setattr(splitter, "FEWEST_MORE", 1)
 
 
 def staircase():
