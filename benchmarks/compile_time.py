@@ -113,6 +113,41 @@ start = 0.01 * jnp.arange(1.0, 2 * n + 1)
 jax.block_until_ready(jax.jit(run)((start, jnp.eye(2 * n) if {tangent} else None)))
 print(json.dumps(time.perf_counter() - begin))
 """
+# Plain equations of a row of blocks on springs, split: dry contacts, and stops on one side or on both.
+SPLIT = """
+import json, time
+import numpy as np
+import hybrid, models
+hybrid.simulate(models.stick_slip(), (0.5, 0.0), (0.0, 1.0), mode="below", tangent=True)
+n, dry, stops = {blocks}, {dry}, {stops}
+def rates(t, x, p):
+    q, v = x[:n], x[n:]
+    beside = np.concatenate([[0.0], q, [0.0]])
+    force = beside[:-2] + beside[2:] - 2.2 * q - 0.05 * v + p.A * np.cos(0.8 * t + 0.3 * np.arange(n))
+    if dry:
+        force = force - p.mu * np.sign(v)
+    if stops > 0:
+        force = force - p.k * np.maximum(q - p.gap, 0)
+    if stops > 1:
+        force = force + p.k * np.maximum(-q - p.gap, 0)
+    return np.concatenate([v, force])
+values = {{"A": 1.0, "mu": 0.2, "k": 20.0, "gap": 0.5}}
+begin = time.perf_counter()
+system = hybrid.from_equations(rates, state=2 * n, parameters=values, period=2 * np.pi / 0.8)
+start = np.concatenate([np.linspace(0.1, 0.4, n), np.linspace(1.0, -1.0, n)])
+first = hybrid.simulate(system, start, (0.0, 60.0), tangent=True)
+middle = time.perf_counter()
+hybrid.simulate(system, start, (0.0, 60.0), tangent=True)
+seconds = 2 * middle - begin - time.perf_counter()
+print(json.dumps([seconds, len(set(first.mode)), len(first.system.modes), len(first.jumps)]))
+"""
+ROWS = {
+    "2 blocks, dry": (2, True, 0),
+    "3 blocks, dry": (3, True, 0),
+    "4 blocks, dry": (4, True, 0),
+    "4 blocks between stops": (4, False, 2),
+    "4 blocks, dry, a stop each": (4, True, 1),
+}
 KERNELS = "from hybrid.__main__ import compile_kernels; compile_kernels(2)"
 # Two small models load the kernels first.
 PROGRAM = """
@@ -146,6 +181,16 @@ def wait_of_peer(program: str, masses: int, tangent: bool) -> float:
     """Seconds from the equations of a chain to the end of the first run."""
     done = fresh_process(program.format(masses=masses, tangent=tangent))
     return float(json.loads(done.output.splitlines()[-1]))
+
+
+def wait_of_split(blocks: int, dry: bool, stops: int, cache: str) -> list[str]:
+    """Seconds to split a row of blocks and to compile what a run visits; modes visited, modes made, jumps."""
+    with TemporaryDirectory() as folder:
+        own = shutil.copytree(cache, Path(folder) / "cache")
+        program = SPLIT.format(blocks=blocks, dry=dry, stops=stops)
+        done = fresh_process(program, {"HYBRID_CACHE_DIR": str(own)})
+    seconds, *counts = json.loads(done.output.splitlines()[-1])
+    return [f"{seconds:.1f}", *map(str, counts)]
 
 
 # Colour and marker of each package.
@@ -199,6 +244,7 @@ def picture(waits: Mapping[str, Sequence[float]], path: Path) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--picture", type=Path, help="file for the picture of the chains")
+    options.add_argument("--split", action="store_true", help="only the systems that are split")
     given = options.parse_args(arguments)
     heading("Compile time of a new model: seconds of the first run with tangent vectors minus the second.")
     with TemporaryDirectory() as folder:
@@ -207,6 +253,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             PROGRAM.format(chain=CHAIN, model="models.bilinear_oscillator()", tangent=True),
             {"HYBRID_CACHE_DIR": folder},
         )
+        split = [[name, *wait_of_split(*row, folder)] for name, row in ROWS.items()]
+        table(["plain equations, split", "seconds", "modes visited", "made", "jumps"], split)
+        if given.split:
+            return
         table(["model", "seconds"], [[name, f"{wait(model, folder):.2f}"] for name, model in MODELS.items()])
         waits = {
             f"hybrid, {name}": [wait(f"chain({n})", folder, tangent) for n in CHAINS]
