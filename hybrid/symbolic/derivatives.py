@@ -6,15 +6,31 @@ every node is differentiated once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import sympy
+from sympy.codegen.cfunctions import expm1, hypot
 from sympy.core.parameters import distribute, global_parameters
 
-from hybrid.symbolic.expressions import ONE, ZERO, Select, close_gates, product
+from hybrid.symbolic.expressions import ONE, ZERO, Select, close_gates, power, product
 from hybrid.symbolic.nodes import interned, once
 
 Partials = dict[sympy.Symbol, sympy.Expr]
+TWO = sympy.Integer(2)
+# Derivatives of functions, by the function and its argument. SymPy's own evaluate the function once more.
+SLOPES: dict[type[sympy.Basic], Callable[[sympy.Expr, sympy.Expr], sympy.Expr]] = {
+    sympy.sin: lambda f, a: sympy.cos(a, evaluate=False),
+    sympy.cos: lambda f, a: -sympy.sin(a, evaluate=False),
+    sympy.sinh: lambda f, a: sympy.cosh(a, evaluate=False),
+    sympy.cosh: lambda f, a: sympy.sinh(a, evaluate=False),
+    sympy.tanh: lambda f, a: 1 - power(f, TWO),
+    sympy.asin: lambda f, a: 1 / sympy.sqrt(1 - power(a, TWO)),
+    sympy.acos: lambda f, a: -1 / sympy.sqrt(1 - power(a, TWO)),
+    sympy.atan: lambda f, a: 1 / (1 + power(a, TWO)),
+    sympy.asinh: lambda f, a: 1 / sympy.sqrt(power(a, TWO) + 1),
+    sympy.atanh: lambda f, a: 1 / (1 - power(a, TWO)),
+    expm1: lambda f, a: sympy.exp(a, evaluate=False),
+}
 
 
 def jacobian_of(
@@ -126,10 +142,8 @@ def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
     """Derivative of the outermost function with respect to the argument ``index``."""
     if expression.is_Pow:
         base, exponent = expression.args
-        return exponent * base ** (exponent - 1) if index == 0 else expression * sympy.log(base)
-    # fdiff would evaluate the new function again.
-    if isinstance(expression, sympy.sin):
-        return sympy.cos(expression.args[0], evaluate=False)
-    if isinstance(expression, sympy.cos):
-        return -sympy.sin(expression.args[0], evaluate=False)
-    return expression.fdiff(index + 1)
+        return exponent * power(base, exponent - 1) if index == 0 else expression * sympy.log(base)
+    if isinstance(expression, hypot):
+        return expression.args[index] / expression
+    slope = SLOPES.get(expression.func)
+    return slope(expression, expression.args[0]) if slope else expression.fdiff(index + 1)

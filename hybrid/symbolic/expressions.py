@@ -49,6 +49,29 @@ def product(*factors: sympy.Expr) -> sympy.Expr:
     return sympy.Mul(*factors)
 
 
+def power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
+    """SymPy's power; even powers below a root are taken out as absolute values.
+
+    SymPy looks for their signs itself, which may take for ever where sums are not expanded.
+    """
+    if not exponent.is_Rational:
+        return base**exponent
+    if _is_even_power(base):
+        inner, whole = base.args[0], base.exp * exponent
+        return sympy.Pow(inner if exponent.is_Integer else Absolute(inner), whole)
+    if base.is_Mul and not exponent.is_Integer:
+        outer = [each for each in base.args if _is_even_power(each)]
+        size = sympy.Abs(base.args[0]) if base.args[0].is_Number else ONE
+        rest = sympy.Mul(*(each for each in base.args if each not in outer)) / size
+        root = rest**exponent if not rest.is_Mul else sympy.Pow(rest, exponent, evaluate=False)
+        return sympy.Mul(size**exponent, *(power(each, exponent) for each in outer), root)
+    return base**exponent
+
+
+def _is_even_power(expression: sympy.Expr) -> bool:
+    return bool(expression.is_Pow and expression.exp.is_Integer and expression.exp.is_even)
+
+
 class RealFunction(sympy.Function):
     """A real function that is evaluated by ``value`` if all arguments are numbers."""
 

@@ -32,6 +32,7 @@ from hybrid.symbolic.expressions import (
     Truncate,
     TruncatedRemainder,
     number,
+    power,
     product,
 )
 from hybrid.symbolic.values import WHERE
@@ -65,6 +66,7 @@ def _of_parity(parity: int, function: Any) -> Callable[[sympy.Expr], sympy.Expr]
 
 
 DEGREE = number(np.pi / 180.0)
+TWO = number(2.0)
 
 # Keyed by the ufunc's name, which its aliases share.
 RULES: dict[str, Callable[..., sympy.Expr]] = {
@@ -75,16 +77,16 @@ RULES: dict[str, Callable[..., sympy.Expr]] = {
     "floor_divide": lambda a, b: Floor(a / b),
     "remainder": Remainder,
     "fmod": TruncatedRemainder,
-    "power": lambda a, b: a**b,
-    "float_power": lambda a, b: a**b,
+    "power": power,
+    "float_power": power,
     "negative": lambda a: -a,
     "positive": lambda a: a,
     "absolute": Absolute,
     "fabs": Absolute,
     "sign": Sign,
-    "square": lambda a: a**2,
+    "square": lambda a: power(a, TWO),
     "reciprocal": lambda a: 1 / a,
-    "sqrt": lambda a: a**HALF,
+    "sqrt": lambda a: power(a, HALF),
     "cbrt": CubeRoot,
     "exp": _as_it_stands(sympy.exp),
     "exp2": exp2,

@@ -14,9 +14,8 @@ from itertools import product
 import sympy
 from sympy.core.parameters import distribute
 
-from hybrid.symbolic.expressions import ZERO
+from hybrid.symbolic.expressions import HALF, ZERO
 
-HALF = sympy.Rational(1, 2)
 Field = list[sympy.Expr]
 Matrix = list[list[sympy.Expr]]
 

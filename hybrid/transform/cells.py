@@ -17,7 +17,7 @@ from sympy.core.parameters import distribute
 from hybrid.symbolic.continuity import vanishes_on
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.evaluation import expressed, scalar
-from hybrid.symbolic.expressions import ZERO
+from hybrid.symbolic.expressions import HALF, ZERO, power
 from hybrid.symbolic.switches import Surfaces, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
@@ -314,9 +314,13 @@ class Pieces:
             if square.expand() == 0:
                 b, unique = -constant / linear, linear
             else:
-                discriminant = linear**2 - 4 * square * constant
-                b = -2 * constant / (linear + discriminant ** sympy.Rational(1, 2))
-                unique = discriminant - FOLD * (linear**2 + square**2)
+                root = power(linear**2 - 4 * square * constant, HALF)
+                # Both quotients of the quadratic formula, each weighted with its denominator: no sign of a
+                # coefficient makes terms cancel, and the square may vanish.
+                b = (2 * square * (root - linear) - 2 * constant * (root + linear)) / (
+                    4 * square**2 + (root + linear) ** 2
+                )
+                unique = root**2 - FOLD * (linear**2 + square**2)
             # Both rates give the same share; one of them may not depend on it.
             p, q = p1 + p3 * b, q1 + q3 * b
             a = -((p0 + p2 * b) * p + (q0 + q2 * b) * q) / (p**2 + q**2)
@@ -327,12 +331,10 @@ class Pieces:
 def _coefficients(mm: sympy.Expr, mp: sympy.Expr, pm: sympy.Expr, pp: sympy.Expr) -> tuple[sympy.Expr, ...]:
     """Coefficients of 1, a, b and ab of the bilinear function with these values where a, b are -1 or 1."""
     four = sympy.Integer(4)
-    return (
-        (mm + mp + pm + pp) / four,
-        (pm + pp - mm - mp) / four,
-        (mp + pp - mm - pm) / four,
-        (mm + pp - mp - pm) / four,
+    by_a, by_b, by_both = (
+        each.expand() / four for each in (pm + pp - mm - mp, mp + pp - mm - pm, mm + pp - mp - pm)
     )
+    return pp - by_a - by_b - by_both, by_a, by_b, by_both
 
 
 def _vertices(sides: Sides, besides: int | None = None) -> Iterator[dict[int, int]]:

@@ -292,6 +292,19 @@ class TestSliding:
         assert set(arc.mode) == {"x=0, y=0"}
         assert arc["z"][-1] == pytest.approx(2.0 * -5 / 47 * (1 + 10 / 5), abs=1e-12)
 
+    @pytest.mark.parametrize("e", [0.0, 1e-12, 1e-6])
+    def test_no_digits_are_lost_where_the_quadratic_of_the_shares_has_a_root_at_zero(self, e):
+        """``0 = e - a + b/2`` and ``0 = a (1 - 2 b)``: b = 1/2 is stable, and the other root is 0."""
+
+        def field(t, x, p):
+            a, b = np.sign(x.x), np.sign(x.y)
+            return p.e - a + 0.5 * b, a - 2 * a * b, a + 10 * b
+
+        system = from_equations(field, state=("x", "y", "z"), parameters={"e": e})
+        arc = simulate(system, (0.0, 0.0, 0.0), (0.0, 2.0), mode="y=0, x=0")
+        assert arc.status.ok
+        assert arc["z"][-1] == pytest.approx(2.0 * (0.25 + e + 5.0), abs=1e-13)
+
     def test_a_repelling_surface_ends_the_run(self):
         away = from_equations(lambda t, x, p: (1.0 + 0 * x.q, np.sign(x.v)), state=PLANE)
         with pytest.raises(hybrid.HybridError, match="more than one mode: v<0, v>0"):
