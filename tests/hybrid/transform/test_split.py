@@ -7,10 +7,10 @@ import pytest
 
 import hybrid
 import models
-from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition, from_equations, simulate, split
+from hybrid import Guard, HybridSystem, Mode, ModelError, Transition, from_equations, simulate, split
 from hybrid.status import StatusCode
 from lyapunov import lyapunov_spectrum
-from models.vibroimpact import _field as vibroimpact_field
+from tests.reference.plain_models import PLAIN, pair
 
 PLANE = ("q", "v")
 
@@ -25,88 +25,11 @@ def plain(field, parameters=None, state=PLANE, transitions=(), period=None):
     )
 
 
-def like(model, field, transitions=()):
-    """The plain equations of a model, split."""
-    return split(plain(field, model.parameters, model.state, transitions, model.period))
-
-
-def ramp(t, x, p):
-    """The end of the converter's ramp."""
-    return x.tau - 1.0
-
-
-WRITTEN_PLAINLY = {
-    "bilinear_oscillator": (
-        lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - p.c * x.v - np.where(x.x < 0, p.k1, p.k2) * x.x),
-        (0.3, 0.2),
-        200.0,
-        None,
-    ),
-    "stop_oscillator": (
-        lambda t, x, p: (
-            x.v,
-            p.A * np.cos(p.w * t)
-            - p.c * x.v
-            - p.k * x.x
-            - np.where(np.abs(x.x) > p.d, p.F0 * np.sign(x.x) + p.ks * (x.x - p.d * np.sign(x.x)), 0.0),
-        ),
-        (0.3, 0.2),
-        200.0,
-        None,
-    ),
-    "chua_circuit": (
-        lambda t, x, p: (
-            p.alpha * (x.y - x.x - (p.m1 * x.x + 0.5 * (p.m0 - p.m1) * (np.abs(x.x + 1) - np.abs(x.x - 1)))),
-            x.x - x.y + x.z,
-            -p.beta * x.y,
-        ),
-        (0.3, 0.2, 0.1),
-        30.0,
-        1.0,
-    ),
-    "stick_slip": (
-        lambda t, x, p: (
-            x.v,
-            -p.Fs * np.sign(x.v - p.belt) / (1 + p.delta * np.abs(x.v - p.belt)) - x.x,
-        ),
-        (0.3, 0.1),
-        100.0,
-        1.0,
-    ),
-    "dry_friction_oscillator": (
-        lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - p.c * x.v - x.x - p.f * np.sign(x.v)),
-        (0.3, 0.1),
-        100.0,
-        None,
-    ),
-    "vibroimpact": (
-        lambda t, x, p: vibroimpact_field(t, x, p, p.K * np.maximum(x.x1 - x.x2, 0.0) ** 1.5),
-        (0.0, 0.001, 0.1, 0.0),
-        50.0,
-        None,
-    ),
-    "buck_converter": (
-        lambda t, x, p: (
-            (x.i - x.v / p.R) / p.C,
-            (np.where(p.a * (x.v - p.V_ref) - p.V_L - (p.V_U - p.V_L) * x.tau < 0, p.E, 0.0) - x.v) / p.L,
-            1 / p.T,
-        ),
-        (11.0, 0.5, 0.0),
-        0.04,
-        4e-4,
-    ),
-}
-CONVERTER = [
-    Transition("plain", "plain", Guard(ramp, +1), Reset(lambda t, x, p: (x.v, x.i, 0.0)), name="ramp")
-]
-
-
-@pytest.mark.parametrize("name", sorted(WRITTEN_PLAINLY))
+@pytest.mark.parametrize("name", sorted(PLAIN))
 def test_plain_equations_give_what_the_model_gives(name):
     """Arcs, jumps, tangent vectors and exponents, to rounding."""
-    field, x0, end, interval = WRITTEN_PLAINLY[name]
-    model = getattr(models, name)()
-    found = like(model, field, CONVERTER if name == "buck_converter" else ())
+    x0, end, interval = PLAIN[name].x0, PLAIN[name].end, PLAIN[name].interval
+    model, found = pair(name)
     by_hand, by_split = (simulate(each, x0, (0.0, end), tangent=True) for each in (model, found))
     assert by_split.status.code is by_hand.status.code
     assert len(by_split.jumps) == len(by_hand.jumps) > 2
@@ -316,7 +239,7 @@ class TestSliding:
     def test_multipliers_of_a_block_on_a_belt(self):
         """One direction of the orbit is forgotten in each stick: the multipliers are 1 and 0."""
         p = models.stick_slip().parameters
-        block = from_equations(WRITTEN_PLAINLY["stick_slip"][0], state=("x", "v"), parameters=p)
+        block = from_equations(PLAIN["stick_slip"].field, state=("x", "v"), parameters=p)
         run = simulate(block, (0.3, 0.1), (0.0, 60.0))
         start = run.jumps["v=belt->v<belt"][-1]
         period = np.diff([jump.t for jump in run.jumps["v=belt->v<belt"]])[-1]
