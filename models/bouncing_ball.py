@@ -36,6 +36,7 @@ def bouncing_ball() -> HybridSystem:
         name="bouncing ball",
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.8},
+        units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2"},
         modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
         transitions=[
             Transition(

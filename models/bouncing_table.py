@@ -51,6 +51,7 @@ def bouncing_table() -> HybridSystem:
         name="bouncing ball on a vibrating table",
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.5, "A": 0.01, "w": 36.0},
+        units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2", "A": "m", "w": "rad/s"},
         modes=[
             Mode("flight", lambda t, x, p: (x.v, -weight(t, x, p))),
             Mode("rest", lambda t, x, p: (0.0, 0.0)),

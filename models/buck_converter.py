@@ -63,6 +63,10 @@ def buck_converter() -> HybridSystem:
             "E": 25.0, "L": 20e-3, "C": 47e-6, "R": 22.0, "T": 400e-6,
             "V_L": 3.8, "V_U": 8.2, "V_ref": 11.3, "a": 8.4,
         },
+        units={
+            "v": "V", "i": "A", "t": "s", "E": "V", "L": "H", "C": "F", "R": "Ohm", "T": "s",
+            "V_L": "V", "V_U": "V", "V_ref": "V",
+        },
         modes=[Mode("off", field(0.0)), Mode("on", field(1.0))],
         transitions=[
             Transition("off", "on", Guard(excess, direction=-1), name="close"),

@@ -47,6 +47,15 @@ def rimless_wheel() -> HybridSystem:
         name="rimless wheel",
         state=("theta", "omega"),
         parameters={"g": 9.8, "l": 1.0, "alpha": np.pi / 8, "gamma": 0.08},
+        units={
+            "theta": "rad",
+            "omega": "rad/s",
+            "t": "s",
+            "g": "m/s^2",
+            "l": "m",
+            "alpha": "rad",
+            "gamma": "rad",
+        },
         modes=[Mode("stance", lambda t, x, p: (x.omega, p.g / p.l * np.sin(x.theta)))],
         transitions=[
             Transition(

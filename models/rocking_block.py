@@ -60,6 +60,7 @@ def rocking_block() -> HybridSystem:
         name="rocking block",
         state=("theta", "omega"),
         parameters={"alpha": 0.25, "p": 2.0, "e": 0.9, "A": 0.0, "w": 2 * np.pi},
+        units={"theta": "rad", "omega": "rad/s", "t": "s", "alpha": "rad", "p": "rad/s", "w": "rad/s"},
         modes=[Mode("right", about(+1)), Mode("left", about(-1))],
         transitions=[
             Transition("right", "left", Guard(upright, direction=-1), loss, name="impact left"),

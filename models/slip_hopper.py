@@ -56,6 +56,18 @@ def slip_hopper() -> HybridSystem:
         name="SLIP hopper",
         state=("x", "y", "vx", "vy"),
         parameters={"m": 80.0, "k": 20e3, "l0": 1.0, "alpha": np.radians(68.0), "g": 9.81},
+        units={
+            "x": "m",
+            "y": "m",
+            "vx": "m/s",
+            "vy": "m/s",
+            "t": "s",
+            "m": "kg",
+            "k": "N/m",
+            "l0": "m",
+            "alpha": "rad",
+            "g": "m/s^2",
+        },
         modes=[Mode("descent", flight), Mode("stance", stance), Mode("ascent", flight)],
         transitions=[
             Transition(
