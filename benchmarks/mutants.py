@@ -2,6 +2,10 @@
 
 A fault is one changed operator, comparison, constant or condition. It is noticed if a test fails or if the
 tests do not end. The changed copy is in a temporary folder.
+
+With ``--coverage FILE`` the nearest tests are those that run the changed line and little else. The file comes
+from ``python -m pytest -n auto --cov=hybrid --cov=lyapunov --cov-context=test`` (package pytest-cov). Machine
+code is not seen there, so the kernels keep the tests that names lead to.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -37,8 +42,9 @@ OTHER_COMPARISON = {
     ast.In: ast.NotIn,
     ast.NotIn: ast.In,
 }
-# Most test files to run per fault.
+# Most test files to run per fault, and most tests if they are known by their coverage.
 MOST_TESTS = 4
+MOST_COVERING = 30
 # Tests of files that names and imports do not lead to.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
@@ -233,8 +239,38 @@ def _own_tests(path: Path) -> list[str]:
     return [str(p.relative_to(ROOT)) for p in (same or importing)]
 
 
-def is_noticed(fault: Fault, seconds: float) -> bool:
-    """Whether the nearest tests fail or do not end on a copy with the fault."""
+class Coverage:
+    """Which tests run which lines, as pytest-cov has recorded it."""
+
+    def __init__(self, path: Path) -> None:
+        from coverage import CoverageData
+
+        data = CoverageData(str(path))
+        data.read()
+        self.tests: dict[str, dict[int, set[str]]] = {}
+        self.sizes: Counter[str] = Counter()
+        for name in data.measured_files():
+            lines = {
+                line: {each for each in tests if each}
+                for line, tests in data.contexts_by_lineno(name).items()
+            }
+            top = next(top for top in ("/hybrid/", "/lyapunov/") if top in name)
+            self.tests[top[1:] + name.rsplit(top, 1)[1]] = lines
+            self.sizes.update(each for tests in lines.values() for each in tests)
+
+    def nearest(self, fault: Fault) -> list[str]:
+        """Tests that run the line, or lines around it; those first that run few other lines."""
+        lines = self.tests.get(str(fault.path), {})
+        for margin in (0, 2, 10, 50, 1000):
+            found = set().union(*(tests for line, tests in lines.items() if abs(line - fault.line) <= margin))
+            if found:
+                ordered = sorted(found, key=lambda each: (self.sizes[each], each))
+                return list(dict.fromkeys(each.split("|")[0] for each in ordered))[:MOST_COVERING]
+        return []
+
+
+def is_noticed(fault: Fault, tests: Sequence[str], seconds: float) -> bool:
+    """Whether some tests fail or do not end on a copy with the fault."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for each in COPIED:
@@ -248,7 +284,7 @@ def is_noticed(fault: Fault, seconds: float) -> bool:
         environment = {**os.environ, "PYTHONPATH": name, "PYTHONDONTWRITEBYTECODE": "1"}
         try:
             done = subprocess.run(
-                [*command, *nearest_tests(fault.path)],
+                [*command, *tests],
                 cwd=folder,
                 env=environment,
                 capture_output=True,
@@ -267,17 +303,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=300.0, help="time limit of the tests for one fault")
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--coverage", type=Path, help="coverage with one context per test")
     given = parser.parse_args(arguments)
+    coverage = Coverage(given.coverage) if given.coverage else None
+
+    def tests_of(fault: Fault) -> list[str]:
+        return (coverage.nearest(fault) if coverage else []) or nearest_tests(fault.path)
+
     heading("Faults planted one at a time, and the number that the nearest tests notice.")
     rows, planted, noticed = [], 0, 0
     for path in given.files:
-        if not nearest_tests(path):
-            rows.append([str(path), "no tests", "", ""])
-            continue
         found = list(faults(path))
+        if not found or not tests_of(found[0]):
+            rows.append([str(path), str(len(found)), "no tests" if found else "", ""])
+            continue
         drawn = random.Random(f"{given.seed} {path}").sample(found, min(given.each, len(found)))
         with ThreadPoolExecutor(given.processes) as pool:
-            results = list(pool.map(lambda fault: is_noticed(fault, given.seconds), drawn))
+            results = list(pool.map(lambda fault: is_noticed(fault, tests_of(fault), given.seconds), drawn))
         for fault, seen in zip(drawn, results, strict=True):
             if not seen:
                 print(f"not noticed: {path}:{fault.line}: {fault.change}", flush=True)
