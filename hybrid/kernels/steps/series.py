@@ -29,6 +29,7 @@ from hybrid.kernels.events.path import state_at, time_at, value_at
 from hybrid.kernels.events.record import remember_grazing, start_record
 from hybrid.kernels.steps.series_guards import (
     earliest_on_series,
+    expanded_at,
     powers_on_step,
     time_of,
     to_bernstein,
@@ -64,6 +65,19 @@ TINY = 1e-300
 # Number of terms at the end of a series that must be small.
 TAIL = 8
 TAIL_OF_EXACT = 3
+# Number of terms before these that must suggest about the same step. The logarithm of the quotient of both
+# steps: more if the terms before suggest a shorter one, as in a gap, or a longer one, as at the end of a gap.
+BEFORE_TAIL = 5
+LEAST_RISE = -0.5
+NEWER = 4
+MOST_RISE = 0.2
+# The same for exact modes, whose terms fall ever faster.
+MOST_RISE_OF_EXACT = 1.0
+# The field and the slope of a series may differ by the tolerance over this share of a step.
+SHARE_OF_STEP = 0.25
+MOST_HALVINGS = 1000
+# Rounding of a state by which the noise of its field is measured.
+ROUNDING = 8.0 * EPSILON
 # How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
 FALL_OF_EXACT = 4.0
 # Largest correction of a landing, as a share of the step.
@@ -121,12 +135,17 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
     exact modes fall faster than any power, what is behind their last term is next to nothing, and three of
     their terms are enough. ``weights (1, columns)`` is scratch.
+
+    Returned second is whether the terms of the state before those suggest about the same step. A series may
+    have gaps, as that of ``t - x**9`` near zero: then small terms say nothing of those that follow. Nor do
+    terms that grow over the step.
     """
     weigh_state(series, n, rtol, atol, exact, weights)
     for g in range(groups):
         weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
     fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
     decisive = four_times(-math.inf)
+    newer, older = four_times(0.0), four_times(0.0)
     for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
         # A nan is skipped here; it shows when the series is summed.
         worst = four_times(0.0)
@@ -136,7 +155,55 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
             for i in range(first + g * stride, first + g * stride + NARROW * n, NARROW):
                 worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
         decisive = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), decisive)
-    return (1.0 if exact else SAFETY) * power_of_two(-largest(decisive))
+        if order - o < NEWER:
+            newer = larger(worst, newer)
+        else:
+            older = larger(worst, older)
+    tail = order - (TAIL_OF_EXACT if exact else TAIL)
+    earlier = four_times(-math.inf)
+    for o in range(tail, max(tail - BEFORE_TAIL, 0), -1):
+        worst = four_times(0.0)
+        for i in range(0, n, NARROW):
+            worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
+        earlier = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), earlier)
+    last, before = largest(decisive), largest(earlier)
+    most = MOST_RISE_OF_EXACT if exact else MOST_RISE
+    regular = LEAST_RISE <= before - last <= most if tail > 0 else last > -1000.0
+    if not exact and regular:
+        # If the newer terms are larger on the step than the older ones, those to come are larger yet.
+        growth = largest(binary_logarithms(newer)) - largest(binary_logarithms(older))
+        regular = growth <= 0.5 * TAIL * last
+    return (1.0 if exact else SAFETY) * power_of_two(-last), regular
+
+
+@njit(**KERNEL)
+def followed(model, method, run, order, t, h, work):
+    """The length up to ``h`` on which the series of the state has the field as its derivative.
+
+    The terms that were left out grow fastest, so the end of the step and a place before it tell. What
+    rounding of the state makes of the field is no misfit.
+    """
+    n, series = model.dimension, work.series
+    state, field, other = work.trial, work.stages[0], work.stages[1]
+    for _ in range(MOST_HALVINGS):
+        follows = True
+        for part in range(1, 3):
+            s = 0.5 * part * h
+            for i in range(n):
+                state[i], _, _ = expanded_at(series, i, 0, order, s)
+            model.field(run.mode, t + s, state, model.parameters, field)
+            for i in range(n):
+                state[i] *= 1.0 + (ROUNDING if i // 2 % 2 == 0 else -ROUNDING)
+            model.field(run.mode, t + s, state, model.parameters, other)
+            for i in range(n):
+                _, slope, _ = expanded_at(series, i, 0, order, s)
+                tolerance = method.atol + method.rtol * max(abs(run.y[i]), abs(state[i]))
+                misfit, noise = abs(field[i] - slope), abs(other[i] - field[i])
+                follows = follows and SHARE_OF_STEP * h * (misfit - noise) <= tolerance
+        if follows:
+            break
+        h *= 0.5
+    return h
 
 
 @njit(**KERNEL)
@@ -252,11 +319,11 @@ def series_step(task, remaining):
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.steps += 1
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
-    h = math.inf
+    h, regular = math.inf, True
     if degree == 0:
         start, stride = model.tangent_start, model.tangent_columns[mode]
         groups = whole_registers(tangents, NARROW) // NARROW
-        h = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
+        h, regular = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock < 0:
@@ -269,6 +336,8 @@ def series_step(task, remaining):
         h = attempts.explained_series(model, method, run, tangents, order, clock, h, work)
         if not h > 0.0:
             return NON_FINITE, 0.0
+    elif not regular and clock < 0:
+        h = followed(model, method, run, order, t, h, work)
     evaluate_with_sizes(series, order, h, 0, front)
     total = 0.0
     for i in range(n):
