@@ -40,6 +40,8 @@ WITHIN_ROUNDING = 4.0
 # A range up to this factor wider than the range in the middle counts as no wider.
 NO_BETTER = 1.01
 MOST_ROOT_STEPS = 200
+# Share of a bracket that tells a guard that stays zero from one with a flat root.
+BESIDE = 1e-3
 # A guard that is zero at the start of the step is searched from this share of the step on.
 SETTLED = 64.0 * EPSILON
 # Number of parts of a step; a guard that could not be traced is evaluated at their ends.
@@ -114,6 +116,19 @@ def certain_sign(model, transition, path, order, clock, start, pace, place, base
 
 
 @njit(**KERNEL)
+def _has_value(model, transition, path, order, clock, start, pace, place, work):
+    """Whether a guard is bounded at a place of the step; ``sqrt(z)`` is not where ``z < 0``."""
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, 0.0, 0.0, work)]
+    return row[LOW] > -math.inf or row[HIGH] < math.inf
+
+
+@njit(**INLINE)
+def _rests_at_zero(value, row):
+    """Whether a guard stays zero for a while; it changes its side at the end of that."""
+    return value == 0.0 and row[LEAST_SLOPE] == 0.0 and row[MOST_SLOPE] == 0.0
+
+
+@njit(**KERNEL)
 def _still_hidden(model, transition, path, order, clock, start, pace, place, side, base, tilt, work):
     """The base and tilt to subtract from a guard from a place on.
 
@@ -142,9 +157,16 @@ def root_in_bracket(
         ]
         if is_zero(on_guard):
             begins = side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
+            value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
         else:
             value = _value_at(model, transition, path, order, clock, start, pace, 0.0, row, base, tilt, work)
             begins = value * side > 0.0
+        if not begins and _rests_at_zero(value, row):
+            # At a flat root the slope is zero too, but not a little farther on.
+            beside = work.registers[
+                _row_at(model, transition, path, order, clock, start, pace, BESIDE * high, base, tilt, work)
+            ]
+            begins = _rests_at_zero(0.5 * (beside[LOW_MIDDLE] + beside[HIGH_MIDDLE]), beside)
         if not begins:
             return 0.0
     place, last = 0.5 * (low + high), high - low
@@ -154,11 +176,12 @@ def root_in_bracket(
         ]
         value = _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work)
         slope = _least_slope(row)
-        if value * side > 0.0:
+        at_rest = _rests_at_zero(value, row)
+        if value * side > 0.0 or at_rest:
             low = place
         else:
             high = place
-        if value == 0.0 or high - low <= 2.0 * EPSILON * high:
+        if (value == 0.0 and not at_rest) or high - low <= 2.0 * EPSILON * high:
             break
         closer = place - value / slope if abs(slope) < math.inf else math.nan
         change = abs(closer - place)
@@ -261,6 +284,7 @@ def first_change(
         clear = row[LOW] * side > 0.0 and row[HIGH] * side > 0.0
         monotone = row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
         nearest, farthest = min(abs(row[LOW]), abs(row[HIGH])), max(abs(row[LOW]), abs(row[HIGH]))
+        known = row[LOW] > -math.inf or row[HIGH] < math.inf
         rounding = WITHIN_ROUNDING * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
         bounded = -math.inf < row[LEAST_SLOPE] and row[MOST_SLOPE] < math.inf
         smooth = bounded and low < middle < high and side != 0
@@ -312,6 +336,15 @@ def first_change(
         if not clear:
             after = certain_sign(model, transition, path, order, clock, start, pace, high, base, tilt, work)
         if after == 0:
+            # A guard without a value at the end of the piece may have changed its side before.
+            divisible = low < middle < high and high - low > EPSILON * length and pieces <= MOST_PIECES
+            if (
+                divisible
+                and not _has_value(model, transition, path, order, clock, start, pace, high, work)
+                and (known or _has_value(model, transition, path, order, clock, start, pace, low, work))
+            ):
+                stack[top + 1, 0], stack[top + 2, 0], stack[top + 2, 1] = middle, low, middle
+                top += 2
             continue
         if after != side and side != 0:
             # After a jump of the guard at the start, it may be certain of its side from this piece on only.
