@@ -10,8 +10,10 @@ from hybrid.kernels.arithmetic.tangent import keep_apart
 from hybrid.kernels.events.guards import (
     allowed,
     guard_speed,
+    guard_value,
     is_forced,
     may_jump,
+    rounding_band,
     was_left_behind,
     widen_scale,
 )
@@ -40,6 +42,8 @@ from hybrid.kernels.types.layout import ENTRY, KERNEL, PARTS, TASK
 # More jumps than this at one instant, in total or per transition, count as endless.
 MOST_JUMPS_AT_ONCE = 1000
 MOST_JUMPS_EACH = 100
+# A landing may be this many times as far from its guard as the rounding of the state.
+MOST_ROUNDING = 64.0
 
 
 @njit(**KERNEL)
@@ -143,8 +147,52 @@ def is_full(record):
 
 
 @njit(**KERNEL)
+def remember_scale(model, run, work):
+    """Keep the sizes of the state's components in ``work.settled`` if the state is on a guard."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        if run.on_guard[model.outgoing[slot]] > 0:
+            for i in range(model.dimension):
+                work.settled[i] = run.scale[i]
+            return True
+    return False
+
+
+@njit(**KERNEL)
+def keep_scale(model, run, on_guard, t, work):
+    """Make the sizes at a landing such that the guard counts as zero there.
+
+    A flight from a guard back to it, no higher than the rounding of the landing before it, ends as far from
+    the guard as it has begun: the sizes at its start tell. And where a Runge-Kutta step has landed on a bent
+    guard, the rounding of the step may be a few times that of the state.
+    """
+    fired = run.pending
+    value = abs(guard_value(model, fired, t, run.y, work.scalar))
+    model.guard_gradient(fired, t, run.y, model.parameters, work.gradient)
+    band = rounding_band(model, run, fired, t, run.y, work)
+    if on_guard and value > band:
+        for i in range(model.dimension):
+            run.scale[i] = max(run.scale[i], work.settled[i])
+        band = rounding_band(model, run, fired, t, run.y, work)
+    bent = model.propagator[run.mode] == RUNGE_KUTTA and model.affine_guard[fired] == 0
+    if bent and band < value <= MOST_ROUNDING * band:
+        for i in range(model.dimension):
+            run.scale[i] *= 2.0 * value / band
+
+
+@njit(**KERNEL)
 def step(parts, task, remaining):
     """One step by the propagator of the mode; returns a code and the time that the step took."""
+    model, run, work = task.model, task.run, task.work
+    on_guard = remember_scale(model, run, work)
+    code, span = step_by_propagator(parts, task, remaining)
+    if code == GO_ON and run.pending != NO_TRANSITION:
+        keep_scale(model, run, on_guard, run.phase + span, work)
+    return code, span
+
+
+@njit(**KERNEL)
+def step_by_propagator(parts, task, remaining):
+    """``step``, without regard to the rounding of the state."""
     model, run = task.model, task.run
     if model.propagator[run.mode] == RUNGE_KUTTA:
         return parts.runge_kutta_step(task, remaining)

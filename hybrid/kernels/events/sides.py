@@ -186,6 +186,9 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             # Another transition's reset left the state at rest: the guard's own reset must hold it again.
             crossed = pushed and not own
             rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
+            if pushed and own and direction != 0:
+                # Held on the guard, the state has not crossed it: another reset may yet push it through.
+                now = -direction
         elif flat and direction != 0 and is_held(model, run, transition, mode, t, x, direction, work):
             # A push that only begins: it has no acceleration yet.
             rests = rests or allowed(model, transition, t, x, work.scalar)

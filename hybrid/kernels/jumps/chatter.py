@@ -26,6 +26,8 @@ LONG = 1.0
 BRIEF = 1e-4
 # Largest relative change of the limit that may be due to rounding.
 ROUGH = 1e-6
+# That change is no more than this many times what the rounding of the last landing makes of it.
+NOISE = 8.0
 # If the time of the limit still changes by more than this share, the limit is not computed.
 FAR = 1e3 * ROUGH
 # Share by which a flight at the level of rounding, and the speed after it, may differ from a steady series.
@@ -160,8 +162,9 @@ def accumulation(model, method, run, transition, since_last, work):
             # The jumps are driven; there is no chatter yet, and no limit to compare with the next one.
             run.trail[LIMIT, 0] = math.inf
         # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
-        # takes over.
-        floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < ROUGH
+        # takes over. Where it is more than rounding, jumps are slightly driven, and more of them are needed.
+        noise = NOISE * gain * band / height
+        floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < min(ROUGH, noise)
         found = drowned or (shallow and (misfit <= 1.0 or floor))
         run.trail[IMPULSE, n] = misfit
         run.chattering += 1

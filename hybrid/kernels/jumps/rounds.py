@@ -9,7 +9,7 @@ from numba import njit
 
 from hybrid.kernels.events.guards import guard_value
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
-from hybrid.kernels.types.layout import INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
 # Largest number of transitions in a round, and number of rounds that must have occurred.
 MOST_IN_TURN = 8
@@ -20,6 +20,8 @@ FEWEST_JUMPS = 16
 STEADY = 0.1
 # A time is shorter only if at most this share is left. Ratios closer to 1 cannot be told from 1.
 SHORTER = 0.999
+# A round this many times as long as the rounding of time has no length that could be compared.
+ROUNDING_OF_TIME = 64.0
 # Share of the time since the chatter began that is too short to change the limit.
 NOTHING_LEFT = 1e-7
 # Largest distance of guards from zero, and of resets from the identity, at a limit, in sizes of the state.
@@ -60,8 +62,13 @@ def time_left_of_rounds(model, run, turn, back):
     """Time that infinitely many more rounds take after the jump ``back`` before the last one, and the ratio.
 
     The rounds are a geometric series up to a term of second order, which the series that began a round
-    before tells. Zero if the rounds do not shorten by a steady ratio.
+    before tells. Zero if the rounds do not shorten by a steady ratio. Rounds shorter than the rounding of
+    time are passed over: those before them tell the ratio.
     """
+    most, drowned = run.visits.shape[0] - 1, 0
+    shortest = ROUNDING_OF_TIME * EPSILON * abs(run.phase)
+    while back + 4 * turn <= min(most, run.jumps) and time_before(model, run, back, back + turn) <= shortest:
+        back, drowned = back + turn, drowned + 1
     d0 = time_before(model, run, back, back + turn)
     d1 = time_before(model, run, back + turn, back + 2 * turn)
     d2 = time_before(model, run, back + 2 * turn, back + 3 * turn)
@@ -72,7 +79,8 @@ def time_left_of_rounds(model, run, turn, back):
         return 0.0, 1.0
     left = d0 * ratio / (1.0 - ratio)
     expected = d1 * before / (1.0 - before) - d0
-    return left + (left - expected) * ratio * ratio / (1.0 - ratio * ratio), ratio
+    left += (left - expected) * ratio * ratio / (1.0 - ratio * ratio)
+    return left * ratio**drowned, ratio
 
 
 @njit(**KERNEL)
@@ -115,6 +123,31 @@ def extrapolate(model, run, turn, back, left, out):
 
 
 @njit(**KERNEL)
+def extrapolate_by_rounds(model, run, turn, back, out):
+    """As ``extrapolate``, each component as a geometric series of its own (Aitken).
+
+    Where distances shrink faster than speeds, the state is no smooth function of the time that is left.
+    """
+    jumps, visits = run.jumps, run.visits
+    for i in range(model.dimension):
+        last = visits[slot_of(run, jumps - back), i]
+        before = visits[slot_of(run, jumps - back - turn), i]
+        change, earlier = last - before, before - visits[slot_of(run, jumps - back - 2 * turn), i]
+        out[i] = last
+        if abs(change) < abs(earlier):
+            out[i] += change * change / (earlier - change)
+
+
+@njit(**KERNEL)
+def agree(model, method, one, other, sizes):
+    """Whether two estimates of the limit agree up to the tolerances."""
+    for i in range(model.dimension):  # noqa: SIM110 (no generators in kernels)
+        if not abs(one[i] - other[i]) <= method.atol + method.rtol * sizes[i]:
+            return False
+    return True
+
+
+@njit(**KERNEL)
 def is_limit(model, run, turn, t, work):
     """Whether a round of jumps from ``work.settled`` finds the state on each guard, and leads back to it.
 
@@ -142,10 +175,16 @@ def is_limit(model, run, turn, t, work):
 
 
 @njit(**KERNEL)
-def size_of_visits(model, run, seen, out):
-    """Largest size of each component right after the last jumps, into ``out (n,)``."""
+def size_of_visits(model, run, seen, out, work):
+    """Largest size of each component right after the last jumps, into ``out (n,)``.
+
+    What a component moves within the rounding of time is rough as well.
+    """
+    field = work.field
+    model.field(run.mode, run.phase, run.y, model.parameters, field)
+    moment = ROUNDING_OF_TIME * EPSILON * abs(run.phase)
     for i in range(model.dimension):
-        out[i] = run.scale[i]
+        out[i] = max(run.scale[i], moment * abs(field[i]) / ROUGH)
         for back in range(seen):
             out[i] = max(out[i], abs(run.visits[slot_of(run, run.jumps - back), i]))
 
@@ -160,7 +199,8 @@ def limit_of_rounds(model, method, run, work):
     if run.jumps <= FEWEST_JUMPS:
         return 0.0, 0
     half = FEWEST_JUMPS // 2
-    if not time_before(model, run, 0, half) < SHORTER * time_before(model, run, half, FEWEST_JUMPS):
+    recent, earlier = time_before(model, run, 0, half), time_before(model, run, half, FEWEST_JUMPS)
+    if not (recent < SHORTER * earlier or recent == 0.0):
         return 0.0, 0
     turn = transitions_in_turn(model, run)
     if turn == 0:
@@ -171,19 +211,22 @@ def limit_of_rounds(model, method, run, work):
         return 0.0, 0
     seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
     lasted = time_before(model, run, 0, seen) + left
-    size_of_visits(model, run, seen, work.trial)
-    shift = abs(left + time_before(model, run, 0, turn) - earlier)
-    extrapolate(model, run, turn, 0, left, work.settled)
-    extrapolate(model, run, turn, turn, earlier, work.error)
-    agreed = shift <= method.rtol * lasted
-    for i in range(model.dimension):
-        tolerance = method.atol + method.rtol * work.trial[i]
-        agreed = agreed and abs(work.settled[i] - work.error[i]) <= tolerance
-    if not (agreed or left <= NOTHING_LEFT * lasted):
-        return 0.0, 0
-    if not is_limit(model, run, turn, run.phase + left, work):
-        return 0.0, 0
-    return left, turn
+    size_of_visits(model, run, seen, work.trial, work)
+    latest, end = time_before(model, run, 0, turn), run.phase + left
+    if latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase):
+        extrapolate(model, run, turn, 0, left, work.settled)
+        extrapolate(model, run, turn, turn, earlier, work.error)
+        agreed = abs(left + latest - earlier) <= method.rtol * lasted
+        agreed = agreed and agree(model, method, work.settled, work.error, work.trial)
+        if (agreed or left <= NOTHING_LEFT * lasted) and is_limit(model, run, turn, end, work):
+            return left, turn
+    if left <= NOTHING_LEFT * lasted:
+        extrapolate_by_rounds(model, run, turn, 0, work.settled)
+        extrapolate_by_rounds(model, run, turn, turn, work.error)
+        agreed = agree(model, method, work.settled, work.error, work.trial)
+        if agreed and is_limit(model, run, turn, end, work):
+            return left, turn
+    return 0.0, 0
 
 
 @njit(**KERNEL)

@@ -6,7 +6,7 @@ from numba import float64, njit, types
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
-from hybrid.kernels.events.guards import is_forced, sides_at
+from hybrid.kernels.events.guards import guard_value, is_forced, rounding_band, sides_at
 from hybrid.kernels.events.path import state_at
 from hybrid.kernels.events.record import remember_grazing, start_record
 from hybrid.kernels.steps.runge_kutta_guards import NOT_THERE, earliest_crossing, land
@@ -132,17 +132,30 @@ def find_event(task, h):
             break
         direction = model.direction[fired]
         side = run.side[fired] if direction == 0 else -direction
+        rounding = measured_time(model, run, mode)
         shortened, correction = land(
-            attempts, model, method, fired, side, mode, t, h, theta, run.y, tangents, work
+            attempts, model, method, fired, side, mode, t, rounding, h, theta, run.y, tangents, work
         )
         if shortened != NOT_THERE:
             return shortened, correction, fired
-        ignored = fired
         attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
+        if is_beyond(model, run, fired, side, t + h, work):
+            # Only a flight at the level of rounding lies between: the guard is as zero as it can be there.
+            attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
+            return theta * h, 0.0, fired
+        ignored = fired
         run.grazing_place, run.grazing_value = theta, 0.0
         run.grazing_guard = fired
         remember_touch(model, method, run, record, t, h, work)
     return h, 0.0, NO_TRANSITION
+
+
+@njit(**KERNEL)
+def is_beyond(model, run, transition, side, t, work):
+    """Whether the end of the attempted step, at ``t``, is surely not on a side of a guard."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    return -value * side > rounding_band(model, run, transition, t, work.new, work)
 
 
 @njit(**INLINE)

@@ -144,14 +144,15 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
 
 
 @njit(**KERNEL)
-def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents, work):
+def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y, tangents, work):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
     The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
     so that the state and the tangents at the event carry the error of the method, not that of its
     interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
-    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
-    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
+    seen. ``rounding`` is the time whose rounding limits the steps. Returns the length of the step last taken
+    and the small Euler step that completed it; ``NOT_THERE`` instead of the length if the guard of the step,
+    unlike that of its interpolant, only comes close to zero.
     """
     s = method.b.shape[0]
     low, high = 0.0, h
@@ -176,11 +177,13 @@ def land(parts, model, method, transition, side, mode, t, h, theta, y, tangents,
             for i in range(model.dimension * (1 + tangents)):
                 work.new[i] += correction * work.stages[s, i]
             return length, correction
-        if value * side > 0.0:
+        # A guard that stays zero for a while changes its side at the end of that.
+        at_rest = not smooth and value == 0.0 and speed == 0.0
+        if value * side > 0.0 or at_rest:
             low, before = length, True
         else:
             high, after = length, True
-        finest = 2.0 * EPSILON * (max(high, abs(t)) if smooth else high)
+        finest = 2.0 * EPSILON * (max(high, rounding) if smooth else high)
         if before and after and high - low <= finest:
             if length != high:
                 attempt_again(parts, model, method, mode, t, high, y, tangents, work)

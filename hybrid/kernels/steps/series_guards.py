@@ -30,6 +30,8 @@ from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
 
 # Safety factor for the estimated error of the last step towards a root.
 UNSEEN = 64.0
+# Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
+MOST_CORRECTIONS = 60
 # High powers of a series are left out of a proof if their sum is below this share of the size of the guard.
 NEGLIGIBLE = 0.003
 
@@ -250,7 +252,7 @@ def root_between(series, column, order, known_roots, h, low, high, left, right):
     only; but not to a root at 0, where the step begins.
     """
     s = simple_root_of(series, column, order, known_roots, h, low, high, left, right)
-    for _ in range(3 if known_roots > 0 else 0):
+    for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
         value, slope, _ = expanded_at(series, column, 0, order, s)
         shift = -value / slope if slope != 0.0 else 0.0
         if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
