@@ -259,13 +259,19 @@ class Coverage:
             self.sizes.update(each for tests in lines.values() for each in tests)
 
     def nearest(self, fault: Fault) -> list[str]:
-        """Tests that run the line, or lines around it; those first that run few other lines."""
+        """Tests that run the line, or lines around it: of each file in turn, those that run few other lines."""
         lines = self.tests.get(str(fault.path), {})
         for margin in (0, 2, 10, 50, 1000):
             found = set().union(*(tests for line, tests in lines.items() if abs(line - fault.line) <= margin))
             if found:
                 ordered = sorted(found, key=lambda each: (self.sizes[each], each))
-                return list(dict.fromkeys(each.split("|")[0] for each in ordered))[:MOST_COVERING]
+                rank: Counter[str] = Counter()
+                turns = []
+                for test in dict.fromkeys(each.split("|")[0] for each in ordered):
+                    file = test.split("::")[0]
+                    rank[file] += 1
+                    turns.append((rank[file], len(turns), test))
+                return [test for *_, test in sorted(turns)][:MOST_COVERING]
         return []
 
 
