@@ -259,7 +259,7 @@ class Coverage:
             self.sizes.update(each for tests in lines.values() for each in tests)
 
     def nearest(self, fault: Fault) -> list[str]:
-        """Tests that run the line, or lines around it: of each file in turn, those that run few other lines."""
+        """Tests that run the line, or lines around it: of each file those first that run few other lines."""
         lines = self.tests.get(str(fault.path), {})
         for margin in (0, 2, 10, 50, 1000):
             found = set().union(*(tests for line, tests in lines.items() if abs(line - fault.line) <= margin))
