@@ -12,11 +12,10 @@ import sympy
 from sympy.codegen.cfunctions import expm1, hypot
 from sympy.core.parameters import distribute, global_parameters
 
-from hybrid.symbolic.expressions import ONE, ZERO, Select, close_gates, power, product
+from hybrid.symbolic.expressions import ONE, TWO, ZERO, Select, close_gates, power, product
 from hybrid.symbolic.nodes import interned, once
 
 Partials = dict[sympy.Symbol, sympy.Expr]
-TWO = sympy.Integer(2)
 # Derivatives of functions, by the function and its argument. SymPy's own evaluate the function once more.
 SLOPES: dict[type[sympy.Basic], Callable[[sympy.Expr, sympy.Expr], sympy.Expr]] = {
     sympy.sin: lambda f, a: sympy.cos(a, evaluate=False),

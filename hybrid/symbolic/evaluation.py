@@ -53,6 +53,7 @@ FUNCTIONS: dict[type[sympy.Basic], Callable[..., Any]] = {
     sym.Maximum: np.maximum,
     sym.Minimum: np.minimum,
     sym.Remainder: np.remainder,
+    sym.Together: lambda u: u,
     sym.Select: np.where,
     sym.Sign: np.sign,
     sym.Step: lambda u: np.heaviside(u, 0.5),

@@ -14,14 +14,21 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import sympy
+from sympy.codegen.cfunctions import exp2, hypot
 
 from hybrid.symbolic.nodes import contains, interned, once
 
 ZERO = sympy.Integer(0)
 ONE = sympy.Integer(1)
+TWO = sympy.Integer(2)
 HALF = sympy.Rational(1, 2)
 # Number of numbers kept in the cache.
 MOST_NUMBERS = 10_000
+# A number taken out of a power, or collected in a product, has at most this many binary digits on either side
+# of the fraction bar, so that neither the number nor the rest leaves the floating range.
+MOST_DIGITS = 500
+# A higher power of a product is not split into powers of its factors, which may leave the floating range.
+HIGHEST_SPLIT = 16
 
 
 def number(value: Any) -> sympy.Expr:
@@ -41,19 +48,58 @@ def _number(value: float) -> sympy.Expr:
 
 
 def product(*factors: sympy.Expr) -> sympy.Expr:
-    """SymPy's product; a number times a symbol or function is built without SymPy's evaluation."""
+    """SymPy's product; a number times a symbol or function is built without SymPy's evaluation.
+
+    Equal factors and numbers are collected as long as they cannot leave the floating range.
+    """
     if len(factors) == 2:
         a, b = factors if factors[0].is_Number else factors[::-1]
         if a.is_Number and (b.is_Symbol or b.is_Function) and a is not ZERO and a is not ONE:
             return sympy.Mul(a, b, evaluate=False)
-    return sympy.Mul(*factors)
+    made = sympy.Mul(*factors)
+    if _digits(made) > MOST_DIGITS or _collects_high_powers(made, factors):
+        return sympy.Mul(*(Together(each) if each.is_Mul else each for each in factors))
+    return made
+
+
+def quotient(a: sympy.Expr, b: sympy.Expr) -> sympy.Expr:
+    """SymPy's quotient, with the numbers of `product`."""
+    return product(a, 1 / b)
+
+
+def _collects_high_powers(made: sympy.Expr, factors: tuple[sympy.Expr, ...]) -> bool:
+    """Whether a product has several factors, and among them a high power that no factor had."""
+    if not made.is_Mul or (len(made.args) == 2 and made.args[0].is_Number and not _digits(made)):
+        return False
+    high = {each for each in made.args if _is_high(each)}
+    return bool(high) and not high <= {each for factor in factors for each in sympy.Mul.make_args(factor)}
+
+
+def _is_high(factor: sympy.Expr) -> bool:
+    return bool(factor.is_Pow and factor.exp.is_Rational and abs(factor.exp.p) > HIGHEST_SPLIT * factor.exp.q)
+
+
+def _digits(expression: sympy.Expr) -> float:
+    """Binary digits of the numerator or denominator of an expression's number, or its floating exponent."""
+    coefficient = expression.args[0] if expression.is_Mul else expression
+    if coefficient.is_Rational and coefficient:
+        return math.log2(max(abs(coefficient.p), coefficient.q))
+    if coefficient.is_Float and coefficient:
+        size = abs(float(coefficient))
+        return abs(math.log2(size)) if 0.0 < size < math.inf else math.inf
+    return 0.0
 
 
 def power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
     """SymPy's power; even powers below a root are taken out as absolute values.
 
-    SymPy looks for their signs itself, which may take for ever where sums are not expanded.
+    SymPy looks for their signs itself, which may take for ever where sums are not expanded. SymPy also splits
+    ``(t/50)**200``, which leaves the floating range and is prevented here.
     """
+    if exponent.is_Number and base.is_Mul:
+        size = abs(float(exponent))
+        if size > HIGHEST_SPLIT or _digits(base) * size > MOST_DIGITS:
+            return Together(base) ** exponent
     if not exponent.is_Rational:
         return base**exponent
     if _is_even_power(base):
@@ -66,6 +112,11 @@ def power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
         root = rest**exponent if not rest.is_Mul else sympy.Pow(rest, exponent, evaluate=False)
         return sympy.Mul(size**exponent, *(power(each, exponent) for each in outer), root)
     return base**exponent
+
+
+def length(a: sympy.Expr, b: sympy.Expr) -> sympy.Expr:
+    """``sqrt(a**2 + b**2)``."""
+    return sympy.sqrt(power(a, TWO) + power(b, TWO))
 
 
 def _is_even_power(expression: sympy.Expr) -> bool:
@@ -83,6 +134,31 @@ class RealFunction(sympy.Function):
         if all(arg.is_Number for arg in args):
             return number(cls.value(*map(float, args)))
         return None
+
+
+class Together(RealFunction):
+    """``u``, a product that SymPy must not take apart."""
+
+    # Read by ``hybrid.symbolic.nodes.degree_of``.
+    keeps_degree = True
+
+    @classmethod
+    def eval(cls, u: sympy.Expr) -> sympy.Expr | None:
+        return u if u.is_Number else None
+
+    def fdiff(self, argindex: int = 1) -> sympy.Expr:
+        return ONE
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"({printer.doprint(self.args[0])})"
+
+
+# Functions that some code treats as these expressions.
+IN_OTHER_TERMS: dict[type[sympy.Basic], Callable[..., sympy.Expr]] = {
+    Together: lambda u: u,
+    hypot: length,
+    exp2: lambda u: sympy.exp(sympy.log(2) * u),
+}
 
 
 class PiecewiseConstant(RealFunction):

@@ -108,9 +108,9 @@ def degree_of(expression: sympy.Basic, variables: frozenset[sympy.Symbol]) -> in
     known = [each for each in degrees if each is not None]
     if isinstance(expression, sympy.Pow) and expression.exp.is_Integer and expression.exp.is_positive:
         return None if degrees[0] is None else degrees[0] * int(expression.exp)
-    if len(known) < len(degrees) or not (expression.is_Add or expression.is_Mul):
-        return None
-    return max(known) if expression.is_Add else sum(known)
+    if len(known) == len(degrees) and (expression.is_Mul or getattr(expression, "keeps_degree", False)):
+        return sum(known)
+    return max(known) if len(known) == len(degrees) and expression.is_Add else None
 
 
 @once

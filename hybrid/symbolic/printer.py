@@ -267,6 +267,9 @@ class _Printer:
         a, b = (self.text(argument, ATOM) for argument in expression.args)
         return f"({a} % {b})", ATOM
 
+    def _together(self, expression: sympy.Expr) -> tuple[str, int]:
+        return self._print(expression.args[0])
+
     def _cube_root(self, expression: sympy.Expr) -> tuple[str, int]:
         u = self.name(expression.args[0])
         return f"copysign(abs({u})**{1 / 3!r}, {u})", ATOM
@@ -284,6 +287,7 @@ class _Printer:
         sym.And: _indicator,
         sym.Or: _indicator,
         sym.Not: _indicator,
+        sym.Together: _together,
         sym.Select: _select,
         sym.Step: _step,
         sym.Gate: _gate,
@@ -304,9 +308,13 @@ def _float_text(value: float) -> tuple[str, int]:
 
 def _fraction(coefficient: sympy.Number) -> tuple[str, str | None]:
     """A positive number as a float, or as a quotient of two floats if one float is not exact."""
-    if coefficient.is_Rational and coefficient.q & (coefficient.q - 1):
+    if coefficient.is_Rational and coefficient.q & (coefficient.q - 1) and _fits(coefficient):
         return repr(float(coefficient.p)), repr(float(coefficient.q))
     return repr(float(coefficient)), None
+
+
+def _fits(fraction: sympy.Rational) -> bool:
+    return max(abs(fraction.p), fraction.q).bit_length() < 1024
 
 
 def power_text(base: str, exponent: sympy.Expr, name: str) -> str:

@@ -12,6 +12,7 @@ from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
 from hybrid.symbolic.expressions import (
     HALF,
     ONE,
+    TWO,
     ZERO,
     Absolute,
     And,
@@ -34,6 +35,7 @@ from hybrid.symbolic.expressions import (
     number,
     power,
     product,
+    quotient,
 )
 from hybrid.symbolic.values import WHERE
 
@@ -66,14 +68,13 @@ def _of_parity(parity: int, function: Any) -> Callable[[sympy.Expr], sympy.Expr]
 
 
 DEGREE = number(np.pi / 180.0)
-TWO = number(2.0)
 
 # Keyed by the ufunc's name, which its aliases share.
 RULES: dict[str, Callable[..., sympy.Expr]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
     "multiply": product,
-    "divide": lambda a, b: a / b,
+    "divide": quotient,
     "floor_divide": lambda a, b: Floor(a / b),
     "remainder": Remainder,
     "fmod": TruncatedRemainder,

@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import ClassVar
 
 import sympy
-from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+from sympy.codegen.cfunctions import expm1, log1p, log2, log10
 
 from hybrid.compiler.bounds.forcing import is_harmless
 from hybrid.compiler.emitted import Programs
@@ -151,6 +151,8 @@ class _Writer:
             return self._add(ONE_OPERAND[function], self.place(arguments[0]))
         if function in TWO_OPERANDS:
             return self._add(TWO_OPERANDS[function], *map(self.place, arguments))
+        if function in sym.IN_OTHER_TERMS:
+            return self.place(sym.IN_OTHER_TERMS[function](*arguments))
         if function not in self.RULES:
             raise NoProgram(f"{function.__name__} has no interval arithmetic here")
         return self.RULES[function](self, *arguments)
@@ -204,10 +206,8 @@ class _Writer:
         sympy.Add: _sum,
         sympy.Mul: _product,
         sym.Select: _select,
-        exp2: lambda self, u: self.place(sympy.exp(sympy.log(2) * u)),
         log2: lambda self, u: self.place(sympy.log(u) / sympy.log(2)),
         log10: lambda self, u: self.place(sympy.log(u) / sympy.log(10)),
-        hypot: lambda self, a, b: self.place(sympy.sqrt(a**2 + b**2)),
         sym.Remainder: lambda self, a, b: self._remainder(op.FLOOR, a, b),
         sym.TruncatedRemainder: lambda self, a, b: self._remainder(op.TRUNCATE, a, b),
     }

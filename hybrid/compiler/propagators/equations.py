@@ -14,7 +14,7 @@ import sympy
 
 from hybrid.compiler.taylor.roots import is_multiple, singular_bases
 from hybrid.symbolic.derivatives import partial_derivatives
-from hybrid.symbolic.expressions import ZERO
+from hybrid.symbolic.expressions import ZERO, Together
 from hybrid.symbolic.nodes import mentions, nodes
 from hybrid.symbolic.signs import sign_of, simplified
 from hybrid.symbolic.tracing import Symbols
@@ -125,6 +125,8 @@ def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
     """Whether time enters only through polynomials and through harmonics and exponentials of linear terms."""
     for node in nodes(entry):
         if not mentions(node, (symbols.t,)) or node.is_Symbol or node.is_Add or node.is_Mul:
+            continue
+        if isinstance(node, Together):  # a product, too
             continue
         if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
             continue

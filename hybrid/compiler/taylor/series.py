@@ -12,11 +12,12 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import sympy
-from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+from sympy.codegen.cfunctions import expm1, log1p, log2, log10
 
 from hybrid.compiler.taylor.sums import Term, added
 from hybrid.kernels.types.codes import NARROW
 from hybrid.symbolic.constants import Constants
+from hybrid.symbolic.expressions import IN_OTHER_TERMS
 from hybrid.symbolic.nodes import mentions, nodes, operations_of, symbols_of
 from hybrid.symbolic.printer import MATH_FUNCTIONS, power_text
 
@@ -267,13 +268,9 @@ class Recurrences:
             return self._pair(expression)
         if expression.func in OWN_SQUARE:
             return self._own_square(expression)
-        if isinstance(expression, hypot):
-            a, b = expression.args
-            return self._bind(expression, *2 * (self.coefficient(sympy.sqrt(a**2 + b**2)),))
-        if isinstance(expression, exp2):
-            return self._bind(
-                expression, *2 * (self.coefficient(sympy.exp(sympy.log(2) * expression.args[0])),)
-            )
+        if expression.func in IN_OTHER_TERMS:
+            text = self.coefficient(IN_OTHER_TERMS[expression.func](*expression.args))
+            return self._bind(expression, text, text)
         if isinstance(expression, BY_DERIVATIVE):
             return self._by_derivative(expression)
         raise NoSeries(f"{type(expression).__name__} is not analytic")

@@ -1,15 +1,21 @@
-"""Random formulas with powers and roots of sums, traced and differentiated.
+"""Random formulas with powers and roots of sums, and high powers of products, traced and differentiated.
 
-SymPy's evaluation of such powers, and of functions of them, ended with a RecursionError in one of eight.
+SymPy's evaluation of powers of sums, and of functions of them, ended with a RecursionError in one of eight.
 """
 
 import random
+from fractions import Fraction
+from math import inf
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.evaluation import Program
+from hybrid.symbolic.printer import IMPORTS, assignments
 from hybrid.symbolic.tracing import model_symbols, trace
 
 NAMES = ("a", "b")
@@ -48,3 +54,79 @@ def test_random_formulas(seed):
         above, below = (function(*(np.array(POINT) + side * moves)) for side in (1, -1))
         rounding = 1e-16 * max(1.0, abs(wanted)) / STEP
         assert slope == pytest.approx((above - below) / (2 * STEP), rel=1e-5, abs=100 * rounding + 1e-7)
+
+
+def printed(function, value):
+    """The value and the slope of a function of one variable, by the generated code."""
+    [expression] = trace(lambda t, x, p: (function(x.a),), ("a",), ())
+    [[slope]] = jacobian_of([expression], model_symbols(1, 0).x)
+    names = {"x": [np.float64(value)]}
+    with np.errstate(all="ignore"):
+        exec(IMPORTS + "\n".join(assignments(["found", "slope"], [expression, slope])), names)
+    return float(names["found"]), float(names["slope"])
+
+
+def loop(base, n):
+    value = 1.0
+    for _ in range(n):
+        value = value * base
+    return value
+
+
+HIGH = {
+    "power": lambda a, c, n: (a * c) ** n,
+    "power of quotient": lambda a, c, n: (a / (1 / c)) ** n,
+    "nested": lambda a, c, n: ((a * c) ** 5) ** (n // 5),
+    "loop": lambda a, c, n: loop(a * c, min(n, 200)),
+    "loop with growth": lambda a, c, n: loop(a * c * np.exp(1 - a * c), min(n, 200)),
+    "with growth": lambda a, c, n: (a * c * np.exp(1 - a * c)) ** n,
+    "even root": lambda a, c, n: ((a * c) ** 2) ** (n / 2),
+    "inverse": lambda a, c, n: (a * c) ** -n,
+    "fraction": lambda a, c, n: np.abs(a * c) ** (n + 0.25),
+    "two": lambda a, c, n: 3 * (a * c) ** n * (1 / (a * c)) ** (n - 5),
+}
+
+
+@pytest.mark.parametrize("shape", HIGH)
+@given(
+    size=st.floats(0.9, 1.1),
+    sign=st.sampled_from([1, -1]),
+    scale=st.floats(-290.0, 290.0),
+    n=st.sampled_from([5, 10, 15, 30, 100, 205, 1000, 5001]),
+)
+def test_a_high_power_is_as_accurate_as_that_of_floats(shape, size, sign, scale, n):
+    """``(t/50)**200`` is 1 at ``t = 50``; neither ``50**200`` nor ``t**200`` need be in range."""
+    constant = 10.0**-scale
+    value = np.float64(size * sign * 10.0**scale)
+    with np.errstate(all="ignore"):
+        wanted = HIGH[shape](value, constant, n)
+    found, _ = printed(lambda a: HIGH[shape](a, constant, n), value)
+    if 1e-250 < abs(wanted) < 1e250:
+        assert found == pytest.approx(wanted, rel=4e-16 * (n + 10), abs=0)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 7])
+@pytest.mark.parametrize("constant", [3.0, 50.0, 0.1, -7.0])
+@given(value=st.floats(-100.0, 100.0))
+def test_low_powers_stay_within_some_roundings(n, constant, value):
+    exact = (Fraction(value) / Fraction(constant)) ** n
+    found, _ = printed(lambda a: (a / constant) ** n, value)
+    assert found == pytest.approx(float(exact), rel=1e-15 * n, abs=1e-290)
+
+
+@pytest.mark.parametrize("solver", [Taylor(), DOP853()])
+def test_a_high_power_of_a_quotient_in_a_model(solver):
+    """SymPy made ``t**200`` times a number with 340 digits, which no float holds."""
+    system = HybridSystem(
+        state=("u", "v", "s"),
+        modes=[Mode("rise", lambda t, x, p: ((t / 50) ** 200, (x.s / 50) ** 200, 1.0))],
+    )
+    arc = simulate(system, (0.0, 0.0, 0.0), (0.0, 50.0), solver=solver)
+    assert arc.x[-1] == pytest.approx([50 / 201, 50 / 201, 50.0], rel=1e-9)
+
+
+def test_the_slope_of_a_high_power():
+    assert printed(lambda a: (a / 50) ** 200, 50.0) == (1.0, 4.0)
+    assert printed(lambda a: (a / 50) ** -200, 50.0) == (1.0, -4.0)
+    assert printed(lambda a: (a / -50) ** 201, 50.0) == (-1.0, pytest.approx(-4.02))
+    assert printed(lambda a: (a * 2) ** 5000, 1.0)[0] == inf
