@@ -14,23 +14,28 @@ import sympy
 from sympy.codegen.cfunctions import exp2, expm1
 
 from hybrid.compiler.emitted import OF_STATE
-from hybrid.symbolic.expressions import Absolute, Maximum
+from hybrid.symbolic.expressions import Absolute, Maximum, Together
 from hybrid.symbolic.nodes import degree_of, mentions, once
 from hybrid.symbolic.tracing import Symbols
 
-# Products of more harmonics than these, such as ``cos(t)**100``, are narrow pulses.
-MOST_HARMONICS = 4
+# Products of more factors that vary than these, such as ``(1 - t**2)**100``, are narrow pulses.
+MOST_FACTORS = 8
+# Near its largest value a sine or cosine is a parabola, so it counts as two factors.
+FACTORS_OF_HARMONIC = 2
 # Used instead of a component of the state if the forcing is not simply a term of the component's rate.
 NO_COMPONENT = -1
 # Functions that may be flat to all digits and change a little further on.
 SATURATING = (sympy.tanh, sympy.atan, sympy.exp, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
+# A sum counts as a factor. A single exponential does not, since it makes no product narrower.
+SUMS_OF_EXPONENTIALS = (sympy.sinh, sympy.cosh, expm1)
 
 
 @attrs.frozen
 class Forcing:
     """An expression in time and parameters, and the component with this term in its rate or NO_COMPONENT.
 
-    Without an expression, with the component OF_STATE, it stands for parts that saturate in the state.
+    Without an expression, with the component OF_STATE, it stands for parts that saturate in the state, or
+    that grow exponentially in time.
     """
 
     expression: sympy.Expr | None
@@ -45,29 +50,39 @@ def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forc
     if field is None:
         return ()
     found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, symbols))
-    if not found and any(_saturates(entry, symbols.x) for entry in field):
+    if not found and any(_saturates(entry, symbols.variables) for entry in field):
         found[Forcing(None, OF_STATE)] = None
     return tuple(found)
 
 
 @once
-def _saturates(node: sympy.Expr, states: tuple[sympy.Symbol, ...]) -> bool:
-    """Whether an expression may change in the state where its series is flat to all digits.
+def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> bool:
+    """Whether an expression may change where its series is flat to all digits.
 
-    ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so is ``x/sqrt(x**2 + 1e-16)``. Powers of affine
-    expressions are not: where these vanish, the field is singular. Nor are quotients of polynomials: their
-    series shows poles that are not far closer to the orbit than the tolerance.
+    ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so are ``x/sqrt(x**2 + 1e-16)``, ``(x/5)**40`` for
+    small ``x``, and ``exp(9*(t - 50))`` long before ``t = 50``. Roots of affine expressions are not: where
+    these vanish, the field is singular. Nor are quotients of polynomials of low degree: their series shows
+    poles that are not far closer to the orbit than the tolerance.
     """
-    if not mentions(node, states):
+    if not mentions(node, variables):
         return False
     if isinstance(node, SATURATING):
         return True
+    own = frozenset(variables)
+    if node.is_Mul or node.is_Pow:
+        degree = degree_of(node, own)
+        if degree is not None and degree > MOST_FACTORS:
+            return True
+    if node.is_Pow and (
+        mentions(node.exp, variables) or (node.exp.is_Integer and abs(node.exp) > MOST_FACTORS)
+    ):
+        return True
     if node.is_Pow and not node.exp.is_Integer:
         bases = node.base.args if isinstance(node.base, Maximum | Absolute) else (node.base,)
-        degrees = [degree_of(base, frozenset(states)) for base in bases]
+        degrees = [degree_of(base, own) for base in bases]
         if any(degree is None or degree > 1 for degree in degrees):
             return True
-    return any(_saturates(part, states) for part in node.args)
+    return any(_saturates(part, variables) for part in node.args)
 
 
 @once
@@ -97,30 +112,39 @@ def _found_parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator
 def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
     """Whether an expression in time has no pulse so narrow that a solver could miss it.
 
-    Polynomials, exponentials of linear functions of time, and products of these with a few sines and cosines
-    of polynomials are harmless. Polynomials and exponentials have no pulses. A sine has the same amplitude in
-    every period, so a solver never finds it at rest. Every other expression may rest and then have a pulse.
+    Sums of products of a few factors are harmless, where a factor is linear in time, and a sine or cosine of
+    a polynomial counts as two per degree. Exponentials of linear functions are harmless, too. Such functions
+    are not small on most of a step and large elsewhere, unless they grow exponentially. Every other
+    expression may rest and then have a pulse.
     """
-    harmonics = _harmonics(expression, t)
-    return harmonics is not None and harmonics <= MOST_HARMONICS
+    factors = _factors(expression, t)
+    return factors is not None and factors <= MOST_FACTORS
 
 
 @once
-def _harmonics(node: sympy.Expr, t: sympy.Symbol) -> int | None:
-    """Largest number of harmonics in a product; None if there are other functions."""
-    if node == t or not mentions(node, (t,)):
+def _factors(node: sympy.Expr, t: sympy.Symbol) -> int | None:
+    """Number of factors of a product that vary, the most in any term of a sum; None for other functions."""
+    if not mentions(node, (t,)):
         return 0
-    if node.is_Add or node.is_Mul:
-        parts = [_harmonics(part, t) for part in node.args]
+    if node == t:
+        return 1
+    if node.is_Add or isinstance(node, sympy.Mul | Together):
+        parts = [_factors(part, t) for part in node.args]
         numbers = [part for part in parts if part is not None]
         if len(numbers) < len(parts):
             return None
-        return sum(numbers) if node.is_Mul else max(numbers)
+        return sum(numbers) if not node.is_Add else max(1, *numbers)
     if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
-        factor = _harmonics(node.base, t)
-        return None if factor is None else factor * int(node.exp)
+        factors = _factors(node.base, t)
+        return None if factors is None else factors * int(node.exp)
+    if node.is_Pow and mentions(node.base, (t,)):
+        return None
+    # The degree is that of a polynomial: a zero derivative would not prove that the argument has no jumps.
+    degree = degree_of(node.exp if node.is_Pow else node.args[0], frozenset((t,)))
+    if degree is None:
+        return None
     if isinstance(node, sympy.sin | sympy.cos):
-        return 1 if degree_of(node.args[0], frozenset((t,))) is not None else None
-    if isinstance(node, sympy.exp | sympy.sinh | sympy.cosh):
-        return None if mentions(node.args[0].diff(t), (t,)) else 0
-    return None
+        return FACTORS_OF_HARMONIC * degree
+    if isinstance(node, sympy.exp | exp2 | sympy.Pow) and degree == 1:
+        return 0
+    return 1 if isinstance(node, SUMS_OF_EXPONENTIALS) and degree == 1 else None

@@ -5,7 +5,6 @@ from functools import cache
 import attrs
 import numpy as np
 import pytest
-import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +22,6 @@ from hybrid import (
     simulate,
     stroboscopic_section,
 )
-from hybrid.compiler.bounds.forcing import MOST_HARMONICS, is_harmless
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 # Pulses as functions of time, with a height ``A``, a place ``a`` and a width ``w``.
@@ -374,12 +372,3 @@ def test_what_the_compiled_system_says():
         modes=[Mode("lag", branching, jacobian=lambda t, x, p: ((-1.0,),))],
     )
     assert "narrower than a step may be stepped over" in repr(compile_system(untraced))
-
-
-def test_a_product_of_many_harmonics_is_no_harmless_forcing():
-    """A sum of as many harmonics is harmless."""
-    t = sympy.Symbol("t", real=True)
-    many = [sympy.cos(k * t) for k in range(1, MOST_HARMONICS + 2)]
-    assert is_harmless(sympy.Add(*many), t)
-    assert is_harmless(sympy.Mul(*many[:-1]), t)
-    assert not is_harmless(sympy.Mul(*many), t)
