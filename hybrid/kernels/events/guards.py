@@ -119,12 +119,14 @@ def _spread_of_terms(model, run, program, t, x, work):
 def widen_scale(model, run, work):
     """Make rounding bands alike at the start and the end of a run, whatever steps lead there.
 
-    The scale of each component is at least its change while the state changes by its own size; ``work.field``
-    is current. Then a run that ends on a guard and a run that starts there agree that the guard is zero.
+    The scale of each component is at least its change while what moves of the state changes by its own size;
+    ``work.field`` is current. Then a run that ends on a guard and a run that starts there agree that the
+    guard is zero.
     """
     size, pace = 0.0, 0.0
     for i in range(model.dimension):
-        size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
+        if work.field[i] != 0.0:
+            size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
     for i in range(model.dimension if pace > 0.0 else 0):
         run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
 
@@ -233,7 +235,9 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
         return total
     size, speed = 0.0, 0.0
     for i in range(n):
-        size = max(size, abs(x[i]), run.scale[i])
+        # The size of a component that the guard does not have says nothing of how the guard bends.
+        if work.gradient[i] != 0.0:
+            size = max(size, abs(x[i]), run.scale[i])
         speed = max(speed, abs(work.field[i]))
     epsilon = 1e-7 * (size if size > 0.0 else 1.0) / (speed if speed > 0.0 else 1.0)
     for i in range(n):

@@ -120,7 +120,9 @@ def is_held(model, run, transition, mode, t, x, towards, work):
     n = model.dimension
     size, pace = 0.0, 0.0
     for i in range(n):
-        size, pace = max(size, abs(x[i]), run.scale[i]), max(pace, abs(work.field[i]))
+        if work.gradient[i] != 0.0:
+            size = max(size, abs(x[i]), run.scale[i])
+        pace = max(pace, abs(work.field[i]))
     moment = 1e-7 * (size if size > 0.0 else 1.0) / (pace if pace > 0.0 else 1.0)
     later, after, end = work.settled, work.state, t + 2.0 * moment
     for i in range(n):

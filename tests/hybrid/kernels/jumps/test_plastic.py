@@ -150,7 +150,7 @@ def pair_over_a_floor():
     )
 
 
-@pytest.mark.parametrize("solver", [Taylor(), DOP853()], ids=["Taylor", "DOP853"])
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 def test_two_masses_never_fall_through_the_floor(solver):
     """With restitutions from plastic to elastic; wherever the run ends, the order of the masses is kept."""
     system, rng = pair_over_a_floor(), np.random.default_rng(2)
