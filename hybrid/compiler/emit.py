@@ -21,6 +21,7 @@ from hybrid.compiler.bounds.forcing import forcings
 from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import function_of_index
+from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Propagator, Series
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
@@ -92,6 +93,9 @@ def _emitted(system: HybridSystem) -> Emitted:
         )
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
+    symbols = writer.symbols
+    affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
+    traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
     series = [each.series for each in propagators]
     places = _places(series, with_room=system.growth is not None)
@@ -106,14 +110,15 @@ def _emitted(system: HybridSystem) -> Emitted:
         ],
         "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
         "guard_gradient": [guard.derivative for guard in guards],
+        "guard_curvature": [
+            curvature(expression, straight, symbols)
+            for expression, straight in zip(traced, affine, strict=True)
+        ],
         "reset": [reset.value for reset in resets],
         "reset_jacobian": [_zeros_first(reset.derivative, n) for reset in resets],
         "series": _placed(places, [each.statements for each in series]),
         "tangent_series": _placed(places, [each.tangent_statements for each in series]),
     }
-    symbols = writer.symbols
-    affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
-    traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     surface, orientation = writer.surfaces(traced)
     pulses = [forcings(field.expressions, symbols) for field in fields]
     forcing = [each for of_mode in pulses for each in of_mode]

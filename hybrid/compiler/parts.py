@@ -7,7 +7,7 @@ FIELDS, EVENTS, VARIATIONAL = "fields", "events", "variational field"
 SERIES, TANGENT_SERIES = "series", "tangent series"
 PARTS = {
     FIELDS: ("field", "field_jacobian"),
-    EVENTS: ("guard", "guard_gradient", "reset", "reset_jacobian"),
+    EVENTS: ("guard", "guard_gradient", "guard_curvature", "reset", "reset_jacobian"),
     VARIATIONAL: ("variational_field",),
     SERIES: ("series",),
     TANGENT_SERIES: ("tangent_series",),

@@ -220,8 +220,8 @@ def note_grazing(run, transition, degree, side, band, work):
 def guard_acceleration(model, run, transition, mode, t, x, work):
     """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
 
-    ``D_x g (D_x f f + D_t f)`` is exact. The curvature of the guard itself is the difference quotient of its
-    speed along the frozen vector field.
+    ``D_x g (D_x f f + D_t f)`` is exact, and so is the curvature of a traced guard along the frozen vector
+    field. That of any other guard is the difference quotient of its speed.
     """
     n = model.dimension
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
@@ -233,6 +233,11 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
         total += work.gradient[i] * bend
     if model.affine_guard[transition] == 1:
         return total
+    for i in range(n):
+        work.state[i] = work.field[i]
+    model.guard_curvature(transition, t, x, model.parameters, work.state)
+    if not math.isnan(work.state[0]):
+        return total + work.state[0]
     size, speed = 0.0, 0.0
     for i in range(n):
         # The size of a component that the guard does not have says nothing of how the guard bends.

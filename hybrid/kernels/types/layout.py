@@ -74,6 +74,7 @@ class Model(Structure):
     variational_field: VECTOR_FUNCTION
     guard: VECTOR_FUNCTION
     guard_gradient: VECTOR_FUNCTION
+    guard_curvature: VECTOR_FUNCTION
     reset: VECTOR_FUNCTION
     reset_jacobian: MATRIX_FUNCTION
     series: SERIES_FUNCTION

@@ -1,0 +1,42 @@
+"""The compiled second derivative of guards along a vector and time."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hybrid.compiler.curvature import UNKNOWN, curvature
+from hybrid.symbolic.tracing import model_symbols, trace
+
+GUARDS = {
+    "quadratic": lambda t, x, p: x.a**2 - p.c * x.a * x.b + t * x.b,
+    "sine in time": lambda t, x, p: x.a - p.c * np.sin(3.0 * t + x.b),
+    "contact": lambda t, x, p: np.maximum(x.a - x.b, 0.0) ** 2.5 - t**3,
+    "quotient": lambda t, x, p: np.exp(-x.a * t) / (1.0 + x.b**2) - p.c,
+    "distance": lambda t, x, p: np.sqrt((x.a - np.cos(t)) ** 2 + x.b**2) - p.c,
+}
+
+
+@pytest.mark.parametrize("name", GUARDS)
+def test_curvature(name):
+    symbols = model_symbols(2, 1)
+    [guard] = trace(GUARDS[name], ("a", "b"), ("c",))
+    lines = "\n".join(curvature(guard, False, symbols))
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        t, x, p, v = rng.uniform(0.2, 1.0), rng.uniform([1.0, 0.1], [2.0, 0.9]), [0.7], rng.normal(size=2)
+
+        def along(s, t=t, x=x, p=p, v=v):
+            point = type("State", (), dict(zip("ab", x + s * v, strict=True)))
+            return GUARDS[name](t + s, point, type("Parameters", (), {"c": p[0]}))
+
+        out = np.array(v)
+        exec(lines, {**vars(math), "t": t, "x": x, "p": p, "out": out})
+        h = 1e-4
+        assert out[0] == pytest.approx((along(h) - 2.0 * along(0.0) + along(-h)) / h**2, rel=1e-5, abs=1e-5)
+
+
+def test_affine_guards_have_none_and_opaque_ones_an_unknown_one():
+    symbols = model_symbols(2, 0)
+    assert curvature(symbols.x[0], True, symbols) == ["out[0] = 0.0"]
+    assert curvature(None, False, symbols) == UNKNOWN
