@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import sympy
+from sympy.core.parameters import distribute
 
-from hybrid.errors import ModelError
-from hybrid.symbolic.derivatives import directional
-from hybrid.symbolic.expressions import ONE, close_gates
+from hybrid.symbolic.derivatives import partial_derivatives
+from hybrid.symbolic.expressions import ONE, close_gates, product
 from hybrid.symbolic.printer import assignments, unprintable
 from hybrid.symbolic.tracing import Symbols
 
@@ -20,11 +20,16 @@ def curvature(guard: sympy.Expr | None, is_affine: bool, symbols: Symbols) -> li
         return ["out[0] = 0.0"]
     if guard is None:
         return UNKNOWN
-    vector = {x: sympy.Symbol(f"out[{i}]", real=True) for i, x in enumerate(symbols.x)}
+    vector = [*(sympy.Symbol(f"out[{i}]", real=True) for i in range(len(symbols.x))), ONE]
+
+    def along(expression: sympy.Expr) -> sympy.Expr:
+        [slopes] = partial_derivatives([expression], symbols.variables)
+        return sympy.Add(*(product(own, slope) for own, slope in zip(vector, slopes, strict=True)))
+
     try:
-        [second] = directional(directional([guard], vector | {symbols.t: ONE}), vector | {symbols.t: ONE})
-        second = close_gates(second)
-    except (ModelError, RecursionError, NotImplementedError):
+        with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
+            second = close_gates(along(along(guard)))
+    except RecursionError:
         return UNKNOWN
     if unprintable([second]) is not None:
         return UNKNOWN

@@ -13,6 +13,7 @@ GUARDS = {
     "sine in time": lambda t, x, p: x.a - p.c * np.sin(3.0 * t + x.b),
     "contact": lambda t, x, p: np.maximum(x.a - x.b, 0.0) ** 2.5 - t**3,
     "quotient": lambda t, x, p: np.exp(-x.a * t) / (1.0 + x.b**2) - p.c,
+    "choice": lambda t, x, p: np.where(x.a > x.b, x.a**2 * t, x.b) + np.abs(x.b - t**2) * x.a,
     "distance": lambda t, x, p: np.sqrt((x.a - np.cos(t)) ** 2 + x.b**2) - p.c,
 }
 
