@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from threading import RLock
 from typing import TYPE_CHECKING, Any
@@ -151,15 +151,19 @@ class CompiledSystem:
 
         return own_functions(self.emitted)
 
-    def moving(self, kinds: Iterable[int], tangents: int) -> dict[str, Any]:
+    def moving(self, kinds: Sequence[int], tangents: int) -> dict[str, Any]:
         """The functions that advance modes by propagators of these kinds, by their names in a model."""
         needed: dict[str, Any] = {}
         if any(kind != RUNGE_KUTTA for kind in kinds):
             part = TANGENT_SERIES if tangents else SERIES
             [needed["series"]] = self.functions(part).values()
-        if tangents and RUNGE_KUTTA in kinds:
+        if tangents and self.takes_steps(kinds):
             needed |= self.functions(VARIATIONAL)
         return needed
+
+    def takes_steps(self, kinds: Sequence[int]) -> bool:
+        """Whether runs by propagators of these kinds may need steps of a Runge-Kutta method."""
+        return any(kind == RUNGE_KUTTA or self.emitted.is_fragile(mode) for mode, kind in enumerate(kinds))
 
     def series_columns(self, tangents: int) -> int:
         """Number of columns that the series of all modes need together."""
@@ -253,6 +257,7 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
+            fragile=_indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
             timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
             tangent_start=self.emitted.tangent_start,
             tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),

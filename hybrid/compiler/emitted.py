@@ -52,6 +52,8 @@ class Propagator:
         The series of its solutions; nothing for RUNGE_KUTTA.
     guards
         By transition that leaves the mode: whether the series hold its guard in a column.
+    fragile
+        Whether the series may be undefined where the field is defined, as that of a root at zero.
     """
 
     kind: int
@@ -59,6 +61,7 @@ class Propagator:
     reason: str
     series: Series = NO_SERIES
     guards: tuple[bool, ...] = ()
+    fragile: bool = False
 
     def __str__(self) -> str:
         return f"{PROPAGATORS[self.kind]} ({self.reason})"
@@ -168,6 +171,14 @@ class Emitted:
     def has_forcing(self, mode: int) -> bool:
         """Whether the field of a mode has parts that depend on time alone and are bounded over each step."""
         return any(self.forcing_component[i] != OF_STATE for i in self._forcings(mode))
+
+    def is_fragile(self, mode: int) -> bool:
+        """Whether the series of a mode may fail where its field does not.
+
+        Terms of a forcing overflow far from its pulse, as ``cosh`` in ``1 / cosh``; roots have no series at
+        zero. A Runge-Kutta step leads on from there.
+        """
+        return self.propagators[mode].fragile or len(self._forcings(mode)) > 0
 
     def _forcings(self, mode: int) -> range:
         return range(self.first_forcing[mode], self.first_forcing[mode + 1])

@@ -11,7 +11,6 @@ from hybrid.kernels.events.guards import (
     allowed,
     guard_speed,
     guard_value,
-    is_forced,
     may_jump,
     rounding_band,
     was_left_behind,
@@ -197,8 +196,7 @@ def step_by_propagator(parts, task, remaining):
     if model.propagator[run.mode] == RUNGE_KUTTA:
         return parts.runge_kutta_step(task, remaining)
     code, span = series_step(task, remaining)
-    if code == NON_FINITE and is_forced(model, run.mode):
-        # Terms of the series overflow far from a pulse, ``cosh`` in ``1 / cosh``; the field does not.
+    if code == NON_FINITE and model.fragile[run.mode] == 1:
         run.stage = STALE
         code, span = parts.runge_kutta_step(task, remaining)
         run.stage = STALE

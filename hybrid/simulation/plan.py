@@ -60,7 +60,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int) -> Plan:
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
         kinds = propagator_kinds(compiled, solver)
         parts, attempts = driver_parts(
-            codes.RUNGE_KUTTA not in kinds, solver.attempt, bool(compiled.emitted.forcing_component)
+            compiled.takes_steps(kinds), solver.attempt, bool(compiled.emitted.forcing_component)
         )
         model = compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64))
         columns, rows = compiled.series_columns(tangents), compiled.emitted.programs.longest
@@ -124,16 +124,16 @@ def kernel_method(solver: Solver) -> Any:
 
 
 @cache
-def driver_parts(series_only: bool, attempt: tuple[str, str], forced: bool) -> tuple[Any, Any]:
+def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[Any, Any]:
     """The pieces that the driver is handed; what the run does not need is not loaded."""
     from hybrid.kernels.types.layout import Attempts, Parts
 
     jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
     module, name = attempt
-    if series_only and not forced:
-        step = load_kernels("hybrid.kernels.steps.step").no_step
-    else:
+    if steps:
         step = load_kernels("hybrid.kernels.steps.runge_kutta").runge_kutta_step
+    else:
+        step = load_kernels("hybrid.kernels.steps.step").no_step
     explained_step, explained_series = Absent(), Absent()
     if forced:
         forcing = load_kernels("hybrid.kernels.steps.forcing")
@@ -169,4 +169,5 @@ def dense_degree(compiled: CompiledSystem, method: Any, kinds: list[int]) -> int
         return of_solutions or (codes.HIGHEST_ORDER if kind == codes.EXACT else method.order)
 
     modes = compiled.emitted.propagators
-    return max(degree_of(kind, each.degree) for kind, each in zip(kinds, modes, strict=True))
+    degrees = [degree_of(kind, each.degree) for kind, each in zip(kinds, modes, strict=True)]
+    return max(degrees + [degree_of(codes.RUNGE_KUTTA, 0)] * compiled.takes_steps(kinds))

@@ -12,7 +12,7 @@ import sympy
 from sympy.codegen.cfunctions import expm1, hypot
 from sympy.core.parameters import distribute, global_parameters
 
-from hybrid.symbolic.expressions import ONE, TWO, ZERO, Select, close_gates, power, product
+from hybrid.symbolic.expressions import ONE, TWO, ZERO, Select, close_gates, defined_at_origin, power, product
 from hybrid.symbolic.nodes import interned, once
 
 Partials = dict[sympy.Symbol, sympy.Expr]
@@ -37,12 +37,12 @@ def jacobian_of(
 ) -> list[list[sympy.Expr]]:
     """Rows of the derivatives of ``expressions`` with respect to ``variables`` (states, then time).
 
-    At a kink ``np.maximum`` and ``np.minimum`` have the mean of both slopes, ``np.abs`` has slope zero.
-    Piecewise constant functions have slope zero.
+    At a kink ``np.maximum`` and ``np.minimum`` have the mean of both slopes, ``np.abs`` has slope zero,
+    and so has the length ``np.hypot`` at the origin. Piecewise constant functions have slope zero.
     """
     with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
         rows = partial_derivatives(expressions, list(variables))
-        return [[close_gates(entry) for entry in row] for row in rows]
+        return [[close_gates(defined_at_origin(entry)) for entry in row] for row in rows]
 
 
 def partial_derivatives(

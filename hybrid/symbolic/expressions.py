@@ -22,6 +22,8 @@ ZERO = sympy.Integer(0)
 ONE = sympy.Integer(1)
 TWO = sympy.Integer(2)
 HALF = sympy.Rational(1, 2)
+# A length below this is zero in the slope of a length.
+SMALLEST_LENGTH = sympy.Float(1e-300)
 # Number of numbers kept in the cache.
 MOST_NUMBERS = 10_000
 # A number taken out of a power, or collected in a product, has at most this many binary digits on either side
@@ -349,6 +351,35 @@ class Gate(RealFunction):
 
 # Functions whose derivative does not show their jumps: a constant derivative proves nothing about them.
 JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)
+
+
+@once
+def defined_at_origin(expression: sympy.Expr) -> sympy.Expr:
+    """Make slopes of lengths zero, not 0/0, where the length is zero.
+
+    ``u*hypot(u, w)``, a drag, has the slope ``hypot(u, w) + u*u/hypot(u, w)``, which is 0 at the origin. The
+    same for roots of sums of squares.
+    """
+    if not expression.args:
+        return expression
+    arguments = [defined_at_origin(argument) for argument in expression.args]
+    if expression.is_Pow and _is_over_length(*expression.args):
+        arguments[0] = Maximum(arguments[0], SMALLEST_LENGTH)
+    same = all(new is old for new, old in zip(arguments, expression.args, strict=True))
+    return expression if same else interned(expression.func(*arguments))
+
+
+def _is_over_length(base: sympy.Expr, exponent: sympy.Expr) -> bool:
+    """Whether a power is one over a length; of a sum, over its root."""
+    if isinstance(base, hypot):
+        return bool(exponent == -ONE)
+    return bool(exponent == -HALF and base.is_Add and all(map(_is_square, base.args)))
+
+
+def _is_square(term: sympy.Expr) -> bool:
+    """Whether a term of a sum is an even power, or a positive multiple of one."""
+    *numbers, rest = term.args if term.is_Mul else (term,)
+    return _is_even_power(rest) and all(each.is_Number and each.is_positive for each in numbers)
 
 
 @once

@@ -84,7 +84,7 @@ def _read(path: Path) -> Emitted | None:
 
 def _propagator(found: dict[str, Any]) -> Propagator:
     series = Series(**{**found["series"], "statements": (), "tangent_statements": ()})
-    return Propagator(found["kind"], found["degree"], found["reason"], series, tuple(found["guards"]))
+    return Propagator(**{**found, "series": series, "guards": tuple(found["guards"])})
 
 
 def _checksum(text: str) -> str:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from sympy.codegen.cfunctions import hypot
+
 from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import Equations
 from hybrid.compiler.propagators.writing import write_series
 from hybrid.kernels.types.codes import TAYLOR
+from hybrid.symbolic.nodes import nodes
 
 
 def taylor(mode: Equations) -> Propagator | str:
@@ -14,4 +17,13 @@ def taylor(mode: Equations) -> Propagator | str:
         return "it has fractional powers of more than one guard"
     reason = "affine, its forcing has no short series" if mode.is_affine else "smooth, nonlinear in the state"
     written = write_series(mode.field, mode.guards, mode.symbols)
-    return Propagator(TAYLOR, 0, reason, written, tuple(mode.held))
+    return Propagator(TAYLOR, 0, reason, written, tuple(mode.held), fragile=_has_roots(mode))
+
+
+def _has_roots(mode: Equations) -> bool:
+    """Whether the field has fractional powers or lengths of the state: they have no series at zero."""
+    return any(
+        (node.is_Pow and not node.exp.is_Integer) or isinstance(node, hypot)
+        for entry in mode.field
+        for node in nodes(entry)
+    )

@@ -58,12 +58,13 @@ class Model(Structure):
     Transitions with the same ``surface`` have the same guard up to a factor, its sign the product of their
     ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
     surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
-    is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0.
-    ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of all transitions;
-    ``forcing_component`` is the component of the state whose rate a forcing is a term of, or -1. Residues are
-    rates that may cancel to their rounding: ``first_residue[m]`` is the first of mode ``m``, their programs
-    are behind those of all forcings, and ``residue_component`` is the component that one is the rate of. The
-    residues of guards, those of their terms that may cancel so, have programs behind them.
+    is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0. ``fragile``
+    is 1 for a mode whose series may be undefined where its field is not. ``first_forcing[m]`` is the first
+    forcing of mode ``m``, whose program is behind those of all transitions; ``forcing_component`` is the
+    component of the state whose rate a forcing is a term of, or -1. Residues are rates that may cancel to
+    their rounding: ``first_residue[m]`` is the first of mode ``m``, their programs are behind those of all
+    forcings, and ``residue_component`` is the component that one is the rate of. The residues of guards,
+    those of their terms that may cancel so, have programs behind them.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
@@ -102,6 +103,7 @@ class Model(Structure):
     accumulates_to: INDICES
     propagator: INDICES
     degree: INDICES
+    fragile: INDICES
     timed: INDICES
     tangent_start: int64
     tangent_columns: INDICES
