@@ -61,7 +61,7 @@ def filippov(
         ``two-fold at start`` ends a run that starts where the surface repels. ``below too high``,
         ``above too low``, ``sliding too high`` and ``sliding too low`` correct the mode of a start that lies
         off the surface on the wrong side for its mode: by more than rounding or, in the sliding mode, by more
-        than 1e-6 of the state's largest component.
+        than 1e-6 of the terms of ``h``.
 
     Raises
     ------

@@ -13,10 +13,10 @@ from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
 
 # A start in the sliding mode does not slide if it is further from the surface than this fraction of the
-# state. The drift during sliding is far smaller, so a run can be continued from any of its states.
+# terms of ``h``. The drift during sliding is far smaller, so a run can be continued from any of its states.
 SLIDING_BAND = 1e-6
-# The two fields count as tangent to the surface if both cross it slower than this fraction of their speeds.
-TANGENT = 1e-9
+# A surface that both fields cross with the same speed does not attract.
+SLOWEST = 1e-300
 # An orbit that reaches the surface slower than this fraction of its speed and turns back only touches it.
 TOUCH = 3e-8
 
@@ -74,7 +74,7 @@ class SwitchingSurface:
 
         def field(t: Any, x: Any, p: Any) -> list[Any]:
             L_b, L_a = self.speeds(t, x, p)
-            attraction = L_b - L_a
+            attraction = self._difference_of_speeds(t, x, p)
             return [
                 b if _is_zero(a - b) else (L_b * a - L_a * b) / attraction
                 for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
@@ -110,32 +110,49 @@ class SwitchingSurface:
             speed, turn = self.speed_below(t, x, p), self.turn_below(t, x, p)
         else:
             speed, turn = self.speed_above(t, x, p), self.turn_above(t, x, p)
-        return (side * turn >= 0.0) | (side * speed > TOUCH * self._steepest(t, x, p))
+        return (side * turn >= 0.0) | (side * speed > TOUCH * self._through(t, x, p))
 
     def attraction(self, t: Any, x: Any, p: Any) -> Any:
-        """``L_b - L_a``, less what counts as zero: positive where the surface attracts."""
-        L_b, L_a = self.speeds(t, x, p)
-        return L_b - L_a - self._hardly_moving(t, x, p)
+        """``L_b - L_a``: positive where the surface attracts."""
+        return self._difference_of_speeds(t, x, p) - SLOWEST
 
-    def _hardly_moving(self, t: Any, x: Any, p: Any) -> Any:
-        """A speed through the surface that counts as zero.
+    def _difference_of_speeds(self, t: Any, x: Any, p: Any) -> Any:
+        """``L_b - L_a`` from the jump of the field: what both speeds have in common is not rounded."""
+        slope = self.gradient(t, x, p)[:-1]
+        jump = [b - a for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)]
+        return _dot(slope, jump, 0.0)
 
-        It is as smooth as the fields, so the sliding mode has a Taylor series if they do.
+    def _through(self, t: Any, x: Any, p: Any) -> Any:
+        """The rate of ``h`` if the terms of both fields' rates added up, as the root of their squares.
+
+        Terms of one unit only: what a field does along the surface, in units of its own, does not count.
         """
-        return TANGENT * self._steepest(t, x, p)
-
-    def _steepest(self, t: Any, x: Any, p: Any) -> Any:
-        """The rate of ``h`` if all velocities of both fields were normal to the surface."""
-        slope, speed = self.gradient(t, x, p)[:-1], [*self.below(t, x, p), *self.above(t, x, p)]
-        return np.sqrt(_dot(slope, slope, 0.0) * _dot(speed, speed, 0.0))
+        *slope, own = self.gradient(t, x, p)
+        total = own * own
+        for field in (self.below, self.above):
+            rates = [a * b for a, b in zip(slope, field(t, x, p), strict=True)]
+            total = _dot(rates, rates, total)
+        return np.sqrt(total)
 
     def is_off(self, t: Any, x: Any, p: Any) -> Any:
-        """Whether a state is too far from the surface to slide, relative to its largest component."""
-        largest = np.abs(x[0])
-        for value in x[1:]:
-            largest = np.maximum(largest, np.abs(value))
-        slope = _dot([np.abs(each) for each in self.gradient(t, x, p)[:-1]], [1.0] * len(x), 0.0)
-        return np.abs(self.switching(t, x, p)) > SLIDING_BAND * slope * largest
+        """Whether a state is too far from the surface to slide, in any units of the states.
+
+        Near is what is near relative to the terms ``D_x h x``. Near is also what is so near that the fields
+        reach the surface before any state that ``h`` does not depend on has changed: the state may lie on
+        ``h = x_0 = 0`` up to rounding, and then only other states have a size.
+        """
+        *slope, _ = self.gradient(t, x, p)
+        h = np.abs(self.switching(t, x, p))
+        terms = [abs(a * b) for a, b in zip(slope, x, strict=True)]
+        L_b, L_a = self.speeds(t, x, p)
+        speed = np.abs(L_b) + np.abs(L_a)
+        far, compared = False, False
+        for a, value, *rates in zip(slope, x, self.below(t, x, p), self.above(t, x, p), strict=True):
+            rate = np.abs(rates[0]) + np.abs(rates[1])
+            other = (a == 0.0) & (rate * np.abs(value) > 0.0)
+            far = far | (other & (h * rate > SLIDING_BAND**2 * speed * np.abs(value)))
+            compared = compared | other
+        return (h > SLIDING_BAND * _dot(terms, [1.0] * len(terms), 0.0)) & (far | np.logical_not(compared))
 
     def projection(self, t: Any, x: Any, p: Any) -> list[Any]:
         """The nearest point of the surface, to first order."""
