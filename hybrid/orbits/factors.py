@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import attrs
 import numpy as np
 
 from hybrid.kernels.types import codes
+from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues, rowwise_qr
 from hybrid.simulation.periods import split_time
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import StatusCode
@@ -16,40 +20,119 @@ SMALLEST, LARGEST = 1e-50, 1e50
 # A step of an implicit method that strains them by more than this is taken again, shorter.
 LONGEST_STEP = 1e3
 SHORTER = 0.25
+# Units of the states that differ by less than this from those that suit a run are good enough.
+OTHER_UNITS = 1e3
+MOST_ATTEMPTS = 3
 
 
-def fundamental_factors(trajectory: Trajectory, t: float) -> tuple[list[np.ndarray], int]:
-    """Advance to ``t``; returns factors ``(n, n)`` in the order in which they are applied, and a code.
+@attrs.frozen(eq=False)
+class Factors:
+    """A fundamental matrix ``(n, n)`` as a product, in units of the states that suit it.
 
-    The trajectory carries the ``n`` columns of the identity. Their product is the fundamental matrix: the
-    upper triangular factors of ``A_j Q_{j-1} = Q_j R_j``, and the last ``Q``. The jumps of one instant have a
-    factor of their own, so that what they annihilate is told from what a flight makes small.
+    Attributes
+    ----------
+    matrices
+        The factors ``(n, n)`` in the order in which they are applied. Their product is ``D^-1 Phi D`` with
+        the units of the states in the diagonal matrix ``D``: it has the eigenvalues of ``Phi``.
+    singular
+        Indices of the factors whose jump has a singular saltation matrix.
+    units
+        The units ``(n,)`` in which all factors have rows and columns of about the same size. They are known
+        only after the run; with others it may have lost digits.
+    code
+        How the run ended.
+    """
+
+    matrices: list[np.ndarray]
+    singular: set[int]
+    units: np.ndarray
+    code: int
+
+
+class _Products:
+    """Tangent vectors that are orthonormal in given units, and the factors that made them so."""
+
+    def __init__(self, trajectory: Trajectory, units: np.ndarray) -> None:
+        self.trajectory, self.units = trajectory, units
+        self.basis = np.eye(len(units))
+        self.matrices: list[np.ndarray] = []
+        self.singular: set[int] = set()
+        self.sizes = np.zeros((len(units), len(units)))
+        trajectory.replace_tangents(np.diag(units))
+
+    @property
+    def vectors(self) -> np.ndarray:
+        """The tangent vectors ``(n, n)`` in the units."""
+        return self.trajectory.tangent_matrix / self.units[:, None]
+
+    def orthonormalise(self, *, singular: bool = False) -> None:
+        if singular:
+            self.singular.add(len(self.matrices))
+        vectors = self.vectors
+        self._measure(vectors)
+        self.basis, triangle = rowwise_qr(vectors)
+        self.matrices.append(triangle)
+        self.trajectory.replace_tangents(self.units[:, None] * self.basis)
+
+    def ended(self, code: int) -> Factors:
+        vectors = self.vectors
+        self._measure(vectors)
+        own = self.sizes * self.units[:, None] / self.units
+        units = self.units
+        if np.all(np.isfinite(own)):
+            # SciPy's linear algebra takes long to import.
+            from scipy.linalg import matrix_balance
+
+            [units, _] = matrix_balance(own, permute=False, separate=True)[1]
+        return Factors([*self.matrices, vectors], self.singular, units, code)
+
+    def _measure(self, vectors: np.ndarray) -> None:
+        self.sizes += np.abs(vectors @ self.basis.T)
+
+
+def fundamental_eigenvalues(start: Callable[[], Trajectory], t: float) -> ProductEigenvalues:
+    """Eigenvalues of the fundamental matrix from a start to ``t``; nan where the run does not reach its end.
+
+    The run is repeated in other units of the states if those of the model are far from suiting it.
+    """
+    trajectory = start()
+    units = np.ones(trajectory.model.dimension)
+    for attempt in range(MOST_ATTEMPTS):
+        factors = fundamental_factors(trajectory if attempt == 0 else start(), t, units)
+        if factors.code != codes.DONE or not all(np.all(np.isfinite(each)) for each in factors.matrices):
+            unknown = np.full(len(units), np.nan)
+            return ProductEigenvalues(unknown, unknown.astype(complex))
+        change = factors.units / units
+        if change.max() <= OTHER_UNITS * change.min():
+            break
+        units = factors.units
+    return product_eigenvalues(factors.matrices, factors.singular)
+
+
+def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> Factors:
+    """Advance to ``t``; returns the fundamental matrix as factors.
+
+    The trajectory carries ``n`` tangent vectors. The factors are the upper triangles of ``A_j Q_{j-1} = Q_j
+    R_j``, and the last ``Q`` with what follows, all in ``units (n,)`` of the states. The jumps of one instant
+    have a factor of their own, so that what they annihilate is told from what a flight makes small.
     """
     run = trajectory.run
     place, record = split_time(t, trajectory.model.period), trajectory.no_record()
-    factors: list[np.ndarray] = []
     implicit = bool(trajectory.method.implicit)
+    products = _Products(trajectory, units)
     strained = False
-
-    def orthonormalise() -> None:
-        nonlocal strained
-        basis, triangle = np.linalg.qr(trajectory.tangent_matrix)
-        factors.append(triangle)
-        trajectory.replace_tangents(basis)
-        strained = False
-
     while True:
         if trajectory.stop.is_set():
-            return factors, StatusCode.INTERRUPTED
+            return products.ended(StatusCode.INTERRUPTED)
         before = run.saved() if implicit else None
         steps = int(run.steps)
         code = trajectory.advance_to(*place, record, max_steps=steps + 1, max_jumps=trajectory.jumps)
         if code not in (codes.MAX_STEPS, codes.MAX_JUMPS, codes.DONE):
-            return factors, code
+            return products.ended(code)
         if int(run.steps) > steps or code == codes.DONE:
-            sizes = np.linalg.svd(trajectory.tangent_matrix, compute_uv=False)
+            sizes = np.linalg.svd(products.vectors, compute_uv=False)
             if not np.all(np.isfinite(sizes)):
-                return factors, codes.NON_FINITE
+                return products.ended(codes.NON_FINITE)
             if before is not None and sizes[0] > WORST_CONDITION * LONGEST_STEP * sizes[-1]:
                 length = run.last_step
                 run.restore(before)
@@ -58,15 +141,18 @@ def fundamental_factors(trajectory: Trajectory, t: float) -> tuple[list[np.ndarr
                 continue
             strained = True
             if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
-                orthonormalise()
+                products.orthonormalise()
+                strained = False
         if code == codes.MAX_JUMPS:
             if strained:
-                orthonormalise()
+                products.orthonormalise()
+                strained = False
+            run.log_determinant = 0.0
             code = trajectory.advance_to(*place, record, max_steps=int(run.steps))
             if code not in (codes.MAX_STEPS, codes.DONE):
-                return factors, code
-            orthonormalise()
+                return products.ended(code)
+            products.orthonormalise(singular=not run.log_determinant > -np.inf)
         if code == codes.DONE:
-            return [*factors, trajectory.tangent_matrix], code
+            return products.ended(code)
         if run.steps >= trajectory.max_steps:
-            return factors, codes.MAX_STEPS
+            return products.ended(codes.MAX_STEPS)

@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.kernels.types import codes
-from hybrid.orbits.factors import fundamental_factors
+from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.labelled import labelled_orbit
-from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
+from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
@@ -397,12 +396,9 @@ class _Shooting:
 
     def _eigenvalues(self, shot: _Shot) -> ProductEigenvalues:
         """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
-        trajectory = self._trajectory(shot.point, shot.mode)
-        factors, code = fundamental_factors(trajectory, shot.point.t + shot.point.period)
-        if code != codes.DONE or not all(np.all(np.isfinite(factor)) for factor in factors):
-            unknown = np.full(len(shot.end), np.nan)
-            return ProductEigenvalues(unknown, unknown.astype(complex))
-        return product_eigenvalues(factors)
+        return fundamental_eigenvalues(
+            lambda: self._trajectory(shot.point, shot.mode), shot.point.t + shot.point.period
+        )
 
     def _signature(self, shot: _Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)

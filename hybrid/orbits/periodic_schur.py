@@ -11,12 +11,14 @@ References
 A. Bojanczyk, G. Golub, P. Van Dooren, "The periodic Schur decomposition. Algorithms and applications", Proc.
 SPIE 1770 (1992) 31, doi:10.1117/12.130915; D. Kressner, "The periodic QR algorithm is a disguised QR
 algorithm", Linear Algebra Appl. 417 (2006) 423, doi:10.1016/j.laa.2003.08.014; K. Lust, "Improved numerical
-Floquet multipliers", Int. J. Bifurc. Chaos 11 (2001) 2389, doi:10.1142/S0218127401003486.
+Floquet multipliers", Int. J. Bifurc. Chaos 11 (2001) 2389, doi:10.1142/S0218127401003486; A. Cox, N. Higham,
+"Stability of Householder QR factorization for weighted least squares problems", Numerical Analysis 1997
+(Longman 1998) 57.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import attrs
 import numpy as np
@@ -24,6 +26,10 @@ import numpy as np
 EPSILON = float(np.finfo(float).eps)
 # A factor whose smallest singular value is below this part of its largest is singular: it is rounding.
 SINGULAR = 1e-13
+# Rounds in which rows and columns are brought to the same size before that is judged.
+ROUNDS = 4
+# Moduli are the same if their logarithms agree to this many digits behind the point.
+SAME_DIGITS = 9
 # Sweeps for one eigenvalue, and after how many without success the shifts are varied.
 MOST_SWEEPS = 60
 EXCEPTIONAL = 10
@@ -60,22 +66,28 @@ class ProductEigenvalues:
             return values
 
 
-def product_eigenvalues(factors: Sequence[np.ndarray] | np.ndarray) -> ProductEigenvalues:
+def product_eigenvalues(
+    factors: Sequence[np.ndarray] | np.ndarray, singular: Collection[int] = ()
+) -> ProductEigenvalues:
     """Eigenvalues of ``factors[-1] @ ... @ factors[1] @ factors[0]``.
 
     Each is right to about the rounding times the condition of the worst factor, however far the eigenvalues
     are apart, unless it is ill-conditioned as a function of the factors. A factor that is singular to
-    rounding gives eigenvalues of exactly zero.
+    rounding gives eigenvalues of exactly zero. Rows and columns that are merely short do not make a factor
+    singular, as those of a reset that shrinks one state by a factor of 1e-20 do not.
 
     Parameters
     ----------
     factors
         Real matrices ``(m, n, n)`` in the order in which they are applied, at least one, finite.
+    singular
+        Indices of factors that are known to be singular: their rows that are merely short are rounding.
 
     Returns
     -------
     ProductEigenvalues
-        Largest first; of a complex pair the one in the upper half plane first.
+        Largest first, of the same moduli the one farther to the right, of a complex pair the one in the
+        upper half plane.
 
     Examples
     --------
@@ -86,7 +98,7 @@ def product_eigenvalues(factors: Sequence[np.ndarray] | np.ndarray) -> ProductEi
     chain = [np.array(factor, dtype=float) for factor in factors]
     n = chain[0].shape[-1]
     with np.errstate(over="ignore", under="ignore", divide="ignore", invalid="ignore"):
-        chain, logs = _without_null_space(chain)
+        chain, logs = _without_null_space(chain, [i in singular for i in range(len(chain))])
         moduli, phases = [], []
         if chain and len(chain[0]):
             found = _Reduced(chain).eigenvalues()
@@ -94,16 +106,17 @@ def product_eigenvalues(factors: Sequence[np.ndarray] | np.ndarray) -> ProductEi
             phases = [phase for _, phase in found]
     log_moduli = np.array(moduli + [-np.inf] * (n - len(moduli)))
     units = np.array(phases + [1.0] * (n - len(phases)), dtype=complex)
-    order = np.lexsort((-units.imag, -units.real, -log_moduli))
+    order = np.lexsort((-units.imag, -units.real, -log_moduli.round(SAME_DIGITS)))
     return ProductEigenvalues(log_moduli[order], units[order])
 
 
-def _without_null_space(chain: list[np.ndarray]) -> tuple[list[np.ndarray], float]:
+def _without_null_space(chain: list[np.ndarray], known: list[bool]) -> tuple[list[np.ndarray], float]:
     """Regular factors of unit size, whose product has the nonzero eigenvalues, and the logarithm taken out.
 
     The product may begin anywhere: ``A B`` and ``B A`` have the same eigenvalues but for zeros. It is made to
     begin with what a singular factor leaves, ``A = Q R`` with fewer columns in ``Q`` than in ``A``: the
     product restricted to the range of ``Q`` has smaller factors. They may be singular in their turn.
+    ``known`` tells which factors are known to be singular.
     """
     total = 0.0
     while True:
@@ -112,20 +125,51 @@ def _without_null_space(chain: list[np.ndarray]) -> tuple[list[np.ndarray], floa
             return [], 0.0
         chain = [factor / size for factor, size in zip(chain, sizes, strict=True)]
         total += float(np.sum(np.log(sizes)))
-        values = np.linalg.svd(np.array(chain), compute_uv=False)
+        stack = np.array(chain)
+        rows, columns = _row_and_column_sizes(stack)
+        rows[known], columns[known] = 1.0, 1.0
+        level = stack / rows[:, :, None] / columns[:, None, :]
+        values = np.linalg.svd(level, compute_uv=False)
         singular = np.flatnonzero(values[:, -1] <= SINGULAR * values[:, 0])
         if not len(singular):
             return chain, total
         first = int(singular[0])
-        rank = int(np.sum(values[first] > SINGULAR * values[first, 0]))
-        left, sizes_kept, right = np.linalg.svd(chain[first])
-        basis, smaller = left[:, :rank], []
+        left, sizes_kept, right = np.linalg.svd(level[first])
+        rank = int(np.sum(sizes_kept > SINGULAR * sizes_kept[0]))
+        basis, start = np.linalg.qr(rows[first][:, None] * left[:, :rank])
+        last = start @ (sizes_kept[:rank, None] * right[:rank] * columns[first])
+        smaller = []
         for factor in chain[first + 1 :] + chain[:first]:
-            image = factor @ basis
-            basis, triangle = np.linalg.qr(image)
+            basis, triangle = rowwise_qr(factor @ basis)
             smaller.append(triangle)
-        smaller.append((sizes_kept[:rank, None] * right[:rank]) @ basis)
-        chain = smaller
+        chain, known = [*smaller, last @ basis], [*known[first + 1 :], *known[:first], True]
+
+
+def _row_and_column_sizes(stack: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers ``(m, n)`` for rows and for columns that, divided by, leave matrices with entries up to 1."""
+    rows, columns = np.ones(stack.shape[:2]), np.ones(stack.shape[:2])
+    for _ in range(ROUNDS):
+        left = np.abs(stack) / rows[:, :, None] / columns[:, None, :]
+        rows *= _or_one(left.max(axis=2))
+        left = np.abs(stack) / rows[:, :, None] / columns[:, None, :]
+        columns *= _or_one(left.max(axis=1))
+    return rows, columns
+
+
+def _or_one(sizes: np.ndarray) -> np.ndarray:
+    return np.where(sizes > 0.0, sizes, 1.0)
+
+
+def rowwise_qr(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``Q (n, k)`` and the upper triangle ``(k, k)``; each row has errors relative to its own size.
+
+    Householder's reflections have that property if the longest rows come first (Cox and Higham 1998).
+    """
+    order = np.argsort(-np.abs(matrix).max(axis=1), kind="stable")
+    sorted_basis, triangle = np.linalg.qr(matrix[order])
+    basis = np.empty_like(sorted_basis)
+    basis[order] = sorted_basis
+    return basis, triangle
 
 
 class _Reduced:
@@ -140,7 +184,7 @@ class _Reduced:
         self.n = n
         triangles, basis = [], np.eye(n)
         for factor in chain[:-1]:
-            basis, triangle = np.linalg.qr(factor @ basis)
+            basis, triangle = rowwise_qr(factor @ basis)
             triangles.append(triangle)
         self.head = chain[-1] @ basis
         self.tail = np.array(triangles[::-1]).reshape(len(triangles), n, n)

@@ -62,6 +62,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "state": (n,),
         "settled": (n,),
         "saltation": (n, n),
+        "sizes": (n, n),
         "path": (degree + 1, n),
         "polynomial": (width,),
         "stack": (ISOLATION_DEPTH, width),

@@ -267,7 +267,7 @@ def growth_rates(field, p, t, period, y, rtol, atol, rates, work, counters):
             return done
         for c in range(k):
             rates[done, c] = 0.0
-        orthonormalise(y, n, k, rates[done], 0.0)
+        orthonormalise(y, n, k, rates[done], work, False)
         for c in range(k):
             rates[done, c] /= period
     return rates.shape[0]

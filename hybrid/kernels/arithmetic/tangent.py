@@ -13,7 +13,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import KERNEL
 
-# The image of a unit vector below this length is only rounding: the map that produced it is singular.
+# A vector that is shorter than this share of the terms that make it up along itself is only rounding.
 COLLAPSED = 1e-13
 # Tangent vectors are orthonormalised once the strain of all jumps since the last orthonormalisation reaches
 # this limit. A condition number of a thousand costs three digits of the vectors that grow less.
@@ -33,37 +33,46 @@ SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 
 
 @njit(**KERNEL)
-def orthonormalise(y, n, k, growth, threshold):
+def orthonormalise(y, n, k, growth, sizes, images):
     """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``.
 
     The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt runs twice,
-    which is enough (Giraud, Langou, Rozloznik 2005). A vector shorter than ``threshold`` times the longest
-    image has collapsed: its growth is minus infinity and it stays the zero vector. Returns the number of
-    vectors that have not collapsed by this threshold although only rounding is left of them.
+    which is enough (Giraud, Langou, Rozloznik 2005).
+
+    Whether what is left of a vector is more than rounding is judged along its own direction, by the sizes of
+    the terms that were added to make it up: so the units of the states do not matter. With ``images`` the
+    vectors are images by a matrix, and ``sizes (k, n)`` has those of the terms of each component; without,
+    it is scratch. An image that is only rounding has collapsed, because the matrix is singular: its growth is
+    minus infinity and it stays the zero vector. Returns the number of other vectors of which only rounding is
+    left.
     """
     indistinct = 0
-    longest = 0.0
     for c in range(k):
-        start = n * (1 + c)
-        square = 0.0
-        for i in range(start, start + n):
-            square += y[i] * y[i]
-        whole = math.sqrt(square)
-        longest = max(longest, whole)
+        start, size = n * (1 + c), sizes[c]
+        for i in range(n):
+            size[i] = (size[i] if images else 0.0) + abs(y[start + i])
         for _ in range(2):
             for other in range(n, start, n):
                 dot = 0.0
                 for i in range(n):
                     dot += y[other + i] * y[start + i]
                 for i in range(n):
-                    y[start + i] -= dot * y[other + i]
-        square = 0.0
-        for i in range(start, start + n):
-            square += y[i] * y[i]
-        length = math.sqrt(square)
-        if length > threshold * longest and length > 0.0:
+                    term = dot * y[other + i]
+                    y[start + i] -= term
+                    size[i] += abs(term)
+        largest, square, made_of = 0.0, 0.0, 0.0
+        for i in range(n):
+            largest = max(largest, abs(y[start + i]))
+        for i in range(n if largest > 0.0 else 0):
+            # Squares of the components themselves may leave the range of floats.
+            share = y[start + i] / largest
+            square += share * share
+            made_of += abs(share) * (size[i] / largest)
+        length = largest * math.sqrt(square)
+        distinct = square > COLLAPSED * made_of
+        if length > 0.0 and (distinct or not images):
             growth[c] += math.log(length)
-            indistinct += 1 if length < COLLAPSED * whole else 0
+            indistinct += 0 if distinct else 1
             for i in range(start, start + n):
                 y[i] /= length
         else:
@@ -124,7 +133,7 @@ def keep_apart(model, run, mode, tangents, gram):
     n = model.dimension
     if independence(run.y, n, tangents, gram) > closest:
         return
-    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, 0.0)
+    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, gram, False)
     run.strain = 0.0
     if run.stage == READY:
         run.stage = STALE
@@ -195,16 +204,13 @@ def solve(system, n, out):
 
 @njit(**KERNEL)
 def log_abs_determinant(matrix, magnitude, n):
-    """``log |det|`` of a matrix ``(n, n)``, overwritten; minus infinity if it is singular to rounding.
+    """``log |det|`` of a matrix ``(n, n)``; minus infinity if it is singular to rounding.
 
-    ``magnitude``, scratch of at least that shape, holds the size of the terms that made up each entry. A
-    pivot within the rounding of these terms counts as zero; a pivot that is merely small, as near a grazing,
-    does not.
+    ``magnitude``, of at least that shape, holds the size of the terms that made up each entry. A pivot
+    within the rounding of these terms counts as zero; a pivot that is merely small, as near a grazing, does
+    not. Both are overwritten.
     """
     total = 0.0
-    for i in range(n):
-        for j in range(n):
-            magnitude[i, j] = abs(matrix[i, j])
     for column in range(n):
         pivot = column
         for i in range(column + 1, n):

@@ -6,7 +6,6 @@ from numba import boolean, float64, int64, njit, void
 
 from hybrid.kernels.arithmetic.clock import forward
 from hybrid.kernels.arithmetic.tangent import (
-    COLLAPSED,
     STRAINED,
     log_abs_determinant,
     multiply,
@@ -83,17 +82,35 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
 
     ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
     (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
-    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities.
+    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities. The sizes of the terms
+    of each entry go to ``work.sizes``.
     """
     n = model.dimension
     transversality = cross(model, transition, mode, t, x_minus, x_plus, work)
     for i in range(n):
+        terms = abs(work.field_after[i]) + abs(work.reset_jacobian[i, n])
+        for j in range(n):
+            terms += abs(work.reset_jacobian[i, j] * work.field[j])
         for j in range(n):
             work.saltation[i, j] = work.reset_jacobian[i, j]
+            work.sizes[i, j] = abs(work.reset_jacobian[i, j])
             term = work.settled[i] * work.gradient[j]
             if term != 0.0:
                 work.saltation[i, j] += term / transversality
+                work.sizes[i, j] += abs(terms * work.gradient[j] / transversality)
     return transversality
+
+
+@njit(**KERNEL)
+def assume_sizes(n, work):
+    """Assume that the entries of ``work.saltation`` are made up of terms as large as its largest entry."""
+    largest = 0.0
+    for i in range(n):
+        for j in range(n):
+            largest = max(largest, abs(work.saltation[i, j]))
+    for i in range(n):
+        for j in range(n):
+            work.sizes[i, j] = largest
 
 
 @njit(**KERNEL)
@@ -127,6 +144,8 @@ def remember_jump(model, run, record, transition, transversality, kind, known, x
 def carry_tangents(model, run, tangents, orthonormal, apart, work):
     """Multiply the tangent vectors by ``work.saltation``, and add its log-determinant to the run's.
 
+    ``work.sizes`` holds the sizes of the terms that made up its entries.
+
     With ``orthonormal`` they are orthonormalised before and after where the matrices since the last time
     strain them, so that a direction that one annihilates is told from one that is merely short; with
     ``apart`` too, and then what the jump alone added to the growth of the first is returned, else 0.
@@ -135,17 +154,23 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
     for i in range(n):
         for j in range(n):
             work.jacobian[i, j] = work.saltation[i, j]
+            work.reset_jacobian[i, j] = work.sizes[i, j]
     log_determinant = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
     run.log_determinant += log_determinant
     run.strain += strain(work.saltation, n, log_determinant)
     anew = orthonormal and (apart or not run.strain < STRAINED)
     if anew:
-        orthonormalise(run.y, n, tangents, run.growth, 0.0)
+        orthonormalise(run.y, n, tangents, run.growth, work.jacobian, False)
+        for c in range(tangents):
+            for i in range(n):
+                work.jacobian[c, i] = 0.0
+                for j in range(n):
+                    work.jacobian[c, i] += work.sizes[i, j] * abs(run.y[n * (1 + c) + j])
     before = run.growth[0]
     multiply(work.saltation, run.y, n, tangents, work.state)
     if not anew:
         return 0.0
-    orthonormalise(run.y, n, tangents, run.growth, COLLAPSED)
+    orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True)
     run.strain = 0.0
     return run.growth[0] - before
 
@@ -279,6 +304,7 @@ def jump(task, transition):
     remember_jump(model, run, record, transition, transversality, kind, known, work.new, work)
     if locked:
         map_of_instant(run, n, work.saltation)
+        assume_sizes(n, work)
     if tangents > 0:
         judge(run, n, work)
         if locked:
@@ -332,6 +358,7 @@ def follow_impacts(task, transition, remaining):
     remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
     if tangents > 0:
         n = model.dimension
+        assume_sizes(n, work)
         carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
         if not apart:
             model.field_jacobian(target, run.phase, x_limit, model.parameters, work.jacobian)
@@ -394,6 +421,7 @@ def rest(task, limit_mode):
     chatter_matrix(model, run, transition, work)
     multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
     if tangents > 0:
+        assume_sizes(model.dimension, work)
         carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
     run.previous_mode = run.mode
     run.mode = limit_mode

@@ -258,7 +258,7 @@ class Work(Structure):
 
     ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
     along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
-    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``saltation (n, n)``;
+    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``saltation, sizes (n, n)``;
     ``path (d + 1, n)``, the powers of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack``
     and ``intervals`` for its isolation; ``registers (r, 6)``, what is known of each row of a program, and
     ``samples (nodes + 1, 2 r)`` the ranges of these rows at the nodes of a step and what they have in common.
@@ -286,6 +286,7 @@ class Work(Structure):
     state: VECTOR
     settled: VECTOR
     saltation: MATRIX
+    sizes: MATRIX
     path: MATRIX
     polynomial: VECTOR
     stack: MATRIX
