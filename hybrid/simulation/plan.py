@@ -51,14 +51,19 @@ class Plan:
     work_layout: Any
 
 
-def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int) -> Plan:
-    """The plan of a run, made once; kernels that the run needs are loaded."""
-    plan = compiled.plans.get((solver, tangents))
+def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: int | None = None) -> Plan:
+    """The plan of a run, made once; kernels that the run needs are loaded.
+
+    The mode ``by_steps`` is advanced by steps of the solver's Runge-Kutta method, even if it has a series.
+    """
+    plan = compiled.plans.get((solver, tangents, by_steps))
     if plan is None:
         system, method = compiled.system, kernel_method(solver)
         load_kernels("hybrid.kernels.events.initial_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
         kinds = propagator_kinds(compiled, solver)
+        if by_steps is not None:
+            kinds[by_steps] = codes.RUNGE_KUTTA
         parts, attempts = driver_parts(
             compiled.takes_steps(kinds), solver.attempt, bool(compiled.emitted.forcing_component)
         )
@@ -76,7 +81,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int) -> Plan:
         )
         while len(compiled.plans) >= MOST_LAYOUTS:
             compiled.plans.pop(next(iter(compiled.plans)), None)
-        compiled.plans[solver, tangents] = plan
+        compiled.plans[solver, tangents, by_steps] = plan
     return plan
 
 

@@ -57,6 +57,11 @@ def start(
     run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
     work = fresh_work(plan.work_layout, plan.method)
     run.mode, beyond = choose_mode(system, plan.parts, model, run, work, mode)
+    if beyond and model.propagator[run.mode] in (codes.DESINGULARISED, codes.ROOTED):
+        # These series hold the root of a guard, which may be negative here.
+        plan = plan_of(compiled, solver, tangents, by_steps=int(run.mode))
+        model = compiled.at(parameters, plan.model) if parameters else plan.model
+        work = fresh_work(plan.work_layout, plan.method)
     return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond, stop)
 
 

@@ -51,15 +51,18 @@ def _write_desingularised(
     body = Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()
     seeds = seeds_of(symbols)
-    slope = slope_along(field, z, symbols)
-    rates = [on_clock(rate, z) for rate in field]
-    tangents = [on_clock(along, z) for along in directional(field, seeds)]
-    trace = on_clock(divergence(field, symbols.x), z)
+    slope = replaced(slope_along(field, z, symbols), harmonics)
     # Where z vanishes, its root crosses zero with a nonzero slope.
     roots = in_terms_of_root(boundaries, z, ROOT, symbols)
     crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)
     body.start_root("root", z, min(roots))
+    # A guard that moves with the forcing has the harmonics in its powers in the field, too.
+    z = replaced(z, harmonics)
+    body.at_start[z] = "root*root"
+    rates = [on_clock(rate, z) for rate in field]
+    tangents = [on_clock(along, z) for along in directional(field, seeds)]
+    trace = on_clock(divergence(field, symbols.x), z)
     turning = [ROOT * replaced(function.diff(symbols.t), harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))

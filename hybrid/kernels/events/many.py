@@ -5,6 +5,7 @@ from numba import int64, njit, types
 from hybrid.kernels.events.initial_mode import verdicts_on
 from hybrid.kernels.types.codes import (
     BEYOND,
+    DESINGULARISED,
     DONE,
     GO_ON,
     MAX_STEPS,
@@ -12,6 +13,7 @@ from hybrid.kernels.types.codes import (
     NO_OBJECTION,
     NO_TRANSITION,
     REFUSED,
+    ROOTED,
 )
 from hybrid.kernels.types.layout import (
     ADVANCE,
@@ -36,7 +38,10 @@ def set_words(words, fresh):
 
 @njit(**KERNEL)
 def mode_of_start(parts, task, named, verdicts):
-    """The mode in which a run starts: the one named, or the only one that allows the state; else NO_MODE."""
+    """The mode in which a run starts: the one named, or the only one that allows the state; else NO_MODE.
+
+    Nor does a run start in a mode whose series hold the root of a guard if it starts beyond a guard.
+    """
     model = task.model
     modes = model.first_outgoing.shape[0] - 1
     for i in range(verdicts.shape[0]):
@@ -45,6 +50,10 @@ def mode_of_start(parts, task, named, verdicts):
     if verdicts_on(parts, model, task.run, task.work, first, stop, verdicts) != NO_TRANSITION:
         return NO_MODE
     if named != NO_MODE:
+        rooted = model.propagator[named] == DESINGULARISED or model.propagator[named] == ROOTED
+        for i in range(verdicts.shape[0] if rooted else 0):
+            if verdicts[i] == BEYOND:
+                return NO_MODE
         return named
     chosen = NO_MODE
     for mode in range(modes):
