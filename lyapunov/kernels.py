@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, types
+from numba import njit
 
 from hybrid.kernels.arithmetic.tangent import orthonormalise
 from hybrid.kernels.types.codes import (
@@ -12,18 +12,11 @@ from hybrid.kernels.types.codes import (
     READY,
     STALE,
 )
-from hybrid.kernels.types.layout import (
-    ADVANCE,
-    ENTRY,
-    INDICES,
-    KERNEL,
-    MATRIX,
-    PARTS,
-    TASK,
-    VECTOR,
-)
-from hybrid.kernels.types.structure import Structure
+from hybrid.kernels.types.kinds import INDICES, INTEGER, MATRIX, REAL, TRUTH
+from hybrid.kernels.types.layout import ADVANCE, Parts, Task
+from hybrid.kernels.types.options import KERNEL, exported
 from lyapunov import statistics
+from lyapunov.interval import End
 
 UNLIMITED = 9223372036854775807
 
@@ -42,30 +35,18 @@ def later(period, cycle, phase, interval):
     return cycle, phase
 
 
-class End(Structure, counters=("cycle",), numbers=("phase",)):
-    """When an interval ends: after ``cycle`` whole periods and at the ``phase`` of the next."""
-
-    counters: INDICES
-    numbers: VECTOR
-
-
-END = End.numba_type
-
-
-@njit(
-    types.UniTuple(int64, 2)(ADVANCE, PARTS, TASK, END, float64, int64, boolean, MATRIX, MATRIX, INDICES),
-    **ENTRY,
-)
+@exported(INTEGER, ADVANCE, Parts, Task, End, REAL, INTEGER, TRUTH, MATRIX, MATRIX, INDICES)
 def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates, batches, batch_state):
     """Growth rates ``(M, k + 1)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
 
     The last column is the other side of the sum rule: the integral of div f plus the log-determinants of the
     saltation matrices, per unit time. ``end`` is the end of the last interval. Each row is also added to
-    ``batches``. Returns how many intervals were completed, and the driver's code. After ``MAX_STEPS`` the
-    next call resumes the interval that was not completed: ``resumed``.
+    ``batches``. Returns the driver's code; ``end.done`` is how many intervals were completed. After
+    ``MAX_STEPS`` the next call resumes the interval that was not completed: ``resumed``.
     """
     run, period, n, tangents = task.run, task.model.period, task.model.dimension, task.tangents
     for done in range(rates.shape[0]):
+        end.done = done
         if done > 0 or not resumed:
             for c in range(tangents):
                 run.growth[c] = 0.0
@@ -73,7 +54,7 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
             end.cycle, end.phase = later(period, end.cycle, end.phase, interval)
         code = advance(parts, task, end.cycle, end.phase, max_steps, UNLIMITED)
         if code != DONE:
-            return done, code
+            return code
         run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False)
         run.strain = 0.0
         if run.stage == READY:
@@ -82,7 +63,8 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
             rates[done, c] = run.growth[c] / interval
         rates[done, tangents] = (run.divergence + run.log_determinant) / interval
         push(batches, batch_state, rates[done])
-    return rates.shape[0], DONE
+    end.done = rates.shape[0]
+    return DONE
 
 
 @njit(**KERNEL)
@@ -109,27 +91,23 @@ def rescale(run, other, n, factor):
     other.pending = NO_TRANSITION
 
 
-@njit(
-    types.UniTuple(int64, 2)(
-        ADVANCE, PARTS, TASK, TASK, TASK, END, float64, float64, int64, int64, boolean, MATRIX
-    ),
-    **ENTRY,
-)
+@exported(INTEGER, ADVANCE, Parts, Task, Task, Task, End, REAL, REAL, INTEGER, INTEGER, TRUTH, MATRIX)
 def distances(
     advance, parts, task, free, renormalised, end, interval, separation, max_steps, burst, resumed, out
 ):
     """Distances ``(M, 2)`` of two companions from an orbit at the ends of ``M`` intervals.
 
     The first companion runs freely; the second is brought back to ``separation`` after each interval
-    (Benettin, Galgani, Strelcyn 1976). Returns how many intervals were completed, and the driver's code. Each
-    run takes ``burst`` steps at most; after ``MAX_STEPS`` the interval that was not completed is ``resumed``
-    by the next call.
+    (Benettin, Galgani, Strelcyn 1976). Returns the driver's code; ``end.done`` is how many intervals were
+    completed. Each run takes ``burst`` steps at most; after ``MAX_STEPS`` the interval that was not completed
+    is ``resumed`` by the next call.
     """
     run, period, n = task.run, task.model.period, task.model.dimension
     most = min(max_steps, run.steps + burst)
     free_most = min(max_steps, free.run.steps + burst)
     renormalised_most = min(max_steps, renormalised.run.steps + burst)
     for done in range(out.shape[0]):
+        end.done = done
         if done > 0 or not resumed:
             end.cycle, end.phase = later(period, end.cycle, end.phase, interval)
         code = advance(parts, task, end.cycle, end.phase, most, UNLIMITED)
@@ -138,9 +116,10 @@ def distances(
         if code == DONE:
             code = advance(parts, renormalised, end.cycle, end.phase, renormalised_most, UNLIMITED)
         if code != DONE:
-            return done, code
+            return code
         out[done, 0] = distance(run, free.run, n)
         out[done, 1] = distance(run, renormalised.run, n)
         if out[done, 1] > 0.0:
             rescale(run, renormalised.run, n, separation / out[done, 1])
-    return out.shape[0], DONE
+    end.done = out.shape[0]
+    return DONE

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
-from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
@@ -21,6 +21,7 @@ from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
+from lyapunov.interval import End
 from lyapunov.statistics import (
     TaperedMean,
     closed_batch_means,
@@ -242,9 +243,8 @@ def generic_directions(n: int, k: int) -> np.ndarray:
 
 def end_at(trajectory: Trajectory) -> Any:
     """The current time of a run as the end of an interval, which the kernels take further."""
-    End = load_kernels("lyapunov.kernels").End
     run = trajectory.run
-    return End(counters=np.array([run.cycle]), numbers=np.array([run.phase]))
+    return End(counters=np.array([run.cycle, 0]), numbers=np.array([run.phase]))
 
 
 class Estimate:
@@ -291,8 +291,8 @@ class Estimate:
         self, intervals: int, mean: TaperedMean, batches: Any, history: bool, bar: Progress
     ) -> tuple[np.ndarray, int]:
         trajectory = self.trajectory
-        kernel = entry(load_kernels("lyapunov.kernels").growth_rates)
-        advance = address(load_kernels().advance)
+        kernel = load_kernels("lyapunov.kernels").growth_rates
+        advance = load_kernels().advance
         kept = [np.empty((0, trajectory.tangents))]
         bursts, code = Bursts([trajectory]), codes.DONE
         while mean.count < intervals and code == codes.DONE:
@@ -300,7 +300,7 @@ class Estimate:
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), trajectory.tangents + 1))
             filled, resumed = 0, False
             while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
-                done, code = kernel(
+                code = kernel(
                     advance,
                     trajectory.parts,
                     self.task,
@@ -311,6 +311,7 @@ class Estimate:
                     rates[filled:],
                     *batches,
                 )
+                done = int(self.end.done)
                 filled += done
                 bar.update(done)
                 code = bursts.judged(code)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments
-from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
@@ -257,8 +257,8 @@ def _follow(
     bar: Progress,
 ) -> tuple[np.ndarray, Status]:
     """Distances ``(M, 2)`` of the free and the renormalised companion, and how the runs ended."""
-    kernel = entry(load_kernels("lyapunov.kernels").distances)
-    advance = address(load_kernels().advance)
+    kernel = load_kernels("lyapunov.kernels").distances
+    advance = load_kernels().advance
     runs: list[Any] = [reference, *companions]
     end = end_at(reference)
     tasks = [run.task(run.no_record()) for run in runs]
@@ -267,7 +267,7 @@ def _follow(
     while total < intervals and code in (codes.DONE, codes.GO_ON):
         bursts.most()
         out = np.empty((min(INTERVALS_AT_ONCE, intervals - total), 2))
-        done, code = kernel(
+        code = kernel(
             advance,
             reference.parts,
             *tasks,
@@ -279,6 +279,7 @@ def _follow(
             code == codes.GO_ON,
             out,
         )
+        done = int(end.done)
         code = bursts.judged(code)
         kept.append(out[:done])
         total += done

@@ -14,14 +14,17 @@ PACKAGES = ("hybrid", "models", "lyapunov")
 KERNELS_MAY_IMPORT = (
     "__future__",
     "collections",
-    "contextvars",
+    "contextlib",
     "ctypes",
+    "functools",
     "hybrid.kernels",
+    "itertools",
     "llvmlite",
     "math",
     "operator",
     "numba",
     "numpy",
+    "re",
     "struct",
     "typing",
 )
@@ -50,7 +53,7 @@ ROOMS = (
 )
 KERNEL_ROOMS = tuple(
     f"hybrid.kernels.{name}"
-    for name in ("types", "arithmetic", "events", "steps", "jumps", "evaluate", "drive")
+    for name in ("types", "instructions", "arithmetic", "events", "steps", "jumps", "evaluate", "drive")
 )
 HEAVY = ("matplotlib", "networkx", "numba", "pandas", "scipy", "sympy", "xarray")
 MAX_LINES = 500

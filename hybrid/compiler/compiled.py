@@ -14,12 +14,13 @@ from hybrid import arguments
 from hybrid.compiler.agreement import check_agreement
 from hybrid.compiler.cache import store
 from hybrid.compiler.cache.folder import announced
-from hybrid.compiler.cache.loader import Absent, address, entry, load_kernels
+from hybrid.compiler.cache.loader import Absent, load_kernels
 from hybrid.compiler.operations import operations_of
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types.codes import NARROW, NO_MODE, RUNGE_KUTTA
+from hybrid.kernels.types.layout import Model, Programs
 from hybrid.system.functions import CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of
 from hybrid.system.periodicity import period_at, period_fault
@@ -110,7 +111,7 @@ class CompiledSystem:
     def _call(
         self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
     ) -> None:
-        call = entry(vars(load_kernels("hybrid.kernels.evaluate"))[kernel])
+        call = vars(load_kernels("hybrid.kernels.evaluate"))[kernel]
         model = self._model.replace(parameters=np.array(parameters, dtype=float))
         call(model, number, index, float(t), np.array(x, dtype=float), out)
 
@@ -208,8 +209,6 @@ class CompiledSystem:
 
     @cached_property
     def _programs(self) -> Any:
-        from hybrid.kernels.types.layout import Programs
-
         programs = self.emitted.programs
         return Programs(
             rows=np.array(programs.rows, dtype=np.int64).reshape(-1, 4),
@@ -221,8 +220,6 @@ class CompiledSystem:
 
     @cached_property
     def _model(self) -> Any:
-        from hybrid.kernels.types.layout import Model
-
         system = self.system
         transitions = system.transitions
         first_outgoing, outgoing = _leaving(system, at_start=False)
@@ -290,7 +287,7 @@ def _program_runners(needed: bool) -> dict[str, Any]:
     if not needed:
         return {"bound": Absent(), "spread": Absent()}
     bounds = load_kernels("hybrid.kernels.events.bounds")
-    return {"bound": address(bounds.bound_guard), "spread": address(bounds.spread_by_rounding)}
+    return {"bound": bounds.bound_guard, "spread": bounds.spread_by_rounding}
 
 
 def _index_or_none(system: HybridSystem, mode: str | None) -> int:

@@ -10,6 +10,7 @@ from typing import Any
 
 import attrs
 
+from hybrid.compiler.cache.loader import import_numba
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import COMPLEX_STEP
 from hybrid.system.variables import PARAMETERS, STATE, plain_class
@@ -86,10 +87,12 @@ def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
     ModelError
         If numba cannot compile the function.
     """
+    import_numba()
     from numba import cfunc, float64, int64, njit, void
 
     from hybrid.compiler.whole_numbers import WholeNumberCompiler, readonly
-    from hybrid.kernels.types.layout import VECTOR
+    from hybrid.kernels.types.kinds import VECTOR
+    from hybrid.kernels.types.numba_types import numba_type
 
     compiled = njit(error_model="numpy", boundscheck=True, pipeline_class=WholeNumberCompiler)
     function = compiled(_own_copy(opaque.function))
@@ -98,9 +101,10 @@ def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
         scope["State"] = plain_class(STATE, opaque.state)
     scope["Parameters"] = plain_class(PARAMETERS, opaque.parameters)
     exec(_text(opaque), scope)
-    signatures = {"value": void(float64, VECTOR, VECTOR, VECTOR)}
+    vector = numba_type(VECTOR)
+    signatures = {"value": void(float64, vector, vector, vector)}
     if opaque.slopes:
-        signatures["slopes"] = void(float64, VECTOR, VECTOR, int64, VECTOR)
+        signatures["slopes"] = void(float64, vector, vector, int64, vector)
     names = {"value": name, "slopes": name + SLOPES}
     try:
         return {

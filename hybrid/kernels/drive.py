@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, int64, njit
+from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
@@ -36,7 +36,9 @@ from hybrid.kernels.types.codes import (
     STUCK,
     TERMINAL,
 )
-from hybrid.kernels.types.layout import ENTRY, KERNEL, PARTS, TASK
+from hybrid.kernels.types.kinds import INTEGER, REAL
+from hybrid.kernels.types.layout import Parts, Task
+from hybrid.kernels.types.options import KERNEL, exported
 
 # More jumps than this at one instant, in total or per transition, count as endless.
 MOST_JUMPS_AT_ONCE = 300
@@ -203,7 +205,7 @@ def step_by_propagator(parts, task, remaining):
     return code, span
 
 
-@njit(int64(PARTS, TASK, int64, float64, int64, int64), **ENTRY)
+@exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 

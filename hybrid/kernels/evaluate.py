@@ -1,11 +1,11 @@
 """The compiled functions of a model, called from Python."""
 
-from numba import float64, int64, njit, void
+from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR
+from hybrid.kernels.types.layout import Model
+from hybrid.kernels.types.options import exported
 
-from hybrid.kernels.types.layout import ENTRY, MATRIX, MODEL, VECTOR
 
-
-@njit(void(MODEL, int64, int64, float64, VECTOR, VECTOR), **ENTRY)
+@exported(None, Model, INTEGER, INTEGER, REAL, VECTOR, VECTOR)
 def vector_function(model, function, index, t, x, out):
     """Value of a field (function 0), guard (1) or reset (2), or the gradient of a guard (3), into ``out``."""
     if function == 0:
@@ -18,7 +18,7 @@ def vector_function(model, function, index, t, x, out):
         model.guard_gradient(index, t, x, model.parameters, out)
 
 
-@njit(void(MODEL, int64, int64, float64, VECTOR, MATRIX), **ENTRY)
+@exported(None, Model, INTEGER, INTEGER, REAL, VECTOR, MATRIX)
 def matrix_function(model, function, index, t, x, out):
     """Jacobian ``(n, n + 1)`` of a field (function 0) or a reset (2) into ``out``."""
     if function == 0:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
@@ -167,15 +167,16 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     """
     states = np.empty((count, trajectory.model.dimension))
     places = np.empty((count, 3), dtype=np.int64)
-    kernel = entry(load_kernels("hybrid.kernels.events.sections").strobe)
+    kernel = load_kernels("hybrid.kernels.events.sections").strobe
+    reached = np.zeros(1, dtype=np.int64)
     record, bursts = trajectory.no_record(), Bursts([trajectory])
     first, total, code = int(trajectory.run.cycle) + 1, 0, codes.GO_ON
     # Points need no tangent vectors, which the trajectory may have.
     plain = attrs.evolve(trajectory, tangents=0)
     task = plain.task(record)
     while code == codes.GO_ON:
-        done, code = kernel(
-            address(load_kernels().advance),
+        code = kernel(
+            load_kernels().advance,
             trajectory.parts,
             task,
             trajectory.phase0,
@@ -183,8 +184,9 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
             UNLIMITED,
             states[total:],
             places[total:],
+            reached,
         )
-        total += done
+        total += int(reached[0])
         code = bursts.judged(code)
         if code == codes.GO_ON:
             # The burst ended within a period; the kernel would begin the next one.

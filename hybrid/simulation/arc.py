@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.simulation.labelled import Names, attributes
@@ -245,7 +245,7 @@ class Pieces:
         """States ``(len(times), n)``, and the steps they are taken from; at a jump, the state after it."""
         states = np.empty((len(times), self.coefficients.shape[2] - 1))
         index = np.empty(len(times), dtype=np.int64)
-        kernel = entry(load_kernels("hybrid.kernels.steps.dense").states_at)
+        kernel = load_kernels("hybrid.kernels.steps.dense").states_at
         kernel(np.ascontiguousarray(times), self.t, self.low, self.h, self.coefficients, states, index)
         return states, index
 

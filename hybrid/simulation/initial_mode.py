@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.system.elements import Transition
@@ -83,7 +83,7 @@ def _verdicts(
     Also the values of guards that are not finite, by transition, if there are several modes.
     """
     verdicts = np.zeros(len(system.transitions), dtype=np.int64)
-    kernel = entry(load_kernels("hybrid.kernels.events.initial_mode").try_modes)
+    kernel = load_kernels("hybrid.kernels.events.initial_mode").try_modes
     undefined: dict[int, float] = {}
     for mode in modes:
         transition = kernel(parts, model, run, work, mode, mode + 1, verdicts)

@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Record, Run, Work
+from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.periods import split_time
 
 # Deep enough for intervals halved down to rounding.
@@ -36,10 +39,6 @@ def fresh_work(layout: Any, method: Any) -> Any:
 @lru_cache(MOST_LAYOUTS)
 def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: int) -> Any:
     """Where the arrays of a workspace lie."""
-    from hybrid.kernels.arithmetic.lanes import whole_registers
-    from hybrid.kernels.types.layout import Work
-    from hybrid.kernels.types.structure import Layout
-
     n, length = dimension, dimension * (1 + tangents)
     stages, degree = len(method.a), len(method.interpolant) - 1
     coupled = len(method.b) if method.implicit else 0
@@ -88,9 +87,6 @@ def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) ->
 @lru_cache(MOST_LAYOUTS)
 def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
     """Where the arrays of a record lie."""
-    from hybrid.kernels.types.layout import Record
-    from hybrid.kernels.types.structure import Layout
-
     n = dimension
     shapes = {
         "used": (4,),
@@ -111,9 +107,6 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
 @lru_cache(MOST_LAYOUTS)
 def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
     """Where the arrays of a run lie."""
-    from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Run
-    from hybrid.kernels.types.structure import Layout
-
     n = dimension
     shapes = {
         "counters": (len(COUNTERS),),
@@ -140,8 +133,6 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
 @cache
 def _first_entries() -> tuple[np.ndarray, np.ndarray]:
     """The named entries of a run that has no mode yet and has not jumped."""
-    from hybrid.kernels.types.layout import COUNTERS, NUMBERS
-
     counters = dict.fromkeys(COUNTERS, 0) | {
         "stage": codes.ENTERING,
         "last_fired": codes.NO_TRANSITION,

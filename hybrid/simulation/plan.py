@@ -9,10 +9,11 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import Absent, address, load_kernels
+from hybrid.compiler.cache.loader import Absent, load_kernels
 from hybrid.compiler.compiled import CompiledSystem
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.layout import Attempts, Method, Parts, Task
 from hybrid.simulation.memory import MOST_LAYOUTS, run_layout, work_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
@@ -87,8 +88,6 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
 
 def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:
     """What the driver works on, without the memory of any run."""
-    from hybrid.kernels.types.layout import Task
-
     return Task(
         attempts=attempts,
         model=model,
@@ -104,8 +103,6 @@ def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:
 @lru_cache(MOST_LAYOUTS)
 def kernel_method(solver: Solver) -> Any:
     """The kernel's view of a solver: tableau and tolerances."""
-    from hybrid.kernels.types.layout import Method
-
     tableau = solver.tableau
     return Method(
         a=tableau.a,
@@ -131,8 +128,6 @@ def kernel_method(solver: Solver) -> Any:
 @cache
 def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[Any, Any]:
     """The pieces that the driver is handed; what the run does not need is not loaded."""
-    from hybrid.kernels.types.layout import Attempts, Parts
-
     jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
     module, name = attempt
     if steps:
@@ -142,17 +137,17 @@ def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[A
     explained_step, explained_series = Absent(), Absent()
     if forced:
         forcing = load_kernels("hybrid.kernels.steps.forcing")
-        explained_step, explained_series = map(address, (forcing.explained_step, forcing.explained_series))
+        explained_step, explained_series = forcing.explained_step, forcing.explained_series
     parts = Parts(
-        runge_kutta_step=address(step),
-        enter=address(corners.enter),
-        jump=address(jumps.jump),
-        finish_chatter=address(jumps.finish_chatter),
-        rest=address(jumps.rest),
-        first_in_order=address(corners.first_in_order),
+        runge_kutta_step=step,
+        enter=corners.enter,
+        jump=jumps.jump,
+        finish_chatter=jumps.finish_chatter,
+        rest=jumps.rest,
+        first_in_order=corners.first_in_order,
     )
     attempts = Attempts(
-        attempt_implicit=address(vars(load_kernels(module))[name]),
+        attempt_implicit=vars(load_kernels(module))[name],
         explained_step=explained_step,
         explained_series=explained_series,
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.simulation.memory import workspace
@@ -86,7 +86,7 @@ def matrices_at(
     n = system.dimension
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
     sources = [system.mode_index(transition.source) for transition in system.transitions]
-    kernel = entry(load_kernels("hybrid.kernels.jumps.jump").saltation)
+    kernel = load_kernels("hybrid.kernels.jumps.jump").saltation
     work, x_plus = workspace(kernel_method(Tsit5()), n, 0, 0), np.empty(n)
     for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
         transversalities[i] = kernel(model, fired, sources[fired], phase, state, x_plus, work)

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.kernels.types import codes
 from hybrid.simulation.initial_mode import choose_mode
@@ -138,18 +138,16 @@ class Trajectory:
 
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
-        from hybrid.kernels.steps.step import jacobian_at
-
         run, n = self.run, self.model.dimension
-        jacobian_at(self.model, run.mode, run.phase, run.y, self.work.jacobian)
+        load_kernels("hybrid.kernels.steps.step").jacobian_at(
+            self.model, run.mode, run.phase, run.y, self.work.jacobian
+        )
         return self.work.jacobian[:, :n].copy()
 
     def field(self) -> np.ndarray:
         """``f`` of the current mode at the current point, ``(n,)``."""
-        from hybrid.kernels.steps.step import field_at
-
         run, out = self.run, np.empty(self.model.dimension)
-        field_at(self.model, run.mode, run.phase, run.y, out)
+        load_kernels("hybrid.kernels.steps.step").field_at(self.model, run.mode, run.phase, run.y, out)
         return out
 
     def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:
@@ -186,9 +184,7 @@ class Trajectory:
 
     def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
         return int(
-            entry(load_kernels().advance)(
-                self.plan.parts, self.task(record), cycle, phase, max_steps, max_jumps
-            )
+            load_kernels().advance(self.plan.parts, self.task(record), cycle, phase, max_steps, max_jumps)
         )
 
     def task(self, record: Any, *, orthonormal: bool = False) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import address, entry, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
@@ -274,13 +274,14 @@ class _Runs:
         fresh = [words.copy() for words in memory]
         places = np.zeros((len(block), 3), dtype=np.int64)
         verdicts = np.zeros(len(self.system.transitions), dtype=np.int64)
-        kernel = entry(load_kernels(KERNEL).many_runs)
-        advance, task = address(load_kernels().advance), trajectory.task(trajectory.no_record())
+        kernel = load_kernels(KERNEL).many_runs
+        advance, task = load_kernels().advance, trajectory.task(trajectory.no_record())
+        reached = np.zeros(1, dtype=np.int64)
         begin, resumed, told = 0, 0, []
         bursts = Bursts([trajectory])
         while begin < len(block):
             bursts.most()
-            i, code = kernel(
+            code = kernel(
                 advance,
                 plan.parts,
                 task,
@@ -300,7 +301,9 @@ class _Runs:
                 states,
                 places,
                 verdicts,
+                reached,
             )
+            i = int(reached[0])
             resumed = int(code == codes.GO_ON)
             if code == codes.REFUSED:
                 self._refuse(block.start + i)

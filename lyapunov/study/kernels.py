@@ -6,14 +6,37 @@ A field is a function ``f(t, y, p, out)``. ``thresholds (n,)`` of the difference
 
 import math
 
-from numba import float64, int64, njit, types, void
+from numba import njit
 
 from hybrid.kernels.arithmetic.linear import factorise, substitute
 from hybrid.kernels.arithmetic.tangent import orthonormalise
-from hybrid.kernels.types.layout import ENTRY, EPSILON, KERNEL, MATRIX, VECTOR
-from hybrid.kernels.types.layout import INDICES as INTEGERS
+from hybrid.kernels.types.kinds import INDICES, INTEGER, MATRIX, REAL, VECTOR, function
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import KERNEL, exported
+from lyapunov.study.places import (
+    ACCEPTED,
+    COUNTERS,
+    DFDT,
+    DONE,
+    EVALUATIONS,
+    F0,
+    F1,
+    F2,
+    FAR,
+    INCREMENTS,
+    K1,
+    K2,
+    K3,
+    NEW,
+    PROBE,
+    RECORD_FULL,
+    REJECTED,
+    SCRATCH_ROWS,
+    STEP_TOO_SMALL,
+    THRESHOLDS,
+)
 
-FIELD = types.FunctionType(void(float64, VECTOR, VECTOR, VECTOR))
+FIELD = function(None, REAL, VECTOR, VECTOR, VECTOR)
 
 # Constants of the formulas and of the step control (Shampine and Reichelt 1997, sections 3 and 4).
 D = 1.0 / (2.0 + math.sqrt(2.0))
@@ -29,17 +52,11 @@ ROOT_EPSILON = math.sqrt(EPSILON)
 LEAST_INCREMENT, LARGEST_INCREMENT = EPSILON**0.78, 0.1
 ROUNDOFF, SMALL, LARGE = EPSILON**0.875, EPSILON**0.75, EPSILON**0.25
 
-DONE, STEP_TOO_SMALL, RECORD_FULL = 0, 1, 2
-# Rows of the scratch memory.
-F0, F1, F2, K1, K2, K3, NEW, DFDT, PROBE, FAR, THRESHOLDS, INCREMENTS, SCRATCH_ROWS = range(13)
-# Places of the counters.
-ACCEPTED, REJECTED, EVALUATIONS, COUNTERS = range(4)
-
 STATES = 4
 M1, OMEGA1, XI1, M2, OMEGA2, XI2, P, PHI0, OMEGA, GAP, STIFFNESS = range(11)
 
 
-@njit(void(float64, VECTOR, VECTOR, VECTOR), **ENTRY)
+@exported(None, REAL, VECTOR, VECTOR, VECTOR)
 def founding_field(t, y, p, out):
     """Vibro-impact system ``x1, x2, v1, v2`` without events, and its linearisation along tangent vectors."""
     chi, square = p[M2] / p[M1], p[OMEGA2] ** 2
@@ -195,7 +212,7 @@ def attempt(field, t, y, p, h, rtol, atol, work, matrix, pivots, jacobian):
     return error * h / 6.0
 
 
-@njit(int64(FIELD, VECTOR, float64, float64, VECTOR, float64, float64, MATRIX, MATRIX, INTEGERS), **ENTRY)
+@exported(INTEGER, FIELD, VECTOR, REAL, REAL, VECTOR, REAL, REAL, MATRIX, MATRIX, INDICES)
 def integrate(field, p, t, end, y, rtol, atol, record, work, counters):
     """Take ``y (n,)`` from ``t`` to ``end`` in place; return a code.
 
@@ -252,7 +269,7 @@ def integrate(field, p, t, end, y, rtol, atol, record, work, counters):
     return DONE
 
 
-@njit(int64(FIELD, VECTOR, float64, float64, VECTOR, float64, float64, MATRIX, MATRIX, INTEGERS), **ENTRY)
+@exported(INTEGER, FIELD, VECTOR, REAL, REAL, VECTOR, REAL, REAL, MATRIX, MATRIX, INDICES)
 def growth_rates(field, p, t, period, y, rtol, atol, rates, work, counters):
     """Growth rates ``(M, k)`` of tangent vectors in ``y (n (1 + k),)`` over ``M`` periods from phase ``t``.
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import HybridSystem
-from hybrid.compiler.cache.loader import address, load_kernels
+from hybrid.compiler.cache.loader import load_kernels
 from lyapunov.spectrum import generic_directions
+from lyapunov.study.places import COUNTERS, SCRATCH_ROWS, STEP_TOO_SMALL
 
 # Parameters in the order of the compiled field.
 PARAMETERS = ("m1", "omega1", "xi1", "m2", "omega2", "xi2", "P", "phi0", "omega", "D", "K")
@@ -71,8 +72,8 @@ class Ode23s:
     ) -> np.ndarray:
         kernels = load_kernels("lyapunov.study.kernels")
         work, counters = scratch(len(y))
-        code = kernels.integrate(address(field), p, *t_span, y, self.rtol, self.atol, record, work, counters)
-        if code == kernels.STEP_TOO_SMALL:
+        code = kernels.integrate(field, p, *t_span, y, self.rtol, self.atol, record, work, counters)
+        if code == STEP_TOO_SMALL:
             raise StepTooSmall(f"ode23s at rtol = {self.rtol:g}, atol = {self.atol:g} stopped in {t_span}")
         return counters
 
@@ -90,7 +91,7 @@ class Ode23s:
         rates = np.empty((transient + periods, k))
         work, counters = scratch(len(y))
         done = kernels.growth_rates(
-            address(kernels.founding_field),
+            kernels.founding_field,
             parameters_of(system, omega),
             0.0,
             2 * np.pi / omega,
@@ -130,5 +131,4 @@ def parameters_of(system: HybridSystem, omega: float) -> np.ndarray:
 
 def scratch(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Scratch memory and counters of the kernels for ``n`` equations."""
-    kernels = load_kernels("lyapunov.study.kernels")
-    return np.zeros((kernels.SCRATCH_ROWS + 2 * n, n)), np.zeros(kernels.COUNTERS + n, dtype=np.int64)
+    return np.zeros((SCRATCH_ROWS + 2 * n, n)), np.zeros(COUNTERS + n, dtype=np.int64)

@@ -83,12 +83,18 @@ def _private_folder() -> Path:
 
 def source_key(*texts: str) -> str:
     """Short hash of source texts and of the compiler's version."""
-    import numba
-
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(_compiler_version().encode())
     for text in texts:
         digest.update(text.encode())
     return digest.hexdigest()[:24]
+
+
+@cache
+def _compiler_version() -> str:
+    # Numba itself is imported only when a kernel is compiled.
+    from importlib.metadata import version
+
+    return version("numba")
 
 
 def keep(path: Path, content: bytes) -> bool:
@@ -115,6 +121,24 @@ def kept(path: Path) -> bytes | None:
         return path.read_bytes()
     except OSError:
         return None
+
+
+def keep_code(path: Path, code: bytes) -> bool:
+    """Write machine code as ``keep`` does, with a checksum."""
+    return keep(path, hashlib.sha256(code).digest() + code)
+
+
+def kept_code(path: Path) -> bytes | None:
+    """The machine code in a file; None if the file is missing or does not match its checksum."""
+    content = kept(path)
+    if content is None:
+        return None
+    size = hashlib.sha256().digest_size
+    digest, code = content[:size], content[size:]
+    if hashlib.sha256(code).digest() == digest:
+        return code
+    say(f"hybrid: compiled code in {path.parent} is damaged; it is compiled again.")
+    return None
 
 
 def say(message: str) -> None:

@@ -1,4 +1,7 @@
-"""Import kernels; their compiled code is cached in a folder named by a hash of all their sources."""
+"""Compiled kernels, from the cache or compiled now; the cache folder is named by a hash of all their sources.
+
+Numba is imported only to compile them.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,15 @@ import ast
 import importlib
 import importlib.util
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from types import SimpleNamespace
 
 from hybrid.compiler.cache import second_process
-from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, source_key
+from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, keep_code, kept_code, source_key
+from hybrid.compiler.cache.kernel import file_of, kernels_in
+from hybrid.compiler.llvm.engine import processor
+from hybrid.kernels.types.kinds import text_of
 from hybrid.symbolic.branches import PARSER
 
 DRIVER = "hybrid.kernels.drive"
@@ -40,52 +43,47 @@ ALL_KERNELS = (
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
+# Threads that need the same kernels compile them once.
+_COMPILING = threading.Lock()
+
+
 @cache
-def load_kernels(module: str = DRIVER) -> ModuleType:
-    """The kernel module of that name, compiled now or loaded from the cache.
+def load_kernels(module: str = DRIVER) -> SimpleNamespace:
+    """The kernels that a module exports, by name, compiled now or loaded from the cache.
 
     A line on standard error announces the compilation, once per process.
     """
-    kept = is_kept(module)
-    if module == DRIVER and not kept:
-        second_process.start([each for each in EVENTS if not is_kept(each)])
-    with nullcontext() if kept else announced(MESSAGE):
-        if module in EVENTS:
-            second_process.finish()
-        _import_numba()
-        with compiled_into(_folder(module)):
-            return importlib.import_module(module)
+    path = _path(module)
+    with _COMPILING:
+        content = kept_code(path)
+        if content is None:
+            with announced(MESSAGE):
+                if module == DRIVER:
+                    second_process.start([each for each in EVENTS if not is_kept(each)])
+                elif module in EVENTS:
+                    second_process.finish()
+                    content = kept_code(path)
+                if content is None:
+                    content = compiled(module)
+                    keep_code(path, content)
+    return SimpleNamespace(**kernels_in(content))
 
 
-# Numba's cache folder is a setting of the whole process, so only one thread may change it at a time.
-_LOCK = threading.RLock()
+def compiled(module: str) -> bytes:
+    """Compile the kernels that a module exports; the contents of their file."""
+    import_numba()
+    from hybrid.kernels.types.export import exports_of, object_code
 
-
-@contextmanager
-def compiled_into(folder: Path) -> Iterator[None]:
-    """Let numba cache functions decorated inside this block, and no others, in ``folder``.
-
-    Numba's cache entry depends only on the time stamp of the function's own file. Kernels call one another
-    across files, so the name of the folder must depend on all their sources.
-    """
-    from numba import config
-
-    from hybrid.compiler.cache.checked import checked_contents
-    from hybrid.kernels.types.options import INTO_FOLDER
-
-    with _LOCK:
-        before, outside = vars(config)["CACHE_DIR"], INTO_FOLDER.set(True)
-        vars(config)["CACHE_DIR"] = str(folder)
-        try:
-            with checked_contents():
-                yield
-        finally:
-            vars(config)["CACHE_DIR"] = before
-            INTO_FOLDER.reset(outside)
+    return file_of(
+        {
+            name: (object_code(name, *export), text_of(export.result), [*map(text_of, export.arguments)])
+            for name, export in exports_of(importlib.import_module(module)).items()
+        }
+    )
 
 
 @cache
-def _import_numba() -> None:
+def import_numba() -> None:
     """Import numba's array functions without SciPy's linear algebra, which kernels do not need.
 
     On import, the array functions look for SciPy's BLAS, which takes a fifth of a second. BLAS is available,
@@ -102,18 +100,28 @@ def _import_numba() -> None:
     vars(arraymath)["ensure_blas"] = look
 
 
-def _folder(module: str) -> Path:
-    return cache_folder(f"kernels-{kernels_key(module)}")
+def _path(module: str) -> Path:
+    return cache_folder(f"kernels-{kernels_key(module)}") / f"{module}.o"
 
 
 def is_kept(module: str) -> bool:
     """Whether compiled code of a kernel module is on disk."""
-    return any(_folder(module).rglob(f"{module.rpartition('.')[2]}.*.nbi"))
+    return _path(module).exists()
 
 
 def sources_in(folder: Path) -> list[Path]:
     """All modules in a folder and its subfolders."""
     return sorted(folder.rglob("*.py"))
+
+
+def _source_of(module: str) -> Path | None:
+    """File of a module; None if there is no such module."""
+    try:
+        spec = importlib.util.find_spec(module)
+    except ModuleNotFoundError:
+        # The name may be that of a function in a module.
+        return None
+    return Path(spec.origin) if spec is not None and spec.origin else None
 
 
 @cache
@@ -122,15 +130,14 @@ def kernels_key(module: str = DRIVER) -> str:
     sources = sources_in(PACKAGE / "kernels")
     if not module.startswith("hybrid."):
         sources += sorted(_own_sources(module))
-    return source_key(*(path.read_text(encoding="utf-8") for path in sources))
+    return source_key(processor(), *(path.read_text(encoding="utf-8") for path in sources))
 
 
 def _own_sources(module: str) -> set[Path]:
     """Files of a module and of all modules that it imports, directly or not, from its own package."""
     package, found, left = module.partition(".")[0], set[Path](), [module]
     while left:
-        spec = importlib.util.find_spec(left.pop())
-        path = Path(spec.origin) if spec is not None and spec.origin else None
+        path = _source_of(left.pop())
         if path is None or path in found or path.name == "__init__.py":
             continue
         found.add(path)
@@ -144,39 +151,7 @@ def _own_sources(module: str) -> set[Path]:
     return found
 
 
-@cache
-def entry(kernel: Any) -> Any:
-    """The fastest entry point of a compiled kernel; the types of arguments are not checked.
-
-    Numba's own call first looks up the types of all arguments, which takes a third of a millisecond for our
-    tuples.
-    """
-    (compiled,) = kernel.overloads.values()
-    return compiled.entry_point
-
-
 class Absent:
     """A placeholder for a kernel that is never called."""
 
     address = 0
-
-
-@cache
-def address(kernel: Any) -> Any:
-    """A compiled kernel as a first-class function, for use as an argument or in a structure."""
-    from numba.core.types import WrapperAddressProtocol
-
-    (signature,) = kernel.nopython_signatures
-    compiled = kernel.overloads[signature.args]
-    pointer = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
-
-    class Address(WrapperAddressProtocol):
-        address = int(pointer)
-
-        def __wrapper_address__(self) -> int:
-            return self.address
-
-        def signature(self) -> Any:
-            return signature
-
-    return Address()

@@ -8,16 +8,16 @@ from typing import Any
 
 import attrs
 from llvmlite import ir
-from numba.core import cgutils
 
-from hybrid.kernels.arithmetic.columns import (
+from hybrid.kernels.arithmetic.doubled import write_divided_dot_product
+from hybrid.kernels.instructions.columns import (
     write_combination,
     write_combination_of_tangents,
     write_convolution,
     write_spread,
 )
-from hybrid.kernels.arithmetic.doubled import write_divided_dot_product
-from hybrid.kernels.arithmetic.lanes import everywhere, read, write, write_down, write_row
+from hybrid.kernels.instructions.loops import declared
+from hybrid.kernels.instructions.registers import everywhere, read, write, write_down, write_row
 from hybrid.kernels.types.codes import NARROW
 
 NUMBER = ir.DoubleType()
@@ -59,7 +59,7 @@ def _of_llvm(name: str) -> Call:
 
 def _declared(builder: Any, name: str, numbers: tuple[Any, ...]) -> Any:
     kind = ir.FunctionType(NUMBER, [NUMBER] * len(numbers))
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), numbers)
+    return builder.call(declared(builder.module, kind, name), numbers)
 
 
 def _remainder(builder: Any, a: Any, b: Any) -> Any:

@@ -14,11 +14,11 @@ from typing import Any, ClassVar
 
 import attrs
 from llvmlite import ir
-from numba.core import cgutils
 
 from hybrid.compiler.llvm.builder import Builder
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE, Call
-from hybrid.kernels.arithmetic.lanes import Matrix, everywhere, vector_of
+from hybrid.kernels.instructions.loops import loop
+from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
 from hybrid.symbolic.branches import PARSER
 
@@ -235,7 +235,7 @@ class _Body:
         assert isinstance(node.iter, ast.Call)
         bounds = [self.value(argument) for argument in node.iter.args]
         start, stop, step = (WHOLE(0), *bounds, WHOLE(1)) if len(bounds) == 1 else (*bounds, WHOLE(1))[:3]
-        with cgutils.for_range_slice(self.builder, start, stop, step, WHOLE) as (index, _):
+        with loop(self.builder, start, stop, step) as index:
             self._store(node.target, index)
             self.block(node.body)
 

@@ -1,51 +1,14 @@
-"""LLVM's instructions as machine code for this processor: optimised, emitted, and loaded."""
+"""Generated functions as machine code for this processor: optimised and emitted."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import Any
 
-import attrs
 from llvmlite import binding, ir
 
+from hybrid.compiler.llvm.engine import SPEED, target
 from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, OwnFunction, Signature, lower
-
-# LLVM's highest optimisation level.
-SPEED = 3
-
-
-@attrs.frozen(eq=False)
-class Compiled:
-    """A function of loaded machine code; ``needs`` keeps the code and the functions that it calls alive."""
-
-    address: int
-    needs: Any = attrs.field(repr=False)
-
-
-def _new_target() -> Any:
-    """LLVM's description of the processor of this machine."""
-    binding.initialize_native_target()
-    binding.initialize_native_asmprinter()
-    return binding.Target.from_default_triple().create_target_machine(
-        cpu=binding.get_host_cpu_name(),
-        features=binding.get_host_cpu_features().flatten(),
-        opt=SPEED,
-        reloc="default",
-        codemodel="jitdefault",
-        jit=True,
-    )
-
-
-_target = cache(_new_target)
-
-
-@cache
-def processor() -> str:
-    """LLVM's version and the processor, on which machine code depends."""
-    version = ".".join(map(str, binding.llvm_version_info))
-    return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
 
 def machine_code(
@@ -59,23 +22,14 @@ def machine_code(
     """
     module = ir.Module("model")
     module.triple = binding.get_default_triple()
-    module.data_layout = str(_target().target_data)
+    module.data_layout = str(target().target_data)
     for written, signature, fused in functions:
         lower(module, written, signature, fused=fused, calls=calls)
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
     tuning = binding.create_pipeline_tuning_options(speed_level=SPEED)
     tuning.loop_vectorization = True
-    passes = binding.create_pass_builder(_target(), tuning)
+    passes = binding.create_pass_builder(target(), tuning)
     passes.getModulePassManager().run(parsed, passes)
-    code: bytes = _target().emit_object(parsed)
+    code: bytes = target().emit_object(parsed)
     return code
-
-
-def load(code: bytes, names: Sequence[str], needs: Sequence[Any] = ()) -> dict[str, Compiled]:
-    """The functions of an object file, ready to be called; ``needs`` are objects that must outlive them."""
-    # Each engine needs its own target, since it frees the target when it is freed itself.
-    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _new_target())
-    engine.add_object_file(binding.ObjectFileRef.from_data(code))
-    engine.finalize_object()
-    return {name: Compiled(engine.get_function_address(name), (engine, *needs)) for name in names}

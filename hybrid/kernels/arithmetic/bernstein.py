@@ -8,7 +8,7 @@ nearly every step has no root.
 
 from numba import njit
 
-from hybrid.kernels.types.layout import INLINE, KERNEL
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 NO_ROOT = 2.0
 # Roots closer than this on the unit interval count as one root: rounding of the coefficients merges them.

@@ -9,7 +9,7 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.types.layout import INLINE, KERNEL
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # The rounding error of a sum is found only if the compiler keeps the order of the operations.
 IN_ORDER = KERNEL | {"fastmath": False}

@@ -11,21 +11,16 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, overload, register_jitable
 
-from hybrid.kernels.arithmetic.lanes import (
-    HERE,
+from hybrid.kernels.arithmetic.lanes import HERE, matrix_of
+from hybrid.kernels.instructions.registers import (
     built_in,
     everywhere,
-    matrix_of,
     multiply_add,
     read,
-    vector_of,
     whole_registers,
     write,
 )
 from hybrid.kernels.types.codes import NARROW, WIDE
-
-# Number of partial sums: in one sum, each term waits for the previous term.
-AT_ONCE = 4
 
 
 def convolve(series, order, inset, left, first, width, widest):
@@ -132,13 +127,6 @@ def _overload_evaluate_with_sizes(series, order, s, first, width):
     return in_registers
 
 
-def _registers(width, widest):
-    """First column and width of each register, the widest registers first."""
-    whole = width // widest * widest
-    wide = [(place, widest) for place in range(0, whole, widest)]
-    return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
-
-
 def _as_known(*kinds):
     """Types of the integer arguments of an intrinsic; literals stay literals.
 
@@ -146,45 +134,6 @@ def _as_known(*kinds):
     width.
     """
     return tuple(kind if isinstance(kind, types.Literal) else types.intp for kind in kinds)
-
-
-def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
-    """The instructions of ``convolve``, or of ``convolve_pairs``."""
-    registers = _registers(width, widest)
-    sums_at_once = max(1, AT_ONCE // len(registers))
-    number = order.type
-    # Start with the lowest orders of the columns: the orders written last are the slowest to read.
-    factor = rows.walker(builder.sub(order, inset), left)
-    other = rows.walker(inset, first)
-    totals = [
-        [cgutils.alloca_once_value(builder, vector_of(each)([0.0] * each)) for _, each in registers]
-        for _ in range(sums_at_once)
-    ]
-
-    def add_term(row_of_totals):
-        a, b = rows.walk(factor, -1), rows.walk(other, 1)
-        for (place, each), total in zip(registers, row_of_totals, strict=True):
-            term = read(builder, rows.beside(b, place), each)
-            if pairs:
-                times = read(builder, rows.beside(a, place), each)
-            else:
-                times = everywhere(builder, builder.load(a), each)
-            builder.store(multiply_add(builder, times, term, builder.load(total)), total)
-
-    terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
-    terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
-    with cgutils.for_range(builder, builder.udiv(terms, number(sums_at_once)), intp=number):
-        for each in totals:
-            add_term(each)
-    if sums_at_once > 1:
-        with cgutils.for_range(builder, builder.urem(terms, number(sums_at_once)), intp=number):
-            add_term(totals[0])
-    target = rows.address(order, first)
-    for i, (place, _) in enumerate(registers):
-        parts = [builder.load(each[i]) for each in totals]
-        while len(parts) > 1:
-            parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
-        write(builder, parts[0], rows.beside(target, place))
 
 
 @intrinsic(prefer_literal=True)
@@ -245,55 +194,3 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
         return context.get_dummy_value()
 
     return types.void(series, types.intp, types.float64, *known), generate
-
-
-def _weighted_sum(builder, factors, terms):
-    total = builder.fmul(factors[0], terms[0])
-    for factor, term in zip(factors[1:], terms[1:], strict=True):
-        total = multiply_add(builder, factor, term, total)
-    return total
-
-
-def write_combination(builder, rows, order, table, width, numbers):
-    """The instructions of ``combine``."""
-    number = order.type
-    target, source = rows.walker(number(0), number(0)), rows.walker(number(0), table)
-    with cgutils.for_range(builder, builder.add(order, number(1)), intp=number):
-        here, there = rows.walk(target, 1), rows.walk(source, 1)
-        for place, lanes in _registers(width, WIDE):
-            factors = [everywhere(builder, each, lanes) for each in numbers]
-            blocks = [rows.beside(there, width * c + place) for c in range(len(numbers))]
-            terms = [read(builder, block, lanes) for block in blocks]
-            write(builder, _weighted_sum(builder, factors, terms), rows.beside(here, place))
-
-
-def write_combination_of_tangents(builder, rows, order, table, width, first, n):
-    """The instructions of ``combine_tangents``."""
-    number = order.type
-    start = rows.address(number(0), first)
-    vectors = [read(builder, rows.beside(start, NARROW * j), NARROW) for j in range(n)]
-    target, source = rows.walker(number(1), first), rows.walker(number(1), table)
-    with cgutils.for_range(builder, order, intp=number):
-        here, there = rows.walk(target, 1), rows.walk(source, 1)
-        for i in range(n):
-            entries = [builder.load(rows.beside(there, width * j + i)) for j in range(n)]
-            factors = [everywhere(builder, entry, NARROW) for entry in entries]
-            write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
-
-
-def write_spread(builder, y, length, n, rows, first, stride):
-    """The instructions of ``spread_tangents``; lanes without a vector are zero."""
-    number = first.type
-    count = builder.sub(builder.sdiv(length, number(n)), number(1))
-    groups = builder.sdiv(builder.add(count, number(NARROW - 1)), number(NARROW))
-    with cgutils.for_range(builder, groups, intp=number) as group:
-        for lane in range(NARROW):
-            vector = builder.add(builder.mul(group.index, number(NARROW)), number(lane))
-            is_one = builder.icmp_signed("<", vector, count)
-            column = builder.add(builder.add(first, builder.mul(group.index, stride)), number(lane))
-            source = builder.select(is_one, builder.mul(number(n), builder.add(vector, number(1))), number(0))
-            start, target = builder.gep(y, [source]), rows.address(number(0), column)
-            for i in range(n):
-                value = builder.load(builder.gep(start, [number(i)]))
-                value = builder.select(is_one, value, value.type(0.0))
-                builder.store(value, rows.beside(target, NARROW * i))

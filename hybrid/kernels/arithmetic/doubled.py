@@ -6,7 +6,7 @@ doi:10.1007/BF01397083; Ogita, Rump and Oishi 2005, doi:10.1137/030601818).
 
 import numpy as np
 
-from hybrid.kernels.arithmetic.lanes import built_in, everywhere, vector_of
+from hybrid.kernels.instructions.registers import built_in, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
 
 # Factor ``U`` that splits a number ``x``: ``U x - (U x - x)`` has the upper half of the digits of ``x``.

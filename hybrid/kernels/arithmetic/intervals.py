@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from hybrid.kernels.arithmetic import operations as op
-from hybrid.kernels.types.layout import INLINE, KERNEL
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Relative error of an operation or of a function of the C library, with a margin.
 ROUNDING = 4.5e-16

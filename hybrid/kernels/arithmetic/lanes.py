@@ -11,10 +11,20 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_jitable, register_model
 
-from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.kernels.instructions.registers import (
+    FUSED,
+    Matrix,
+    built_in,
+    everywhere,
+    read,
+    vector_of,
+    whole_registers,
+    widths,
+    write,
+)
+from hybrid.kernels.types.codes import NARROW
 from hybrid.kernels.types.options import PartCompiler
 
-FUSED = ("contract",)
 # These functions are small and run at every order: without inlining, the call would cost as much as the work.
 HERE = {"_nrt": False, "forceinline": True, "pipeline_class": PartCompiler}
 
@@ -28,10 +38,7 @@ class LanesType(types.Type):
 
 LANES = LanesType()
 
-
-def vector_of(width):
-    """The type of a register of ``width`` numbers."""
-    return ir.VectorType(ir.DoubleType(), width)
+register_jitable(whole_registers)
 
 
 @register_model(LanesType)
@@ -40,75 +47,10 @@ class _Register(models.PrimitiveModel):
         super().__init__(manager, kind, vector_of(NARROW))
 
 
-def everywhere(builder, number, width):
-    """One number in every lane."""
-    nothing = vector_of(width)(ir.Undefined)
-    vector = builder.insert_element(nothing, number, ir.IntType(32)(0))
-    lanes = ir.VectorType(ir.IntType(32), width)
-    return builder.shuffle_vector(vector, nothing, lanes([0] * width))
-
-
-def built_in(builder, name, width, *arguments):
-    """Call a function that the compiler provides for vectors, such as ``fabs``."""
-    kind = vector_of(width)
-    function = ir.FunctionType(kind, [kind] * len(arguments))
-    return builder.call(
-        cgutils.get_or_insert_function(builder.module, function, f"llvm.{name}.v{width}f64"), arguments
-    )
-
-
-def multiply_add(builder, a, b, c):
-    """``a * b + c``."""
-    return builder.fadd(c, builder.fmul(a, b, flags=FUSED), flags=FUSED)
-
-
-class Matrix:
-    """Writes the instructions that address entries of a matrix with this data pointer and column count."""
-
-    def __init__(self, builder, data, columns):
-        self.builder, self.data, self.columns = builder, data, columns
-
-    def address(self, row, column):
-        """Address of an entry."""
-        builder = self.builder
-        return builder.gep(self.data, [builder.add(builder.mul(row, self.columns), column)])
-
-    def walker(self, row, column):
-        """A variable that holds the address of an entry."""
-        return cgutils.alloca_once_value(self.builder, self.address(row, column))
-
-    def walk(self, walker, rows):
-        """Move a walker on by a number of rows; returns the address that it held."""
-        builder = self.builder
-        here = builder.load(walker)
-        builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
-        return here
-
-    def beside(self, address, columns):
-        """Address of the entry ``columns`` further in the same row."""
-        return self.builder.gep(address, [self.columns.type(columns)])
-
-
 def matrix_of(context, builder, kind, matrix):
     """The ``Matrix`` of a numba array."""
     array = context.make_array(kind)(context, builder, matrix)
     return Matrix(builder, array.data, cgutils.unpack_tuple(builder, array.shape)[1])
-
-
-def read(builder, address, width):
-    """The vector at an address."""
-    return builder.load(builder.bitcast(address, vector_of(width).as_pointer()), align=8)
-
-
-def write(builder, vector, address):
-    """Store a vector at an address."""
-    builder.store(vector, builder.bitcast(address, vector.type.as_pointer()), align=8)
-
-
-@register_jitable
-def whole_registers(width, register):
-    """``width`` columns, rounded up to whole vector registers of ``register`` columns."""
-    return (width + register - 1) // register * register
 
 
 def load(matrix, row, column):
@@ -128,14 +70,8 @@ def store_down(matrix, row, column, stride, lanes):
 
 def store_row(matrix, row, column, numbers):
     """Write a tuple of numbers side by side, in registers padded with zeros."""
-    filled = sum(_widths(len(numbers)))
+    filled = sum(widths(len(numbers)))
     matrix[row, column : column + filled] = [*numbers, *[0.0] * (filled - len(numbers))]
-
-
-def _widths(count):
-    """Widths of the registers in which a row of ``count`` numbers is written."""
-    rest = count % WIDE
-    return [WIDE] * (count // WIDE) + ([] if rest == 0 else [NARROW if rest <= NARROW else WIDE])
 
 
 @overload(load, jit_options=HERE)
@@ -169,24 +105,6 @@ def _write_register(typing_context, matrix, row, column, lanes):
         return context.get_dummy_value()
 
     return types.void(matrix, types.intp, types.intp, kind), generate
-
-
-def write_down(builder, matrix, row, column, stride, lanes):
-    """The instructions of ``store_down``."""
-    address = matrix.address(row, column)
-    for lane in range(NARROW):
-        builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
-        address = builder.gep(address, [stride])
-
-
-def write_row(builder, matrix, row, column, numbers):
-    """The instructions of ``store_row``."""
-    address = matrix.address(row, column)
-    for i, width in enumerate(_widths(len(numbers))):
-        vector = vector_of(width)([0.0] * width)
-        for lane, value in enumerate(numbers[WIDE * i : WIDE * (i + 1)]):
-            vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
-        write(builder, vector, matrix.beside(address, WIDE * i))
 
 
 def square_root(lanes):

@@ -11,7 +11,7 @@ from hybrid.kernels.types.codes import (
     RUNGE_KUTTA,
     STALE,
 )
-from hybrid.kernels.types.layout import KERNEL
+from hybrid.kernels.types.options import KERNEL
 
 # A vector that is shorter than this share of the terms that make it up along itself is only rounding.
 COLLAPSED = 1e-13

@@ -10,7 +10,7 @@ step's variable, one column per component.
 
 import math
 
-from numba import float64, int64, njit
+from numba import njit
 
 from hybrid.kernels.arithmetic import operations as op
 from hybrid.kernels.arithmetic.intervals import (
@@ -27,7 +27,9 @@ from hybrid.kernels.arithmetic.intervals import (
     whole_power,
 )
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, MATRIX, PART, PROGRAMS, VECTOR
+from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR
+from hybrid.kernels.types.layout import EPSILON, Programs
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # Over a radius this large the mean value theorem makes no range narrower.
 FAR = 1e300
@@ -298,10 +300,7 @@ def _constant_leaf(programs, place, row):
     return code == op.NUMBER or code == op.PARAMETER
 
 
-@njit(
-    int64(PROGRAMS, int64, MATRIX, int64, int64, float64, float64, float64, float64, MATRIX),
-    **PART,
-)
+@exported(INTEGER, Programs, INTEGER, MATRIX, INTEGER, INTEGER, REAL, REAL, REAL, REAL, MATRIX)
 def bound_guard(programs, transition, path, order, clock, start, pace, middle, radius, registers):
     """Bounds of a guard over ``middle +- radius`` on a path; returns their row in ``registers``.
 
@@ -322,7 +321,7 @@ def bound_guard(programs, transition, path, order, clock, start, pace, middle, r
     return _run(programs, transition, registers, radius)
 
 
-@njit(float64(PROGRAMS, int64, float64, float64, VECTOR, VECTOR, float64, MATRIX), **PART)
+@exported(REAL, Programs, INTEGER, REAL, REAL, VECTOR, VECTOR, REAL, MATRIX)
 def spread_by_rounding(programs, transition, t, clock, x, scale, share, registers):
     """How far a guard may be from its value at ``(t, x)`` when each argument is off by its rounding.
 

@@ -22,7 +22,8 @@ from hybrid.kernels.types.codes import (
     LOW_MIDDLE,
     MOST_SLOPE,
 )
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Returned instead of a place on the step if there is none.
 NOWHERE = -1.0

@@ -5,7 +5,8 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import lowest
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Rounding error that a component of the state may have, as a multiple of EPSILON times its size.
 ROUNDING_OF_STATE = 16

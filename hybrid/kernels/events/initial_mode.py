@@ -2,11 +2,13 @@
 
 import math
 
-from numba import int64, njit
+from numba import njit
 
 from hybrid.kernels.events.guards import allowed, guard_value
 from hybrid.kernels.types.codes import BEYOND, LEAVES, NO_OBJECTION, NO_TRANSITION
-from hybrid.kernels.types.layout import ENTRY, INDICES, KERNEL, MODEL, PARTS, RUN, WORK
+from hybrid.kernels.types.kinds import INDICES, INTEGER
+from hybrid.kernels.types.layout import Model, Parts, Run, Work
+from hybrid.kernels.types.options import KERNEL, exported
 
 
 @njit(**KERNEL)
@@ -36,7 +38,7 @@ def verdicts_on(parts, model, run, work, first, stop, verdicts):
     return NO_TRANSITION
 
 
-@njit(int64(PARTS, MODEL, RUN, WORK, int64, int64, INDICES), **ENTRY)
+@exported(INTEGER, Parts, Model, Run, Work, INTEGER, INTEGER, INDICES)
 def try_modes(parts, model, run, work, first, stop, verdicts):
     """As :func:`verdicts_on`, for calls from Python."""
     return verdicts_on(parts, model, run, work, first, stop, verdicts)

@@ -1,6 +1,6 @@
 """Runs from many starts, one after another, without leaving the compiled code."""
 
-from numba import int64, njit, types
+from numba import njit
 
 from hybrid.kernels.events.initial_mode import verdicts_on
 from hybrid.kernels.types.codes import (
@@ -15,18 +15,9 @@ from hybrid.kernels.types.codes import (
     REFUSED,
     ROOTED,
 )
-from hybrid.kernels.types.layout import (
-    ADVANCE,
-    CUBE,
-    ENTRY,
-    INDEX_MATRIX,
-    INDICES,
-    KERNEL,
-    MATRIX,
-    PARTS,
-    TASK,
-    VECTOR,
-)
+from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, VECTOR
+from hybrid.kernels.types.layout import ADVANCE, Parts, Task
+from hybrid.kernels.types.options import KERNEL, exported
 
 
 @njit(**KERNEL)
@@ -80,29 +71,28 @@ def is_plain(run, verdicts):
     return notes == 0
 
 
-@njit(
-    types.UniTuple(int64, 2)(
-        ADVANCE,
-        PARTS,
-        TASK,
-        INDICES,
-        INDICES,
-        INDICES,
-        INDICES,
-        MATRIX,
-        INDICES,
-        VECTOR,
-        int64,
-        int64,
-        int64,
-        int64,
-        int64,
-        int64,
-        CUBE,
-        INDEX_MATRIX,
-        INDICES,
-    ),
-    **ENTRY,
+@exported(
+    INTEGER,
+    ADVANCE,
+    Parts,
+    Task,
+    INDICES,
+    INDICES,
+    INDICES,
+    INDICES,
+    MATRIX,
+    INDICES,
+    VECTOR,
+    INTEGER,
+    INTEGER,
+    INTEGER,
+    INTEGER,
+    INTEGER,
+    INTEGER,
+    CUBE,
+    INDEX_MATRIX,
+    INDICES,
+    INDICES,
 )
 def many_runs(
     advance,
@@ -124,17 +114,19 @@ def many_runs(
     states,
     places,
     verdicts,
+    reached,
 ):
     """The states ``(N, S, n)`` of runs from the ``origins (N, n)`` at ``S`` times, the last one their end.
 
     ``run_words`` and ``work_words`` are the memory of run and work, ``fresh_run`` and ``fresh_work`` what
     that holds at the start. ``places (N, 3)`` gets the mode, the number of jumps and the number of states
-    reached. Returns the first run that is not complete, or of which there is something to tell, with its
-    code; REFUSED as the code if it cannot start, GO_ON if the ``budget`` of steps was used up, after which
-    the next call resumes the run: ``resumed``.
+    reached. Stops at the first run that is not complete, or of which there is something to tell: its index
+    goes into ``reached (1,)``. Returns the code of that run; REFUSED if it cannot start, GO_ON if the
+    ``budget`` of steps was used up, after which the next call resumes the run: ``resumed``.
     """
     run, n = task.run, task.model.dimension
     for i in range(begin, origins.shape[0]):
+        reached[0] = i
         if i > begin or resumed == 0:
             set_words(run_words, fresh_run)
             set_words(work_words, fresh_work)
@@ -144,7 +136,7 @@ def many_runs(
             places[i, 2] = 0
             mode = mode_of_start(parts, task, named, verdicts)
             if mode == NO_MODE:
-                return i, REFUSED
+                return REFUSED
             run.mode = mode
         for s in range(places[i, 2], cycles.shape[0]):
             before = run.steps
@@ -152,13 +144,14 @@ def many_runs(
             code = advance(parts, task, cycles[s], phases[s], most, max_jumps)
             budget -= run.steps - before
             if code == MAX_STEPS and most < max_steps:
-                return i, GO_ON
+                return GO_ON
             if code != DONE:
-                return i, code
+                return code
             for c in range(n):
                 states[i, s, c] = run.y[c]
             places[i, 2] = s + 1
         places[i, 0], places[i, 1] = run.mode, run.jumps
         if not is_plain(run, verdicts):
-            return i, DONE
-    return origins.shape[0], DONE
+            return DONE
+    reached[0] = origins.shape[0]
+    return DONE

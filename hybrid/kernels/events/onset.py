@@ -21,7 +21,7 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.types.layout import INLINE
+from hybrid.kernels.types.options import INLINE
 
 # Orders of a guard that is zero: its speed, its acceleration or the next step shows the side to which it
 # leaves. A guard of the last order jumps across zero and is not small.

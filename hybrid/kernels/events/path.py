@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.types.layout import INLINE, KERNEL
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 
 @njit(**INLINE)

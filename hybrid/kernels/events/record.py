@@ -3,7 +3,7 @@
 from numba import njit
 
 from hybrid.kernels.events.guards import allowed, keep_grazing
-from hybrid.kernels.types.layout import KERNEL
+from hybrid.kernels.types.options import KERNEL
 
 
 @njit(**KERNEL)

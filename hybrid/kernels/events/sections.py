@@ -1,34 +1,26 @@
 """Stroboscopic points of a run, computed without leaving the compiled code."""
 
-from numba import float64, int64, njit, types
-
 from hybrid.kernels.types.codes import DONE
-from hybrid.kernels.types.layout import (
-    ADVANCE,
-    ENTRY,
-    INDEX_MATRIX,
-    MATRIX,
-    PARTS,
-    TASK,
-)
+from hybrid.kernels.types.kinds import INDEX_MATRIX, INDICES, INTEGER, MATRIX, REAL
+from hybrid.kernels.types.layout import ADVANCE, Parts, Task
+from hybrid.kernels.types.options import exported
 
 
-@njit(
-    types.UniTuple(int64, 2)(ADVANCE, PARTS, TASK, float64, int64, int64, MATRIX, INDEX_MATRIX),
-    **ENTRY,
-)
-def strobe(advance, parts, task, phase, max_steps, max_jumps, states, places):
+@exported(INTEGER, ADVANCE, Parts, Task, REAL, INTEGER, INTEGER, MATRIX, INDEX_MATRIX, INDICES)
+def strobe(advance, parts, task, phase, max_steps, max_jumps, states, places, reached):
     """State ``(N, n)``, and cycle, mode and jump count ``(N, 3)``, at ``phase`` of the next N cycles.
 
-    Returns the number of points reached, and the driver's code.
+    Returns the driver's code; the number of points reached goes into ``reached (1,)``.
     """
     model, run = task.model, task.run
     for done in range(states.shape[0]):
+        reached[0] = done
         cycle = run.cycle + 1
         code = advance(parts, task, cycle, phase, max_steps, max_jumps)
         if code != DONE:
-            return done, code
+            return code
         for i in range(model.dimension):
             states[done, i] = run.y[i]
         places[done, 0], places[done, 1], places[done, 2] = cycle, run.mode, run.jumps
-    return states.shape[0], DONE
+    reached[0] = states.shape[0]
+    return DONE

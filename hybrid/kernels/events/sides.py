@@ -16,7 +16,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
-from hybrid.kernels.types.layout import KERNEL
+from hybrid.kernels.types.options import KERNEL
 
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
 STARTED, FLOWED, LANDED = range(3)

@@ -7,7 +7,8 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
 from hybrid.kernels.jumps.rounds import fired_before
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Rows of Run.trail, written by the previous jump. The last column holds a time or a speed.
 BEFORE = 0

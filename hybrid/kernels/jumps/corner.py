@@ -1,6 +1,6 @@
 """One instant: which transition fires next, and whether the order of those reached together matters."""
 
-from numba import int64, njit
+from numba import njit
 
 from hybrid.kernels.events.guards import (
     acceleration_rounding,
@@ -20,7 +20,9 @@ from hybrid.kernels.types.codes import (
     NO_TRANSITION,
     STALE,
 )
-from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, RUN, TASK, WORK
+from hybrid.kernels.types.kinds import INTEGER
+from hybrid.kernels.types.layout import Model, Run, Task, Work
+from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
 MOST_JUMPS = 50
@@ -28,7 +30,7 @@ MOST_JUMPS = 50
 SAME = 1e-9
 
 
-@njit(int64(MODEL, RUN, WORK), **ENTRY)
+@exported(INTEGER, Model, Run, Work)
 def enter(model, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
@@ -114,7 +116,7 @@ def turns_back(model, run, transition, before, work):
     return acceleration * before > acceleration_rounding(model, run, t, work)
 
 
-@njit(int64(TASK, int64), **PART)
+@exported(INTEGER, Task, INTEGER)
 def first_in_order(task, fired):
     """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
 

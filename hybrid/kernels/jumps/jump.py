@@ -2,7 +2,7 @@
 
 import math
 
-from numba import boolean, float64, int64, njit, void
+from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward
 from hybrid.kernels.arithmetic.tangent import (
@@ -47,7 +47,9 @@ from hybrid.kernels.types.codes import (
     NO_TRANSITION,
     TRANSVERSE,
 )
-from hybrid.kernels.types.layout import ENTRY, KERNEL, MODEL, PART, TASK, VECTOR, WORK
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH, VECTOR
+from hybrid.kernels.types.layout import Model, Task, Work
+from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
 
@@ -76,7 +78,7 @@ def cross(model, transition, mode, t, x_minus, x_plus, work):
     return transversality
 
 
-@njit(float64(MODEL, int64, int64, float64, VECTOR, VECTOR, WORK), **ENTRY)
+@exported(REAL, Model, INTEGER, INTEGER, REAL, VECTOR, VECTOR, Work)
 def saltation(model, transition, mode, t, x_minus, x_plus, work):
     """Saltation matrix into ``work.saltation (n, n)`` and the state after the jump into ``x_plus (n,)``.
 
@@ -271,7 +273,7 @@ def recall_map(model, run, tangents, work):
     keep_map(run, n, work)
 
 
-@njit(void(TASK, int64), **PART)
+@exported(None, Task, INTEGER)
 def jump(task, transition):
     """Make a jump at the current point of the run: state, tangent vectors, counters, record.
 
@@ -401,7 +403,7 @@ def follow_rounds(task, remaining):
     return True
 
 
-@njit(boolean(TASK, int64, float64), **PART)
+@exported(TRUTH, Task, INTEGER, REAL)
 def finish_chatter(task, transition, remaining):
     """After a jump: go to the limit if jumps accumulate before the end of the run; returns whether it did.
 
@@ -412,7 +414,7 @@ def finish_chatter(task, transition, remaining):
     return follow_rounds(task, remaining)
 
 
-@njit(void(TASK, int64), **PART)
+@exported(None, Task, INTEGER)
 def rest(task, limit_mode):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     _, model, _, run, _, work = task_of(task)

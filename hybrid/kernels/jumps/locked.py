@@ -13,7 +13,7 @@ the next ``P``, whatever the guard of that jump does: its saltation matrix would
 from numba import njit
 
 from hybrid.kernels.arithmetic.tangent import multiply, solve
-from hybrid.kernels.types.layout import KERNEL
+from hybrid.kernels.types.options import KERNEL
 
 
 @njit(**KERNEL)

@@ -9,7 +9,8 @@ from numba import njit
 
 from hybrid.kernels.events.guards import guard_value
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Largest number of transitions in a round, and number of rounds that must have occurred.
 MOST_IN_TURN = 8

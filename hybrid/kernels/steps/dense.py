@@ -1,11 +1,12 @@
 """States between the ends of steps: the polynomials of a record, evaluated."""
 
-from numba import int64, njit, void
+from numba import int64, njit
 
 from hybrid.kernels.arithmetic.clock import IN_ORDER
 from hybrid.kernels.events.path import value_at
 from hybrid.kernels.steps.series_guards import time_of
-from hybrid.kernels.types.layout import CUBE, ENTRY, INDICES, KERNEL, MATRIX, VECTOR
+from hybrid.kernels.types.kinds import CUBE, INDICES, MATRIX, VECTOR
+from hybrid.kernels.types.options import KERNEL, exported
 
 
 @njit(**KERNEL)
@@ -47,7 +48,7 @@ def degree_of_all(polynomials):
     return degree
 
 
-@njit(void(VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, INDICES), **ENTRY)
+@exported(None, VECTOR, VECTOR, VECTOR, VECTOR, CUBE, MATRIX, INDICES)
 def states_at(times, start, low, span, coefficients, states, steps):
     """States ``(N, n)`` at times ``(N,)`` and the step that each was taken from; at a jump, after it.
 

@@ -12,7 +12,7 @@ it is so over many steps to come, they cost nothing.
 
 import math
 
-from numba import float64, int64, njit
+from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program
@@ -26,7 +26,9 @@ from hybrid.kernels.types.codes import (
     MOST_SLOPE,
     NARROW,
 )
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL, METHOD, MODEL, PART, RUN, WORK
+from hybrid.kernels.types.kinds import INTEGER, REAL
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # Verdicts on a piece of a step.
 EXPLAINED, UNKNOWN, HIDDEN = range(3)
@@ -281,7 +283,7 @@ def _unresolved(run, longest, shortest):
     return min(longest, shortest) if run.unresolved <= MOST_UNRESOLVED else longest
 
 
-@njit(float64(MODEL, METHOD, RUN, float64, WORK), **PART)
+@exported(REAL, Model, Method, Run, REAL, Work)
 def explained_step(model, method, run, h, work):
     """The length up to ``h`` of a step whose stages explain the forcing."""
     return _longest_explained(model, method, run, work.path, 0, -1, method.nodes, h, work)
@@ -368,7 +370,7 @@ def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
     return True
 
 
-@njit(float64(MODEL, METHOD, RUN, int64, int64, int64, float64, WORK), **PART)
+@exported(REAL, Model, Method, Run, INTEGER, INTEGER, INTEGER, REAL, Work)
 def explained_series(model, method, run, tangents, order, clock, h, work):
     """The length up to ``h`` of a step on which the series follows the forcing; nan if it is not finite."""
     if not _is_finite(model, run.mode, tangents, order, work):

@@ -7,11 +7,13 @@ the end of the step, so the last of them is the derivative there.
 
 import math
 
-from numba import float64, int64, njit
+from numba import njit
 
 from hybrid.kernels.arithmetic.linear import factorise, substitute
 from hybrid.kernels.steps.step import combine, error_ratio, estimate_error
-from hybrid.kernels.types.layout import KERNEL, METHOD, MODEL, PART, VECTOR, WORK
+from hybrid.kernels.types.kinds import INTEGER, REAL, VECTOR
+from hybrid.kernels.types.layout import Method, Model, Work
+from hybrid.kernels.types.options import KERNEL, exported
 
 MOST_ITERATIONS = 10
 # An iteration that no longer contracts has reached rounding if its last change is below this share of the
@@ -167,7 +169,7 @@ def solve_tangents(model, method, mode, t, h, y, tangents, work):
     return True
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
+@exported(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
 def attempt_radau(model, method, mode, t, h, y, tangents, work):
     """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
 

@@ -2,7 +2,7 @@
 
 import math
 
-from numba import float64, njit, types
+from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
@@ -26,13 +26,9 @@ from hybrid.kernels.types.codes import (
     STALE,
     STEP_TOO_SMALL,
 )
-from hybrid.kernels.types.layout import (
-    EPSILON,
-    INLINE,
-    KERNEL,
-    PART,
-    TASK,
-)
+from hybrid.kernels.types.kinds import REAL, Pair
+from hybrid.kernels.types.layout import EPSILON, Task
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
 SAFETY = 0.9
@@ -195,7 +191,7 @@ def alignment_ratio(method, n, tangents, work):
     return (-0.5 * math.log(product) / CLOSEST) ** (1.0 / method.exponent)
 
 
-@njit(types.UniTuple(float64, 2)(TASK, float64), **PART)
+@exported(Pair(REAL), Task, REAL)
 def runge_kutta_step(task, remaining):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 

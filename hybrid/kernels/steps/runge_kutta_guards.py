@@ -17,7 +17,8 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Below this share of the step, one Euler step completes a correction: the error left is its square.
 EULER_IS_ENOUGH = 1e-8

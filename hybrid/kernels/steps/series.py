@@ -21,12 +21,12 @@ from hybrid.kernels.arithmetic.lanes import (
     magnitude,
     square_root,
     store,
-    whole_registers,
 )
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.path import state_at, time_at, value_at
 from hybrid.kernels.events.record import remember_grazing, start_record
+from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.steps.series_guards import (
     earliest_on_series,
     expanded_at,
@@ -47,7 +47,8 @@ from hybrid.kernels.types.codes import (
     STEP_TOO_SMALL,
     WIDE,
 )
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 from hybrid.kernels.types.task import task_of
 
 # Series that can be trusted to the last digit are cut off below rounding.

@@ -26,7 +26,8 @@ from hybrid.kernels.types.codes import (
     NO_TRANSITION,
     ROOTED,
 )
-from hybrid.kernels.types.layout import EPSILON, INLINE, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Safety factor for the estimated error of the last step towards a root.
 UNSEEN = 64.0

@@ -2,20 +2,11 @@
 
 import math
 
-from numba import float64, int64, njit, types, void
+from numba import njit
 
-from hybrid.kernels.types.layout import (
-    ENTRY,
-    INLINE,
-    KERNEL,
-    MATRIX,
-    METHOD,
-    MODEL,
-    PART,
-    TASK,
-    VECTOR,
-    WORK,
-)
+from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR, Pair
+from hybrid.kernels.types.layout import Method, Model, Task, Work
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # At the start of a run, a state below this many tolerances counts as this large.
 MANY_TOLERANCES = 1e4
@@ -50,13 +41,13 @@ def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
             out[first + i] = rate
 
 
-@njit(void(MODEL, int64, float64, VECTOR, VECTOR), **ENTRY)
+@exported(None, Model, INTEGER, REAL, VECTOR, VECTOR)
 def field_at(model, mode, t, x, out):
     """``f`` into ``out (n,)``."""
     model.field(mode, t, x, model.parameters, out)
 
 
-@njit(void(MODEL, int64, float64, VECTOR, MATRIX), **ENTRY)
+@exported(None, Model, INTEGER, REAL, VECTOR, MATRIX)
 def jacobian_at(model, mode, t, x, out):
     """``(D_x f, D_t f)`` into ``out (n, n + 1)``."""
     model.field_jacobian(mode, t, x, model.parameters, out)
@@ -215,13 +206,13 @@ def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
     return attempt(parts, model, method, mode, t, h, y, tangents, work)
 
 
-@njit(types.UniTuple(float64, 2)(TASK, float64), **PART)
+@exported(Pair(REAL), Task, REAL)
 def no_step(task, remaining):
     """Stands in for the step of a Runge-Kutta method where every mode has a series."""
     return math.nan, 0.0
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK), **PART)
+@exported(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
 def no_attempt(model, method, mode, t, h, y, tangents, work):
     """Stands in for the implicit step where the method is explicit."""
     return math.nan

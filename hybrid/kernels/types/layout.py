@@ -1,25 +1,28 @@
-"""The structures that kernels pass around, and their numba types.
+"""The structures that kernels pass around.
 
 A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the state first, then ``k`` tangent vectors
 one after the other, so that each of them is contiguous. ``n`` is the dimension, ``k`` the number of tangents.
 """
 
-from numba import boolean, float64, int64, types, void
-
-from hybrid.kernels.types.options import Options, PartCompiler
+from hybrid.kernels.types.kinds import (
+    CUBE,
+    INDEX_MATRIX,
+    INDICES,
+    INTEGER,
+    MATRIX,
+    REAL,
+    TRUTH,
+    VECTOR,
+    Pair,
+    function,
+)
 from hybrid.kernels.types.structure import Structure
 
 EPSILON = 2.220446049250313e-16
 
-VECTOR = float64[::1]
-MATRIX = float64[:, ::1]
-CUBE = float64[:, :, ::1]
-INDICES = int64[::1]
-INDEX_MATRIX = int64[:, ::1]
-
-VECTOR_FUNCTION = types.FunctionType(void(int64, float64, VECTOR, VECTOR, VECTOR))
-SERIES_FUNCTION = types.FunctionType(void(int64, float64, VECTOR, VECTOR, int64, MATRIX))
-MATRIX_FUNCTION = types.FunctionType(void(int64, float64, VECTOR, VECTOR, MATRIX))
+VECTOR_FUNCTION = function(None, INTEGER, REAL, VECTOR, VECTOR, VECTOR)
+SERIES_FUNCTION = function(None, INTEGER, REAL, VECTOR, VECTOR, INTEGER, MATRIX)
+MATRIX_FUNCTION = function(None, INTEGER, REAL, VECTOR, VECTOR, MATRIX)
 
 
 class Programs(Structure):
@@ -37,13 +40,9 @@ class Programs(Structure):
     parameters: VECTOR
 
 
-PROGRAMS = Programs.numba_type
-
 # ``bounds.bound_guard`` and ``bounds.spread_by_rounding``.
-BOUND = types.FunctionType(
-    int64(PROGRAMS, int64, MATRIX, int64, int64, float64, float64, float64, float64, MATRIX)
-)
-SPREAD = types.FunctionType(float64(PROGRAMS, int64, float64, float64, VECTOR, VECTOR, float64, MATRIX))
+BOUND = function(INTEGER, Programs, INTEGER, MATRIX, INTEGER, INTEGER, REAL, REAL, REAL, REAL, MATRIX)
+SPREAD = function(REAL, Programs, INTEGER, REAL, REAL, VECTOR, VECTOR, REAL, MATRIX)
 
 
 class Model(Structure):
@@ -80,7 +79,7 @@ class Model(Structure):
     reset_jacobian: MATRIX_FUNCTION
     series: SERIES_FUNCTION
     parameters: VECTOR
-    dimension: int64
+    dimension: INTEGER
     first_outgoing: INDICES
     outgoing: INDICES
     first_at_start: INDICES
@@ -89,7 +88,7 @@ class Model(Structure):
     direction: INDICES
     affine_guard: INDICES
     guard_in_series: INDICES
-    programs: PROGRAMS
+    programs: Programs
     bound: BOUND
     spread: SPREAD
     first_forcing: INDICES
@@ -105,12 +104,9 @@ class Model(Structure):
     degree: INDICES
     fragile: INDICES
     timed: INDICES
-    tangent_start: int64
+    tangent_start: INTEGER
     tangent_columns: INDICES
-    period: float64
-
-
-MODEL = Model.numba_type
+    period: REAL
 
 
 class Method(Structure):
@@ -139,15 +135,12 @@ class Method(Structure):
     nodes: VECTOR
     series_nodes: VECTOR
     series_weights: VECTOR
-    implicit: int64
-    order: int64
-    exponent: float64
-    rtol: float64
-    atol: float64
-    max_step: float64
-
-
-METHOD = Method.numba_type
+    implicit: INTEGER
+    order: INTEGER
+    exponent: REAL
+    rtol: REAL
+    atol: REAL
+    max_step: REAL
 
 
 COUNTERS = (
@@ -250,9 +243,6 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     instant: VECTOR
 
 
-RUN = Run.numba_type
-
-
 class Work(Structure):
     """Scratch memory, allocated once a run.
 
@@ -299,9 +289,6 @@ class Work(Structure):
     weights: MATRIX
 
 
-WORK = Work.numba_type
-
-
 class Record(
     Structure,
     used=("steps", "jumps", "grazings", "matrices"),
@@ -338,9 +325,6 @@ class Record(
     grazing_state: MATRIX
 
 
-RECORD = Record.numba_type
-
-
 class Attempts(Structure):
     """What a step may need: parts that are not compiled where they are not called.
 
@@ -348,12 +332,9 @@ class Attempts(Structure):
     shorten a step so that no pulse of the forcing is hidden from it.
     """
 
-    attempt_implicit: types.FunctionType(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
-    explained_step: types.FunctionType(float64(MODEL, METHOD, RUN, float64, WORK))
-    explained_series: types.FunctionType(float64(MODEL, METHOD, RUN, int64, int64, int64, float64, WORK))
-
-
-ATTEMPTS = Attempts.numba_type
+    attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
+    explained_step: function(REAL, Model, Method, Run, REAL, Work)
+    explained_series: function(REAL, Model, Method, Run, INTEGER, INTEGER, INTEGER, REAL, Work)
 
 
 class Task(Structure):
@@ -363,17 +344,14 @@ class Task(Structure):
     orthonormalised whenever they come too close to each other.
     """
 
-    attempts: ATTEMPTS
-    model: MODEL
-    method: METHOD
-    run: RUN
-    record: RECORD
-    work: WORK
-    tangents: int64
-    orthonormal: int64
-
-
-TASK = Task.numba_type
+    attempts: Attempts
+    model: Model
+    method: Method
+    run: Run
+    record: Record
+    work: Work
+    tangents: INTEGER
+    orthonormal: INTEGER
 
 
 class Parts(Structure):
@@ -383,33 +361,13 @@ class Parts(Structure):
     a Runge-Kutta method need not even be compiled where every mode has a series.
     """
 
-    runge_kutta_step: types.FunctionType(types.UniTuple(float64, 2)(TASK, float64))
-    enter: types.FunctionType(int64(MODEL, RUN, WORK))
-    jump: types.FunctionType(void(TASK, int64))
-    finish_chatter: types.FunctionType(boolean(TASK, int64, float64))
-    rest: types.FunctionType(void(TASK, int64))
-    first_in_order: types.FunctionType(int64(TASK, int64))
+    runge_kutta_step: function(Pair(REAL), Task, REAL)
+    enter: function(INTEGER, Model, Run, Work)
+    jump: function(None, Task, INTEGER)
+    finish_chatter: function(TRUTH, Task, INTEGER, REAL)
+    rest: function(None, Task, INTEGER)
+    first_in_order: function(INTEGER, Task, INTEGER)
 
-
-PARTS = Parts.numba_type
 
 # The driver itself comes as an argument to those who call it, for the same reason.
-ADVANCE = types.FunctionType(int64(PARTS, TASK, int64, float64, int64, int64))
-
-# How kernels are compiled. Sums may be reordered and fused, but nan and infinity keep their meaning in
-# comparisons (``math.isfinite`` takes the difference of a number and itself, which may be taken for zero).
-# Kernels allocate nothing and own nothing, so no references are counted.
-_MATHEMATICS = Options({"error_model": "numpy", "fastmath": {"contract", "reassoc", "nsz"}, "_nrt": False})
-# Called from Python, and kept on disk: these state their signatures.
-ENTRY = _MATHEMATICS | {"nogil": True, "cache": True}
-# Handed to the driver as a first-class function.
-PART = ENTRY | {"no_cpython_wrapper": True}
-# Called by other kernels only: it becomes part of them, so by itself it is neither wrapped nor kept nor made
-# machine code, and it takes its types from its callers. A process that finds these on disk never looks at it.
-KERNEL = _MATHEMATICS | {
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": PartCompiler,
-}
-# Small and called at every stage: the call would cost as much as the work.
-INLINE = KERNEL | {"forceinline": True}
+ADVANCE = function(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)

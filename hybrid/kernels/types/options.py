@@ -1,13 +1,12 @@
-"""How numba compiles a kernel that only becomes part of others: no further than to intermediate code.
+"""How numba compiles kernels: no further than to intermediate code.
 
 Numba optimises every function by itself and makes machine code of it, before it links the function into its
 callers and optimises it there again. Nobody calls the machine code of a part, and what is optimised in the
 caller need not be before, with few exceptions: both together are a third of the time that all kernels take.
+``export`` makes machine code of the kernels that Python calls or hands to other kernels.
 """
 
-from collections.abc import Mapping
-from contextvars import ContextVar
-
+from numba import njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
@@ -20,34 +19,6 @@ THOROUGHLY = (
     "hybrid.kernels.steps.series",
     "hybrid.kernels.steps.series_guards",
 )
-
-
-# Whether what is compiled now goes into a folder that is named after all sources of the kernels.
-INTO_FOLDER = ContextVar("INTO_FOLDER", default=False)
-
-
-class Options(Mapping):
-    """Keywords for ``njit``; a kernel is kept on disk only if ``INTO_FOLDER`` says so as it is decorated.
-
-    Numba would keep it beside its own file and take it from there again after another file has changed whose
-    functions are part of it.
-    """
-
-    def __init__(self, options):
-        self.options = options
-
-    def __getitem__(self, name):
-        option = self.options[name]
-        return option and INTO_FOLDER.get() if name == "cache" else option
-
-    def __iter__(self):
-        return iter(self.options)
-
-    def __len__(self):
-        return len(self.options)
-
-    def __or__(self, other):
-        return Options({**self.options, **other})
 
 
 class _NoEnvironment:
@@ -105,3 +76,32 @@ class PartCompiler(CompilerBase):
         pipeline.passes.insert(place, (_PartLowering, "choose the library of a part"))
         pipeline.finalize()
         return [pipeline]
+
+
+# Sums may be reordered and fused, but nan and infinity keep their meaning in comparisons (``math.isfinite``
+# takes the difference of a number and itself, which may be taken for zero). Kernels allocate nothing and own
+# nothing, so no references are counted.
+KERNEL = {
+    "error_model": "numpy",
+    "fastmath": {"contract", "reassoc", "nsz"},
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": PartCompiler,
+}
+# Small and called at every stage: the call would cost as much as the work.
+INLINE = KERNEL | {"forceinline": True}
+
+
+def exported(result, *arguments):
+    """Decorate a kernel that Python calls or hands to other kernels; the kinds are those of its signature.
+
+    For other kernels it is a function like any other, which becomes part of them.
+    """
+
+    def declare(function):
+        kernel = njit(**KERNEL)(function)
+        kernel.exported = result, arguments
+        return kernel
+
+    return declare

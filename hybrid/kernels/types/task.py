@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.types.layout import INLINE
+from hybrid.kernels.types.options import INLINE
 
 
 @njit(**INLINE)

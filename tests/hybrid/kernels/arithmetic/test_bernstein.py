@@ -10,12 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.arithmetic import bernstein
 
-KERNELS = load_kernels("hybrid.kernels.arithmetic.bernstein")
-NONE = KERNELS.NO_ROOT
-_first_crossing, _divide_by_theta, _stays = KERNELS.first_crossing, KERNELS.divide_by_theta, KERNELS.stays
-_value_and_slope = KERNELS.value_and_slope
+NONE = bernstein.NO_ROOT
+_first_crossing, _divide_by_theta, _stays = (
+    bernstein.first_crossing,
+    bernstein.divide_by_theta,
+    bernstein.stays,
+)
+_value_and_slope = bernstein.value_and_slope
 
 
 @njit

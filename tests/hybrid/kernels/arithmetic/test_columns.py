@@ -2,25 +2,26 @@
 
 import numpy as np
 import pytest
-from numba import float64, int64, njit, void
+from numba import njit
 
 from hybrid.kernels.arithmetic.columns import (
     evaluate,
     evaluate_with_sizes,
     gather_tangents,
 )
-from hybrid.kernels.types.layout import MATRIX
+from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL
+from hybrid.kernels.types.numba_types import signature_of
 from tests.hybrid.text import both
 
 NOTHING = np.zeros(1)
 
 
-@njit(void(MATRIX, int64, float64, int64, int64))
+@njit(signature_of(None, MATRIX, INTEGER, REAL, INTEGER, INTEGER))
 def compiled_evaluate(series, order, s, first, width):
     evaluate(series, order, s, first, width)
 
 
-@njit(void(MATRIX, int64, float64, int64, int64))
+@njit(signature_of(None, MATRIX, INTEGER, REAL, INTEGER, INTEGER))
 def compiled_evaluate_with_sizes(series, order, s, first, width):
     evaluate_with_sizes(series, order, s, first, width)
 

@@ -8,18 +8,17 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.arithmetic import intervals
 from hybrid.kernels.arithmetic import operations as op
 
-KERNELS = load_kernels("hybrid.kernels.arithmetic.intervals")
-_range, _slope = KERNELS.range_of, KERNELS.slope_of
+_range, _slope = intervals.range_of, intervals.slope_of
 _product, _quotient, _whole, _fixed = (
-    KERNELS.product,
-    KERNELS.quotient,
-    KERNELS.whole_power,
-    KERNELS.fixed_power,
+    intervals.product,
+    intervals.quotient,
+    intervals.whole_power,
+    intervals.fixed_power,
 )
-_angle = KERNELS.angle
+_angle = intervals.angle
 
 
 @njit

@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
-from numba import boolean, njit
+from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
-
-load_kernels()
-from hybrid.kernels.arithmetic.linear import factorise, substitute  # noqa: E402
-from hybrid.kernels.types.layout import INDICES, MATRIX, VECTOR  # noqa: E402
+from hybrid.kernels.arithmetic.linear import factorise, substitute
+from hybrid.kernels.types.kinds import INDICES, MATRIX, TRUTH, VECTOR
+from hybrid.kernels.types.numba_types import signature_of
 
 
-@njit(boolean(MATRIX, INDICES, VECTOR))
+@njit(signature_of(TRUTH, MATRIX, INDICES, VECTOR))
 def solve(matrix, pivots, vector):
     n = vector.shape[0]
     regular = factorise(matrix, pivots, n)

@@ -6,11 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.arithmetic import powers
 from hybrid.kernels.arithmetic.lanes import load, store
 
-KERNELS = load_kernels("hybrid.kernels.arithmetic.powers")
-_logarithms, _power = KERNELS.binary_logarithms, KERNELS.power_of_two
+_logarithms, _power = powers.binary_logarithms, powers.power_of_two
 
 
 @njit

@@ -8,12 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.arithmetic import tangent
 
-KERNELS = load_kernels("hybrid.kernels.arithmetic.tangent")
-_orthonormalise, _log_abs_determinant = KERNELS.orthonormalise, KERNELS.log_abs_determinant
-_solve, _strain = KERNELS.solve, KERNELS.strain
-_independence_kernel = KERNELS.independence
+_orthonormalise, _log_abs_determinant = tangent.orthonormalise, tangent.log_abs_determinant
+_solve, _strain = tangent.solve, tangent.strain
+_independence_kernel = tangent.independence
 
 
 @njit

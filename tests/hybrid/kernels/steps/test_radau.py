@@ -2,23 +2,20 @@
 
 import numpy as np
 import pytest
-from numba import float64, int64, njit
+from numba import njit
 
 import hybrid
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.steps.radau import NOT_SOLVED, attempt_radau
+from hybrid.kernels.types.kinds import INTEGER, REAL, VECTOR
+from hybrid.kernels.types.layout import Method, Model, Work
+from hybrid.kernels.types.numba_types import signature_of
 from hybrid.simulation.trajectory import start
-
-load_kernels()
-from hybrid.kernels.types.layout import METHOD, MODEL, VECTOR, WORK  # noqa: E402
-
-radau = load_kernels("hybrid.kernels.steps.radau")
-NOT_SOLVED, attempt_radau = radau.NOT_SOLVED, radau.attempt_radau
 
 # Newton's iteration to rounding; fixed steps ignore the error ratio.
 TIGHT = hybrid.RadauIIA(rtol=1e-13, atol=1e-14)
 
 
-@njit(float64(MODEL, METHOD, int64, float64, float64, VECTOR, int64, WORK))
+@njit(signature_of(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work))
 def attempt(model, method, mode, t, h, y, tangents, work):
     return attempt_radau(model, method, mode, t, h, y, tangents, work)
 

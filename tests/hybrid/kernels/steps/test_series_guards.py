@@ -8,13 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.steps import series_guards
 from hybrid.kernels.types.codes import HIGHEST_ORDER as ORDER
 
-KERNELS = load_kernels("hybrid.kernels.steps.series_guards")
-_judge, _to_bernstein, _leading = KERNELS.judge_leading, KERNELS.leading_to_bernstein, KERNELS.leading_powers
-_expanded_at, _root_between, _keeps_half = KERNELS.expanded_at, KERNELS.root_between, KERNELS.keeps_half
-CLEAR, CROSSES, UNKNOWN = KERNELS.CLEAR, KERNELS.CROSSES, KERNELS.UNKNOWN
+_judge, _to_bernstein, _leading = (
+    series_guards.judge_leading,
+    series_guards.leading_to_bernstein,
+    series_guards.leading_powers,
+)
+_expanded_at, _root_between, _keeps_half = (
+    series_guards.expanded_at,
+    series_guards.root_between,
+    series_guards.keeps_half,
+)
+CLEAR, CROSSES, UNKNOWN = series_guards.CLEAR, series_guards.CROSSES, series_guards.UNKNOWN
 
 
 @njit

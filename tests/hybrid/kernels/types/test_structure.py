@@ -1,32 +1,31 @@
 """Structures: a kernel reads the values that Python wrote."""
 
+import numba
 import numpy as np
 import pytest
 
-numba = pytest.importorskip("numba")
-from numba import float64, int64, types  # noqa: E402
-
-from hybrid.kernels.types.layout import CUBE, ENTRY, INDICES, MATRIX, VECTOR  # noqa: E402
-from hybrid.kernels.types.structure import Layout, Structure  # noqa: E402
+from hybrid.kernels.types.kinds import CUBE, INDICES, INTEGER, MATRIX, REAL, VECTOR, function
+from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.structure import Layout, Structure
 
 
-@numba.cfunc(float64(float64))
+@numba.cfunc(signature_of(REAL, REAL))
 def double(x):
     return 2.0 * x
 
 
 class Parcel(Structure):
-    count: int64
+    count: INTEGER
     vector: VECTOR
-    function: types.FunctionType(float64(float64))
+    function: function(REAL, REAL)
     matrix: MATRIX
-    size: float64
+    size: REAL
     cube: CUBE
 
 
 class Box(Structure):
     places: INDICES
-    parcel: Parcel.numba_type
+    parcel: Parcel
 
 
 def parcel():
@@ -40,7 +39,7 @@ def parcel():
     )
 
 
-@numba.njit(**ENTRY | {"cache": False})
+@numba.njit
 def read(box, out):
     inner = box.parcel
     out[0], out[1], out[2] = inner.count, inner.size, inner.function(inner.size)
@@ -164,15 +163,12 @@ class TestLayout:
 
 
 class Place(Structure, counters=("mode", "cycle"), numbers=("phase",), table_of=("first", "second", "third")):
-    counters: types.int64[::1]
-    numbers: types.float64[::1]
-    table_of: types.float64[:, ::1]
+    counters: INDICES
+    numbers: VECTOR
+    table_of: MATRIX
 
 
-PLACE = Place.numba_type
-
-
-@numba.njit(types.void(PLACE, types.float64[::1]))
+@numba.njit(signature_of(None, Place, VECTOR))
 def go_on(place, out):
     place.mode += 3
     place.cycle = place.mode * 2

@@ -1,0 +1,54 @@
+"""Machine code for this processor: the target that it is made for, and loading it into this process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import attrs
+from llvmlite import binding
+
+# LLVM's highest optimisation level.
+SPEED = 3
+
+
+@attrs.frozen(eq=False)
+class Compiled:
+    """A function of loaded machine code; ``needs`` keeps the code and the functions that it calls alive."""
+
+    address: int
+    needs: Any = attrs.field(repr=False)
+
+
+def _new_target() -> Any:
+    """LLVM's description of the processor of this machine."""
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding.Target.from_default_triple().create_target_machine(
+        cpu=binding.get_host_cpu_name(),
+        features=binding.get_host_cpu_features().flatten(),
+        opt=SPEED,
+        reloc="default",
+        codemodel="jitdefault",
+        jit=True,
+    )
+
+
+target = cache(_new_target)
+
+
+@cache
+def processor() -> str:
+    """LLVM's version and the processor, on which machine code depends."""
+    version = ".".join(map(str, binding.llvm_version_info))
+    return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
+
+
+def load(code: bytes, names: Sequence[str], needs: Sequence[Any] = ()) -> dict[str, Compiled]:
+    """The functions of an object file, ready to be called; ``needs`` are objects that must outlive them."""
+    # Each engine needs its own target, since it frees the target when it is freed itself.
+    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _new_target())
+    engine.add_object_file(binding.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return {name: Compiled(engine.get_function_address(name), (engine, *needs)) for name in names}

@@ -1,0 +1,113 @@
+"""Machine code of the kernels that Python calls or hands to other kernels.
+
+The code of a kernel is an object file with two functions. Other kernels call the first one, which takes the
+arguments as the compiler passes them. Python calls the second one, which takes the address of a table with
+the words of all arguments and returns a word. Neither function needs the compiler's run-time library, so a
+process that finds the file on disk never imports the compiler.
+"""
+
+from typing import Any, NamedTuple
+
+from llvmlite import ir
+from numba.core import types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
+
+from hybrid.kernels.types.kinds import Pair, width_of
+from hybrid.kernels.types.numba_types import array_in, numba_type, signature_of, word_in
+
+WORD = ir.IntType(64)
+# Behind the name of a kernel: the function that takes a table of words.
+BY_WORDS = "_by_words"
+
+
+class _ExportLibrary(JITCodeLibrary):
+    """A library whose machine code goes into a file, not into this process."""
+
+    def _finalize_final_module(self):
+        self._finalized = True
+
+    def machine_code(self):
+        """The contents of an object file."""
+        return self._codegen._tm.emit_object(self._final_module)
+
+
+class Export(NamedTuple):
+    """A kernel that a module exports, and the kinds of its signature."""
+
+    kernel: Any
+    result: Any
+    arguments: tuple
+
+
+def exports_of(module):
+    """The kernels that a module exports, by name."""
+    return {
+        name: Export(each, *each.exported)
+        for name, each in vars(module).items()
+        if hasattr(each, "exported") and each.py_func.__module__ == module.__name__
+    }
+
+
+@global_compiler_lock
+def object_code(name, kernel, result, arguments):
+    """Compile a kernel; the contents of an object file."""
+    signature = signature_of(result, *arguments)
+    kernel.compile(signature)
+    compiled = kernel.overloads[signature.args]
+    context = compiled.target_context
+    library = _ExportLibrary(context.codegen(), name)
+    library.add_linking_library(compiled.library)
+    module = context.create_module(name)
+    function = _write_typed(context, module, name, compiled.fndesc)
+    if not isinstance(result, Pair):
+        _write_by_words(context, module, function, result, arguments)
+    library.add_ir_module(module)
+    library.finalize()
+    return library.machine_code()
+
+
+def _write_typed(context, module, name, described):
+    """The function that other kernels call. Kernels raise nothing, so their status is not looked at."""
+    result, arguments = described.restype, described.argtypes
+    convention = context.call_conv
+    called = ir.Function(module, convention.get_function_type(result, arguments), described.llvm_func_name)
+    kind = ir.FunctionType(
+        context.get_value_type(result), [context.get_value_type(each) for each in arguments]
+    )
+    function = ir.Function(module, kind, name)
+    builder = ir.IRBuilder(function.append_basic_block("entry"))
+    _, value = convention.call_function(builder, called, result, arguments, function.args)
+    builder.ret(value)
+    return function
+
+
+def _write_by_words(context, module, called, result, arguments):
+    """The function that Python calls: it reads the arguments from a table, whose address it is given."""
+    kind = ir.FunctionType(WORD, [WORD.as_pointer()])
+    function = ir.Function(module, kind, called.name + BY_WORDS)
+    builder = ir.IRBuilder(function.append_basic_block("entry"))
+    [table] = function.args
+    values, place = [], 0
+    for argument in arguments:
+        values.append(_argument(context, builder, table, place, numba_type(argument)))
+        place += width_of(argument)
+    value = builder.call(called, values)
+    if result is None:
+        value = WORD(0)
+    elif value.type == ir.DoubleType():
+        value = builder.bitcast(value, WORD)
+    elif value.type != WORD:
+        value = builder.zext(value, WORD)
+    builder.ret(value)
+
+
+def _argument(context, builder, table, place, kind):
+    def word(offset, llvm_type):
+        return word_in(context, builder, table, place + offset, llvm_type)
+
+    if isinstance(kind, types.Array):
+        return array_in(context, builder, kind, word)
+    if kind == types.boolean:
+        return builder.trunc(word(0, WORD), ir.IntType(1))
+    return word(0, context.get_value_type(kind))
