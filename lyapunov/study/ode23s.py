@@ -60,7 +60,7 @@ class Ode23s:
     def steps(
         self, field: Any, y: ArrayLike, t_span: tuple[float, float], p: ArrayLike = (), most: int = 100_000
     ) -> Steps:
-        """All accepted steps for a compiled field ``f(t, y, p, out)`` of ``lyapunov.study.kernels.FIELD``."""
+        """All accepted steps for a compiled field ``f(t, y, p, out)``, an object with an ``address``."""
         y = np.array(y, dtype=float)
         record = np.full((most, 1 + len(y)), np.nan)
         counters = self._integrate(field, y, t_span, np.asarray(p, dtype=float), record)

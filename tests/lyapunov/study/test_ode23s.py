@@ -6,20 +6,21 @@ import subprocess
 
 import numpy as np
 import pytest
-from numba import float64, njit, void
+from numba import cfunc
 
 import models
 from hybrid import simulate
+from hybrid.kernels.types.kinds import REAL, VECTOR
+from hybrid.kernels.types.numba_types import signature_of
 from lyapunov.study.ode23s import Ode23s, StepTooSmall
 from lyapunov.study.runs import STARTS
 
-VECTOR = float64[::1]
 LINEAR = np.array([[-0.5, 3.0, 0.0], [-3.0, -0.5, 1.0], [0.0, 0.0, -40.0]])
 SPAN = (0.0, 2.0)
 
 
 def compiled(function):
-    return njit(void(float64, VECTOR, VECTOR, VECTOR))(function)
+    return cfunc(signature_of(None, REAL, VECTOR, VECTOR, VECTOR))(function)
 
 
 def linear(t, y, p, out):
