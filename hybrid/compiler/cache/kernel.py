@@ -10,7 +10,18 @@ from functools import cached_property
 from typing import Any
 
 from hybrid.compiler.llvm.engine import load
-from hybrid.kernels.types.kinds import INTEGER, NOTHING, REAL, TRUTH, kind_named, text_of, width_of, words_of
+from hybrid.kernels.types.kinds import (
+    INTEGER,
+    NOTHING,
+    REAL,
+    TRUTH,
+    Array,
+    Number,
+    kind_named,
+    text_of,
+    width_of,
+    words_of,
+)
 
 # Behind the name of a kernel: its function that takes a table of words, see ``hybrid.kernels.types.export``.
 BY_WORDS = "_by_words"
@@ -40,14 +51,23 @@ class Kernel:
     def __init__(self, name: str, code: bytes, result: str, arguments: list[str]) -> None:
         self.name, self._code, self._result = name, code, result
         kinds = [kind_named(each) for each in arguments]
-        self._words = [words_of(f"argument {i} of {name}", kind) for i, kind in enumerate(kinds)]
-        self._table = struct.Struct(f"{sum(map(width_of, kinds))}q")
+        # How each argument is converted: an address has None, and numbers are left to the table.
+        self._converters = [
+            words_of(f"argument {i} of {name}", kind) if isinstance(kind, Array) else kind
+            for i, kind in enumerate(kinds)
+        ]
+        self._table = struct.Struct("".join("d" if kind == REAL else width_of(kind) * "q" for kind in kinds))
 
     def __call__(self, *values: Any) -> Any:
         """Call the kernel; arrays are passed by their addresses."""
-        words: list[int] = []
-        for convert, value in zip(self._words, values, strict=True):
-            words += convert(value)
+        words: list[Any] = []
+        for value, converter in zip(values, self._converters, strict=True):
+            if converter is None:
+                words.append(value.address)
+            elif isinstance(converter, Number):
+                words.append(value)
+            else:
+                words += converter(value)
         return self._read(self._call(self._table.pack(*words)))
 
     @property

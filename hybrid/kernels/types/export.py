@@ -15,6 +15,7 @@ from numba.core.compiler_lock import global_compiler_lock
 
 from hybrid.kernels.types.kinds import Pair, width_of
 from hybrid.kernels.types.numba_types import array_in, numba_type, signature_of, word_in
+from hybrid.kernels.types.options import optimise
 
 WORD = ir.IntType(64)
 # Behind the name of a kernel: the function that takes a table of words.
@@ -23,6 +24,9 @@ BY_WORDS = "_by_words"
 
 class _ExportLibrary(JITCodeLibrary):
     """A library whose machine code goes into a file, not into this process."""
+
+    def _optimize_final_module(self):
+        optimise(self)
 
     def _finalize_final_module(self):
         self._finalized = True

@@ -5,6 +5,7 @@ Nothing here needs the compiler: a process that finds all machine code on disk n
 
 import re
 import struct
+from ctypes import addressof, c_char
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,7 +84,9 @@ def words_of(name, kind):
 
 def address_of(array):
     """Address of the first entry of an array."""
-    # Ten times as fast as its ctypes view.
+    if array.size and array.flags.writeable:
+        # Ten times as fast as the array's own interface.
+        return addressof(c_char.from_buffer(array))
     return array.__array_interface__["data"][0]
 
 

@@ -21,6 +21,15 @@ THOROUGHLY = (
 )
 
 
+def optimise(library):
+    """Optimise the module of a library once.
+
+    Numba itself does so twice, for the sake of reference counts, which kernels do not have.
+    """
+    passes, builder = library._codegen._module_pass_manager()
+    passes.run(library._final_module, builder)
+
+
 class _NoEnvironment:
     """Takes the place of a code generator where there is no machine code to give an environment to."""
 
@@ -36,7 +45,7 @@ class _PartLibrary(JITCodeLibrary):
 
     def _optimize_final_module(self):
         if self.thoroughly:
-            super()._optimize_final_module()
+            optimise(self)
 
     def _finalize_final_module(self):
         self._finalize_dynamic_globals()
