@@ -151,9 +151,7 @@ def error_as_documented(means):
     r = sum(y[1:] * y[:-1]) / sum(y**2)
     r = min(max(r + (1 + 3 * r) / len(y), 0.0), 0.9)
     # Spectrum of first-order autoregressive noise, relative to frequency zero.
-    share = np.mean(
-        [abs((1 - r) / (1 - r * np.exp(1j * np.pi * j / len(y)))) ** 2 for j in range(1, nu + 1)]
-    )
+    share = np.mean([abs((1 - r) / (1 - r * np.exp(1j * np.pi * j / len(y)))) ** 2 for j in range(1, nu + 1)])
     return np.sqrt(mean_square / (share * b)) * t.ppf(norm.cdf(2.0), nu) / 2
 
 
