@@ -171,6 +171,15 @@ class TestWholeNumbers:
         arc = simulate(opaque, (1.0,), (0.0, 1.0))
         assert arc.x[-1, 0] == pytest.approx(math.exp(-1.0), abs=1e-9)
 
+    def test_large_defaults_are_real_and_small_ones_stay_whole(self):
+        def field(t, x, p, large=7_000_000_000, whole=1, real=2.5):
+            return (-x.q * PAIR[whole] / 2.0 * (large * large) / 4.9e19 * real / 2.5 if p.k > 0 else x.q,)
+
+        opaque = system(field, state=("q",))
+        assert compile_system(opaque).emitted.opaque
+        arc = simulate(opaque, (1.0,), (0.0, 1.0))
+        assert arc.x[-1, 0] == pytest.approx(math.exp(-1.0), abs=1e-9)
+
     def test_negative_powers(self):
         def field(t, x, p):
             return (-x.q * TEN**MINUS_TWO * 100 if p.k > 0 else x.q,)
