@@ -298,12 +298,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--coverage", type=Path, help="coverage with one context per test")
     given = parser.parse_args(arguments)
     coverage = Coverage(given.coverage) if given.coverage else None
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
 
     def tests_of(fault: Fault) -> list[str]:
         if coverage is None:
             return nearest_tests(fault.path)
         # Tests of the same name may be newer than the coverage.
-        own = [str(p.relative_to(ROOT)) for p in (ROOT / "tests").rglob(f"test_{fault.path.stem}.py")]
+        own = [str(p.relative_to(ROOT)) for p in files if p.stem == f"test_{fault.path.stem}"]
         others = [test for test in coverage.nearest(fault) if test.split("::")[0] not in own]
         return own + others if own or others else nearest_tests(fault.path)
 
