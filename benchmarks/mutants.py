@@ -39,7 +39,7 @@ OTHER_COMPARISON = {
 }
 # Most test files to run per fault, and most tests if they are known by their coverage.
 MOST_TESTS = 4
-MOST_COVERING = 20
+MOST_COVERING = 40
 # Tests of files that names and imports do not lead to.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
