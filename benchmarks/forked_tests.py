@@ -145,7 +145,18 @@ class Copy:
             from hybrid.compiler.cache import store
 
             vars(store)["_tracer"] = lambda: "unchanged"
-        options = ["-x", "-q", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:cov", "-p", "no:xdist", "--no-header"]
+        options = [
+            "-x",
+            "-q",
+            "--assert=plain",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:cov",
+            "-p",
+            "no:xdist",
+            "--no-header",
+        ]
         return int(pytest.main([*options, *tests], plugins=[FirstFailure()]))
 
 

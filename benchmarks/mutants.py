@@ -39,7 +39,7 @@ OTHER_COMPARISON = {
 }
 # Most test files to run per fault, and most tests if they are known by their coverage.
 MOST_TESTS = 4
-MOST_COVERING = 40
+MOST_COVERING = 30
 # Tests of files that names and imports do not lead to.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
@@ -293,7 +293,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("files", nargs="+", type=Path, help="sources, relative to the top of the project")
     parser.add_argument("--each", type=int, default=8, help="number of random faults per file")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=int, default=200, help="limit of the processor time of the tests per fault")
+    parser.add_argument(
+        "--seconds", type=int, default=200, help="limit of the processor time of the tests per fault"
+    )
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--coverage", type=Path, help="coverage with one context per test")
     given = parser.parse_args(arguments)

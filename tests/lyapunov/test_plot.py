@@ -102,7 +102,10 @@ def test_signs_tell_the_kinds_of_motion(forced, found):
 def test_three_exponents_of_zero_are_a_torus_too():
     rows = [[(0.1, 0.0, -0.1), (0.0, -1.0, -1.0)], [(-1.0, -1.0, -1.0), (-np.inf, -np.inf, -np.inf)]]
     found = kinds(made(rows, 0.2, "no"))
-    assert [[KINDS[i] for i in row] for row in found.values] == [["torus", "periodic"], ["at rest", "at rest"]]
+    assert [[KINDS[i] for i in row] for row in found.values] == [
+        ["torus", "periodic"],
+        ["at rest", "at rest"],
+    ]
     assert found.attrs["flag_values"] == [0, 1, 2, 3, 4]
     assert found.attrs["flag_meanings"] == "not_known at rest periodic torus chaotic"
 

@@ -71,8 +71,6 @@ def test_a_run_has_the_exponents_of_its_fundamental_matrix(span):
         methods={"DOP853": hybrid.DOP853()},
         tangent=True,
         repeats=1,
-        reference=hybrid.Answer(
-            state=np.exp([-3.0 * span, -0.5 * span]), exponents=np.array([-0.5, -3.0])
-        ),
+        reference=hybrid.Answer(state=np.exp([-3.0 * span, -0.5 * span]), exponents=np.array([-0.5, -3.0])),
     )
     assert max(rows.error["exponents"]) < 1e-8

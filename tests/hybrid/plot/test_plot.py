@@ -125,9 +125,7 @@ def test_an_orbit_is_drawn_over_the_components_asked_for(options, components):
     np.testing.assert_array_equal(start, [orbit.x0[[*components]]])
     names = orbit.system.state_names
     assert (axes.get_xlabel(), axes.get_ylabel()) == tuple(names[i] for i in components)
-    assert axes.get_title(loc="left") == (
-        f"period 6.28319, largest multiplier {orbit.multipliers[0]:.4g}"
-    )
+    assert axes.get_title(loc="left") == (f"period 6.28319, largest multiplier {orbit.multipliers[0]:.4g}")
 
 
 def test_an_orbit_of_one_component_is_drawn_over_itself():

@@ -81,7 +81,9 @@ def test_random_expressions_keep_their_values(seed, thorough):
 def test_powers(exponent, halves):
     power = A ** sympy.Rational(exponent, halves)
     for a in (0.7, 1.9):
-        np.testing.assert_allclose(run([power, B * power], a, 3.0, 0.0), [a ** (exponent / halves) * k for k in (1, 3)])
+        np.testing.assert_allclose(
+            run([power, B * power], a, 3.0, 0.0), [a ** (exponent / halves) * k for k in (1, 3)]
+        )
 
 
 @pytest.mark.parametrize(
@@ -100,11 +102,11 @@ def test_powers(exponent, halves):
         (sympy.sqrt(A), "sqrt(a)"),
         (1 / sympy.sqrt(A), "1.0/sqrt(a)"),
         (A**3, "a*a*a"),
-        (A**sympy.Rational(3, 2), "a*sqrt(a)"),
+        (A ** sympy.Rational(3, 2), "a*sqrt(a)"),
         (A**B, "a**b"),
         ((A + 1) ** B, "(a + 1.0)**b"),
         (A ** (-B), "a**(-b)"),
-        (A**sympy.Rational(1, 3), "a**0.3333333333333333"),
+        (A ** sympy.Rational(1, 3), "a**0.3333333333333333"),
         (exp2(A + B), "2.0**(b + a)"),
         (sympy.exp(A + B), "exp(b + a)"),
         (Less(A, B), "(1.0 if a < b else 0.0)"),
