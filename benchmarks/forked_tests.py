@@ -1,7 +1,7 @@
-"""Run chosen tests on a copy of the sources in which one file is changed, each time in a fork of this process.
+"""Run chosen tests on a copy of the sources in which one file is changed, each time in a fork of a process.
 
-This process has imported the packages that the library rests on, but not the library, so that a run of a small
-test takes about a second.
+That process has imported the packages that the library rests on, but not the library, so that a run of a
+small test takes about a second.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -103,10 +104,8 @@ class Copy:
             time.sleep(0.02)
             done, code = os.waitpid(child, os.WNOHANG)
         # Also ends processes that the tests have started.
-        try:
+        with suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
         if not done:
             os.waitpid(child, 0)
             return ENDLESS
