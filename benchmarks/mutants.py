@@ -13,22 +13,17 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
-import os
 import random
 import re
-import shutil
-import subprocess
-import sys
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.common import ROOT, heading, table
+from benchmarks.forked_tests import ENDLESS, Copy
 
-COPIED = ("hybrid", "lyapunov", "models", "tests", "docs", "benchmarks", "pyproject.toml", "README.md")
 OTHER_OPERATOR = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Mod: ast.Add}
 OTHER_COMPARISON = {
     ast.Lt: ast.Gt,
@@ -154,12 +149,21 @@ OTHER_NAME = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
 class Fault(NamedTuple):
-    """A changed source and a description of the change."""
+    """One change of a source, and a description of the change."""
 
     path: Path
     line: int
     change: str
-    source: str
+    # Number of the node in the order of ``ast.walk``.
+    place: int
+
+    def source(self) -> str:
+        """Text of the file with the fault."""
+        tree = ast.parse((ROOT / self.path).read_text(encoding="utf-8"))
+        node = next(each for i, each in enumerate(ast.walk(tree)) if i == self.place)
+        (change,) = _changes(node)
+        change(node)
+        return ast.unparse(tree)
 
 
 def faults(path: Path) -> Iterator[Fault]:
@@ -170,14 +174,12 @@ def faults(path: Path) -> Iterator[Fault]:
         if id(node) in skipped:
             continue
         for change in _changes(node):
-            changed = copy.deepcopy(tree)
-            target = next(each for i, each in enumerate(ast.walk(changed)) if i == place)
-            before = ast.unparse(target)
-            change(target)
-            after = ast.unparse(target)
+            changed = copy.copy(node)
+            change(changed)
+            before, after = ast.unparse(node), ast.unparse(changed)
             if after != before:
                 told = f"{before[:60]} -> {after[:60]}"
-                yield Fault(path, getattr(node, "lineno", 0), told, ast.unparse(changed))
+                yield Fault(path, getattr(node, "lineno", 0), told, place)
 
 
 def _is_silent(node: ast.AST) -> bool:
@@ -275,31 +277,15 @@ class Coverage:
         return []
 
 
-def is_noticed(fault: Fault, tests: Sequence[str], seconds: float) -> bool:
-    """Whether some tests fail or do not end on a copy with the fault."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for each in COPIED:
-            source = ROOT / each
-            if source.is_dir():
-                shutil.copytree(source, folder / each, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
-            else:
-                shutil.copy(source, folder / each)
-        (folder / fault.path).write_text(fault.source, encoding="utf-8")
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--no-header"]
-        environment = {**os.environ, "PYTHONPATH": name, "PYTHONDONTWRITEBYTECODE": "1"}
-        try:
-            done = subprocess.run(
-                [*command, *tests],
-                cwd=folder,
-                env=environment,
-                capture_output=True,
-                timeout=seconds,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            return True
-        return done.returncode != 0
+_COPY: list[Copy] = []
+
+
+def first_failure(fault: Fault | None, tests: Sequence[str], seconds: int) -> str | None:
+    """The first test that fails or does not end on a copy with the fault, or without one."""
+    if not _COPY:
+        _COPY.append(Copy())
+    changed, source = (fault.path, fault.source()) if fault else (None, "")
+    return _COPY[0].failing(tests, seconds, changed, source)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -307,31 +293,47 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("files", nargs="+", type=Path, help="sources, relative to the top of the project")
     parser.add_argument("--each", type=int, default=8, help="number of random faults per file")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--seconds", type=float, default=300.0, help="time limit of the tests for one fault")
+    parser.add_argument(
+        "--seconds", type=int, default=200, help="limit of the processor time of the tests per fault"
+    )
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--coverage", type=Path, help="coverage with one context per test")
     given = parser.parse_args(arguments)
     coverage = Coverage(given.coverage) if given.coverage else None
+    files = sorted((ROOT / "tests").rglob("test_*.py"))
 
     def tests_of(fault: Fault) -> list[str]:
-        return (coverage.nearest(fault) if coverage else []) or nearest_tests(fault.path)
+        if coverage is None:
+            return nearest_tests(fault.path)
+        # Tests of the same name may be newer than the coverage.
+        own = [str(p.relative_to(ROOT)) for p in files if p.stem == f"test_{fault.path.stem}"]
+        others = [test for test in coverage.nearest(fault) if test.split("::")[0] not in own]
+        return own + others if own or others else nearest_tests(fault.path)
 
     heading("Faults planted one at a time, and the number that the nearest tests notice.")
-    rows, planted, noticed = [], 0, 0
-    for path in given.files:
-        found = list(faults(path))
-        if not found or not tests_of(found[0]):
-            rows.append([str(path), str(len(found)), "no tests" if found else "", ""])
-            continue
-        drawn = random.Random(f"{given.seed} {path}").sample(found, min(given.each, len(found)))
-        with ThreadPoolExecutor(given.processes) as pool:
-            results = list(pool.map(lambda fault: is_noticed(fault, tests_of(fault), given.seconds), drawn))
-        for fault, seen in zip(drawn, results, strict=True):
-            if not seen:
-                print(f"not noticed: {path}:{fault.line}: {fault.change}", flush=True)
-        planted, noticed = planted + len(drawn), noticed + sum(results)
-        rows.append([str(path), str(len(found)), str(len(drawn)), str(sum(results))])
-        print(f"{path}: {sum(results)} of {len(drawn)}", flush=True)
+    rows, planted, noticed, failing = [], 0, 0, set[str]()
+    with ProcessPoolExecutor(given.processes) as pool:
+        for path in given.files:
+            found = list(faults(path))
+            if not found or not tests_of(found[0]):
+                rows.append([str(path), str(len(found)), "no tests" if found else "", ""])
+                continue
+            drawn = random.Random(f"{given.seed} {path}").sample(found, min(given.each, len(found)))
+            runs = [pool.submit(first_failure, each, tests_of(each), given.seconds) for each in drawn]
+            results = [run.result() for run in runs]
+            for fault, test in zip(drawn, results, strict=True):
+                seen = f"noticed by {test}" if test else "not noticed"
+                print(f"{seen}: {path}:{fault.line}: {fault.change}", flush=True)
+            failing.update(test.split("[")[0] for test in results if test and "::" in test)
+            planted, count = planted + len(drawn), sum(map(bool, results))
+            noticed += count
+            rows.append([str(path), str(len(found)), str(len(drawn)), str(count)])
+        broken = set[str]()
+        while test := pool.submit(first_failure, None, sorted(failing - broken), 3600).result():
+            broken.add(test.split("[")[0])
+            print(f"fails without a fault too: {test}", flush=True)
+            if test == ENDLESS or test.split("[")[0] not in failing:
+                break
     rows.append(["all", "", str(planted), str(noticed)])
     print()
     table(["file", "possible faults", "planted", "noticed"], rows)

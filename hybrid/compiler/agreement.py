@@ -20,6 +20,8 @@ EPSILON = float(np.finfo(float).eps)
 SIZES = (1e-3, 30.0, 1e3)
 # Values whose relative difference is below this are equal without a closer look.
 SAME_VALUE = 16 * EPSILON
+# Differences between derivatives by the complex step that are rounding, as a share of their size.
+SAME_DERIVATIVE = 1e-7
 # Number of evaluations with random roundings, which show the effect of rounding on a function.
 SHAKES = 8
 # The compiler's elementary functions are not NumPy's. What is traced can be shaken at each operation.
@@ -132,8 +134,11 @@ def disagreement(
         wanted = complex_step(system.variables, function, t, x, values)
     except Exception:  # not at this point, then
         return None
+    # Size of a row's derivatives, of which those that cancel are judged by the size of the value.
+    known = np.isfinite(wanted)
+    size = np.where(known, np.abs(wanted), 0.0).max(axis=1) + np.abs(found) / np.abs(x).max()
     found = compiled.derivative(function, index, t, x, values)
-    wrong = np.isfinite(wanted) & ~(np.abs(found - wanted) <= 1e-7 * (1.0 + np.abs(wanted)))
+    wrong = known & ~(np.abs(found - wanted) <= SAME_DERIVATIVE * size[:, None])
     if not np.any(wrong):
         return None
     i, j = (int(k) for k in np.argwhere(wrong)[0])

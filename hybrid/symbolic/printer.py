@@ -202,8 +202,6 @@ class _Printer:
 
     def _power(self, expression: sympy.Expr) -> tuple[str, int]:
         base, exponent = expression.args
-        if base is sympy.E:
-            return f"exp({self.text(exponent)})", ATOM
         if not exponent.is_Rational or exponent.q > 2 or abs(exponent) > LARGEST_UNROLLED_POWER:
             return f"{self.text(base, ATOM)}**{self.text(exponent, ATOM)}", POWER
         if exponent.is_negative:

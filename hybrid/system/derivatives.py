@@ -80,6 +80,8 @@ class Reference:
         The point.
     values, tolerance
         ``(rows, n + 1)``; the tolerance is infinite where the function has a kink or a jump.
+    size
+        ``(rows, 1)``: size of a row's values and derivatives, in whose units errors are judged.
     source
         The method, for error texts.
     """
@@ -88,6 +90,7 @@ class Reference:
     x: np.ndarray
     values: np.ndarray
     tolerance: np.ndarray
+    size: np.ndarray
     source: str
 
     def confirms(self, other: np.ndarray) -> bool:
@@ -112,9 +115,9 @@ def reference_derivative(
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
         return difference
     # A term such as 1e-8*abs(x), without a complex derivative, makes the two differ by its small factor.
-    tolerance = 1e-9 * (1.0 + np.abs(values)) + 2.0 * np.abs(values - difference.values)
+    tolerance = 1e-9 * difference.size + 2.0 * np.abs(values - difference.values)
     tolerance[np.isinf(difference.tolerance)] = np.inf
-    return Reference(t, x, values, tolerance, "complex step")
+    return Reference(t, x, values, tolerance, difference.size, "complex step")
 
 
 def evaluate(
@@ -174,13 +177,13 @@ def _central_difference(
     if coarse is None or fine is None:
         return None
     (central, bend), (half_central, half_bend) = coarse, fine
-    size = 1.0 + np.abs(half_central)
-    rounding = 1e-10 * np.abs(here).reshape(-1, 1)
-    tolerance = 1e-7 * size + rounding + 4.0 * np.abs(half_central - central)
+    # States and time are near 1, so values and derivatives are of one size.
+    size = np.abs(here).reshape(-1, 1) + np.abs(half_central).max(axis=1, keepdims=True)
+    tolerance = 1e-7 * size + 4.0 * np.abs(half_central - central)
     # One-sided slopes approach each other as the step shrinks, except at a kink.
-    kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size + rounding)
+    kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size)
     tolerance[kink] = np.inf
-    return Reference(t, x, (4.0 * half_central - central) / 3.0, tolerance, "central difference")
+    return Reference(t, x, (4.0 * half_central - central) / 3.0, tolerance, size, "central difference")
 
 
 def _differences(

@@ -18,7 +18,7 @@ MOST_SWITCHES = 4
 FORMS = ("sign", "abs", "maximum", "where")
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class PiecewiseAffineField:
     r"""The right-hand side ``A x + b`` plus, for each switch, ``c s(h)`` with ``h = a \cdot x - level``.
 

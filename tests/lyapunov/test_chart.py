@@ -100,6 +100,25 @@ def test_the_attractor_is_carried_forward():
     assert (carried.x_end[:, 0] > 0).all()
 
 
+def test_the_mode_of_the_attractor_is_carried_forward():
+    """A switch that is never undone: the second row goes on in the mode where the first one ended."""
+    switch = hybrid.HybridSystem(
+        state=("x",),
+        parameters={"c": 1.0},
+        modes=[
+            hybrid.Mode("slow", lambda t, x, p: (p.c - x.x,)),
+            hybrid.Mode("fast", lambda t, x, p: (3.0 * (p.c - x.x),)),
+        ],
+        transitions=[hybrid.Transition("slow", "fast", hybrid.Guard(lambda t, x, p: x.x - 0.9, +1))],
+    )
+    options = {"mode": "slow", "intervals": 20, "interval": 0.5, "transient": 20}
+    over = {"c": [1.0, 0.5]}
+    alone = lyapunov.chart(switch, over, (0.0,), **options)
+    np.testing.assert_allclose(alone.exponents[:, 0], [-3.0, -1.0], atol=1e-9)
+    carried = lyapunov.chart(switch, over, (0.0,), continue_from="c", **options)
+    np.testing.assert_allclose(carried.exponents[:, 0], [-3.0, -3.0], atol=1e-9)
+
+
 def test_each_line_of_a_grid_is_carried_by_itself():
     over = {"A": [0.02, 0.05], "tilt": np.linspace(0.2, -0.2, 4)}
     grid = lyapunov.chart(duffing(), over, (1.2, 0.0), continue_from="previous", **SHORT)

@@ -79,3 +79,17 @@ def test_a_linear_system_has_its_eigenvalues(decay):
     orbit = hybrid.periodic_orbit(system, (0.0, 0.0), parameters={"decay": decay})
     exact = np.sort(np.linalg.eigvals([[-0.1, 0.5], [0.3, -decay]]))[::-1]
     np.testing.assert_allclose(lyapunov.floquet_exponents(orbit), exact, rtol=1e-11)
+
+
+def test_steps_of_an_implicit_method_that_are_too_long_for_tangent_vectors():
+    """At a loose tolerance a step forgets the fast state to all digits; shorter ones keep its exponent.
+
+    The orbit follows ``cos t`` slowly, so the solver's own steps are far longer than 1/300.
+    """
+    system = hybrid.HybridSystem(
+        state=("x", "y"),
+        modes=[hybrid.Mode("m", lambda t, x, p: (-x.x + np.cos(t), -300.0 * (x.y - x.x)))],
+        period=2 * np.pi,
+    )
+    orbit = hybrid.periodic_orbit(system, (0.5, 0.5), solver=hybrid.RadauIIA(rtol=1e-6, atol=1e-8))
+    np.testing.assert_allclose(lyapunov.floquet_exponents(orbit), [-1.0, -300.0], rtol=1e-6)

@@ -99,6 +99,29 @@ def test_signs_tell_the_kinds_of_motion(forced, found):
     assert {text.get_text() for text in ax.get_legend().get_texts()} == {*found[0], *found[1]}
 
 
+def test_three_exponents_of_zero_are_a_torus_too():
+    rows = [[(0.1, 0.0, -0.1), (0.0, -1.0, -1.0)], [(-1.0, -1.0, -1.0), (-np.inf, -np.inf, -np.inf)]]
+    found = kinds(made(rows, 0.2, "no"))
+    assert [[KINDS[i] for i in row] for row in found.values] == [
+        ["torus", "periodic"],
+        ["at rest", "at rest"],
+    ]
+    assert found.attrs["flag_values"] == [0, 1, 2, 3, 4]
+    assert found.attrs["flag_meanings"] == "not_known at rest periodic torus chaotic"
+
+
+def test_exponents_are_named_and_have_bands_of_two_standard_errors(line):
+    ax = plot_exponents(line, ax=plt.figure().subplots())
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert names[:2] == ["$\\lambda_{1}$", "$\\lambda_{2}$"]
+    for i, band in enumerate(ax.collections):
+        middle, error = line.exponents.values[:3, i], 2 * line.standard_error.values[:3, i]
+        [path] = band.get_paths()
+        low, high = np.nanmin(path.vertices[:, 1]), np.nanmax(path.vertices[:, 1])
+        assert low == pytest.approx((middle - error).min())
+        assert high == pytest.approx((middle + error).max())
+
+
 def test_noise_is_white_and_a_few_large_values_leave_colours_to_the_rest():
     values = np.full((10, 20, 1), -0.5)
     values[0, 0], values[0, 1] = 1e3, 0.19

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.fft import dct
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
@@ -127,7 +128,7 @@ def test_undefined_growth_has_no_error(bad):
 
 @pytest.mark.parametrize("length", [0, 1, 3])
 def test_too_short_a_series_has_no_error(length):
-    assert np.isnan(standard_error(np.ones((length, 2)))).all()
+    np.testing.assert_array_equal(standard_error(np.ones((length, 2))), [np.nan, np.nan])
 
 
 @given(scale=st.floats(1e-6, 1e6), shift=st.floats(-1e3, 1e3))
@@ -136,6 +137,40 @@ def test_error_scales_with_the_series_and_ignores_its_mean(scale, shift):
     np.testing.assert_allclose(
         standard_error(scale * (series + shift)), scale * standard_error(series), rtol=1e-6
     )
+
+
+def error_as_documented(means):
+    """The formula of ``standard_error_from_batches`` for one column of batch means ``(b,)``."""
+    b = len(means)
+    nu = min(8, b // 2)
+    mean_square = np.mean(dct(means, norm="ortho")[1 : nu + 1] ** 2)
+
+    size = b // 32 if b >= 32 else 1
+    coarse = [np.mean(each) for each in np.split(means[b % size :], b // size)]
+    y = np.array(coarse) - means.mean()
+    r = sum(y[1:] * y[:-1]) / sum(y**2)
+    r = min(max(r + (1 + 3 * r) / len(y), 0.0), 0.9)
+    # Spectrum of first-order autoregressive noise, relative to frequency zero.
+    share = np.mean([abs((1 - r) / (1 - r * np.exp(1j * np.pi * j / len(y)))) ** 2 for j in range(1, nu + 1)])
+    return np.sqrt(mean_square / (share * b)) * t.ppf(norm.cdf(2.0), nu) / 2
+
+
+@pytest.mark.parametrize("length", [4, 5, 15, 31, 63, 64, 100, 1000, 1023, 1024])
+@pytest.mark.parametrize("phi", [-0.5, 0.0, 0.6, 0.95])
+def test_error_is_that_of_the_documented_formula(length, phi):
+    """For up to 1024 values, each of which is a batch of its own."""
+    series = autoregressive(phi, length, np.random.default_rng(length))[:, :3]
+    expected = [error_as_documented(column) for column in series.T]
+    np.testing.assert_allclose(standard_error(series), expected, rtol=1e-7)
+
+
+@pytest.mark.parametrize(("length", "size"), [(1025, 2), (2048, 2), (2049, 3), (5003, 5)])
+def test_long_series_are_merged_into_at_most_1024_batches(length, size):
+    """A remainder is left out at the start, which is nearest to the transient."""
+    series = autoregressive(0.6, length, np.random.default_rng(length))[:, :3]
+    batches = series[length % size :].reshape(-1, size, 3).mean(axis=1)
+    assert len(batches) <= 1024
+    np.testing.assert_allclose(standard_error(series), standard_error_from_batches(batches), rtol=1e-12)
 
 
 def test_student_factors():

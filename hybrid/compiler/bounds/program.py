@@ -142,10 +142,8 @@ class _Writer:
             return self._add(*self.leaves[expression])
         if expression.is_Number or expression.is_NumberSymbol:
             return self._number(float(expression))
-        if expression.is_Pow and expression.base is not sympy.E:
-            return self._power(*expression.args)
         if expression.is_Pow:
-            return self._add(op.EXP, self.place(expression.exp))
+            return self._power(*expression.args)
         function, arguments = expression.func, expression.args
         if function in ONE_OPERAND:
             return self._add(ONE_OPERAND[function], self.place(arguments[0]))

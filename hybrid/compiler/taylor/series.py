@@ -258,8 +258,6 @@ class Recurrences:
             return self._sum(expression)
         if expression.is_Mul:
             return self._product(expression)
-        if expression.is_Pow and expression.base is sympy.E:
-            return self._exponential(expression, expression.exp)
         if expression.is_Pow:
             return self._power(expression)
         if isinstance(expression, sympy.exp):

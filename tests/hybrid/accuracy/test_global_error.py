@@ -10,7 +10,8 @@ import pytest
 import hybrid
 import models
 from hybrid import DOP853, StatusCode, Tsit5, global_error
-from hybrid.accuracy.global_error import _agreement, _bound
+from hybrid.accuracy.global_error import SAFETY, _agreement, _bound, _compare
+from hybrid.status import SUCCESS
 from tests.cases import systems
 from tests.reference.impacts import ImpactOscillator
 
@@ -208,3 +209,27 @@ class Jumped:
 
     def __len__(self):
         return len(self.transition_index)
+
+
+def run_with(times, transitions, end, mode="m"):
+    """What the comparison reads of a run."""
+    jumps = SimpleNamespace(t=np.array(times), transition_index=np.array(transitions))
+    jumps = type("Jumps", (SimpleNamespace,), {"__len__": lambda self: len(times)})(**vars(jumps))
+    return SimpleNamespace(jumps=jumps, x=np.array([end]), mode=[mode], status=SUCCESS)
+
+
+def test_jumps_are_compared_as_far_as_all_three_runs_agree():
+    run = run_with([1.0, 2.0, 3.0, 4.0], [0, 0, 0, 0], [1.0, -3.0])
+    tighter = run_with([1.01, 2.0, 3.0, 4.0], [0, 0, 0, 1], [1.0, -3.25])
+    tightest = run_with([1.02, 2.0, 3.0, 4.0], [0, 1, 0, 0], [1.5, -3.0])
+    found = _compare(run, tighter, tightest)
+    np.testing.assert_allclose(found.jumps, [0.03 * SAFETY, np.inf, np.inf, np.inf], rtol=1e-12)
+    np.testing.assert_allclose(found.x, [1.0 * SAFETY, 0.25 * SAFETY], rtol=1e-12)
+    assert found.status.code == StatusCode.NOT_CONVERGED
+    assert "agree on the first 1 of 4 jumps" in found.status.message
+    fewer = run_with([1.01], [0], [1.0, -3.0])
+    assert "first 1 of 4" in _compare(run, fewer, run).status.message
+    other = run_with([1.0, 2.0, 3.0, 4.0], [0, 0, 0, 0], [1.0, -3.0], mode="n")
+    assert _compare(run, run, run).status is SUCCESS
+    longer = run_with([1.0, 2.0, 3.0, 4.0, 5.0], [0, 0, 0, 0, 0], [1.0, -3.0], mode="n")
+    assert np.isinf(_compare(run, longer, other).x).all()

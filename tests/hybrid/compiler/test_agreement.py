@@ -28,6 +28,7 @@ R = 7_000_000_000
 TEN, MINUS_TWO = 10, -2
 TABLE = np.linspace(0.0, 1.0, 11)
 LIST = [1.0, 2.0]
+PAIR = (1.0, 2.0)
 
 
 def system(field, *, state=("q", "v"), jacobian=None, **options):
@@ -66,6 +67,24 @@ class TestTypes:
             return (x.v, -x.q) if branch(x.q) else (x.v, -5 * x.q)
 
         refused(field, r"field: value 1 is .* compiled and .* in Python, at t = .*a branch on the type")
+
+    @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+    def test_derivatives_that_branch_on_the_type_are_refused_in_any_units(self, unit):
+        """The whole number in the field cannot be traced, so its derivative is the complex step."""
+
+        def field(t, x, p):
+            force = -unit * PAIR[int(p.k)] * x.q
+            return unit * x.v, 1.001 * force if isinstance(x.q, np.complex128) else force
+
+        refused(field, "field: the derivative is .* compiled and .* in Python, at t = .*a branch on the type")
+
+    @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+    def test_derivatives_that_cancel_are_no_fault(self, unit):
+        def field(t, x, p):
+            force = unit * PAIR[int(p.k)] * (np.sin(x.q) ** 2 + np.cos(x.q) ** 2)
+            return unit * x.v, force
+
+        compile_system(system(field))
 
     @pytest.mark.parametrize("caught", [ValueError, TypeError, Exception, BaseException, ModelError])
     @pytest.mark.parametrize(
@@ -146,6 +165,15 @@ class TestWholeNumbers:
     def test_large_ones_are_real(self):
         def field(t, x, p):
             return (-x.q * (R * R) / 4.9e19 if p.k > 0 else x.q,)
+
+        opaque = system(field, state=("q",))
+        assert compile_system(opaque).emitted.opaque
+        arc = simulate(opaque, (1.0,), (0.0, 1.0))
+        assert arc.x[-1, 0] == pytest.approx(math.exp(-1.0), abs=1e-9)
+
+    def test_large_defaults_are_real_and_small_ones_stay_whole(self):
+        def field(t, x, p, large=7_000_000_000, whole=1, real=2.5):
+            return (-x.q * PAIR[whole] / 2.0 * (large * large) / 4.9e19 * real / 2.5 if p.k > 0 else x.q,)
 
         opaque = system(field, state=("q",))
         assert compile_system(opaque).emitted.opaque

@@ -6,7 +6,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from hybrid.orbits.periodic_schur import product_eigenvalues
+from hybrid.orbits import periodic_schur
+from hybrid.orbits.periodic_schur import product_eigenvalues, rowwise_qr
 
 
 def orthogonal(n, rng):
@@ -145,3 +146,43 @@ def test_one_factor_has_its_own_eigenvalues():
     expected = np.linalg.eigvals(matrix)
     expected = expected[np.lexsort((-expected.imag, -np.abs(expected).round(9)))]
     np.testing.assert_allclose(product_eigenvalues([matrix]).values, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("n", range(3, 9))
+@pytest.mark.parametrize("length", [1, 4])
+def test_roots_of_unity_on_which_the_usual_shifts_stand_still(n, length):
+    """A cyclic permutation is its own QR step; only shifts chosen otherwise separate its eigenvalues."""
+    cycle = np.roll(np.eye(n), 1, axis=0)
+    found = product_eigenvalues([cycle, *[np.eye(n)] * (length - 1)])
+    exact = np.exp(2j * np.pi * np.arange(n) / n)
+    exact = exact[np.lexsort((-exact.imag, -exact.real.round(9)))]
+    np.testing.assert_allclose(found.log_moduli, 0.0, atol=1e-13)
+    np.testing.assert_allclose(found.phases, exact, atol=1e-12)
+
+
+@pytest.mark.parametrize("columns", [2, 4])
+def test_each_row_of_a_graded_matrix_is_factorised_to_its_own_size(columns):
+    """The rows are 60 orders of magnitude apart, the longest neither first nor last."""
+    rng = np.random.default_rng(4)
+    sizes = 10.0 ** np.array([-30.0, 0.0, -60.0, -15.0])
+    matrix = sizes[:, None] * rng.normal(size=(4, columns))
+    basis, triangle = rowwise_qr(matrix)
+    np.testing.assert_array_equal(np.tril(triangle, -1), 0.0)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(columns), atol=1e-14)
+    errors = np.abs(basis @ triangle - matrix).max(axis=1)
+    assert np.all(errors <= 1e-14 * sizes)
+
+
+def test_the_shifts_make_sweeps_converge_fast(monkeypatch):
+    """Francis' shifts need two to three sweeps per eigenvalue, others tens of them."""
+    sweeps = []
+    sweep = periodic_schur._Reduced._sweep
+    monkeypatch.setattr(
+        periodic_schur._Reduced, "_sweep", lambda *arguments: sweeps.append(1) or sweep(*arguments)
+    )
+    rng = np.random.default_rng(5)
+    factors = rng.normal(size=(3, 30, 30))
+    found = product_eigenvalues(factors)
+    expected = np.linalg.eigvals(factors[2] @ factors[1] @ factors[0])
+    np.testing.assert_allclose(found.log_moduli, np.sort(np.log(np.abs(expected)))[::-1], atol=1e-9)
+    assert len(sweeps) < 3 * 30

@@ -83,6 +83,61 @@ def test_phase_portrait_names_its_axes(bounces):
         plot_phase(bounces, 2, "v")
 
 
+def test_a_phase_portrait_shows_flights_jumps_and_the_start(contacts, bounces):
+    for arc, i, j in ((contacts, 2, 0), (bounces, 0, 1)):
+        axes = plot_phase(arc, i, j)
+        *flights, jumps, start = curves(axes)
+        modes = sorted(set(arc.mode), key=arc.system.mode_index)
+        assert len(flights) == len(modes)
+        for name, points in zip(modes, flights, strict=True):
+            inside = np.isin(arc.x[arc.mode == name][:, i], points[:, 0])
+            assert inside.all()
+            assert np.isnan(points[:, 0]).sum() == len(set(arc.j[arc.mode == name]))
+        np.testing.assert_array_equal(jumps[::3], arc.jumps.x_minus[:, [i, j]])
+        np.testing.assert_array_equal(jumps[1::3], arc.jumps.x_plus[:, [i, j]])
+        assert np.isnan(jumps[2::3]).all()
+        np.testing.assert_array_equal(start, arc.x[:1, [i, j]])
+
+
+def test_visits_of_modes_other_than_the_first_are_shaded(contacts):
+    (row,) = plot_arc(contacts, ["x1"])
+    [shades] = row.collections
+    spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in shades.get_paths()]
+    switches = [(jump.t, jump.target) for jump in contacts.jumps]
+    visits = [
+        (t, switches[k + 1][0] if k + 1 < len(switches) else contacts.t[-1])
+        for k, (t, target) in enumerate(switches)
+        if target == "contact"
+    ]
+    np.testing.assert_allclose(spans, visits, rtol=1e-12)
+    (row,) = plot_arc(simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0)), ["q"])
+    assert not row.collections
+
+
+@pytest.mark.parametrize(
+    ("options", "components"),
+    [({}, (0, 1)), ({"x": 1}, (1, 0)), ({"x": "v", "y": "v"}, (1, 1)), ({"y": 0}, (0, 0))],
+)
+def test_an_orbit_is_drawn_over_the_components_asked_for(options, components):
+    orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    axes = hybrid.plot.plot_orbit(orbit, **options)
+    *_, start = curves(axes)
+    np.testing.assert_array_equal(start, [orbit.x0[[*components]]])
+    names = orbit.system.state_names
+    assert (axes.get_xlabel(), axes.get_ylabel()) == tuple(names[i] for i in components)
+    assert axes.get_title(loc="left") == (f"period 6.28319, largest multiplier {orbit.multipliers[0]:.4g}")
+
+
+def test_an_orbit_of_one_component_is_drawn_over_itself():
+    line = hybrid.HybridSystem(
+        state=("u",), modes=[hybrid.Mode("decay", lambda t, x, p: (-x.u + np.cos(t),))], period=2 * np.pi
+    )
+    orbit = hybrid.periodic_orbit(line, (0.5,))
+    axes = plot(orbit)
+    np.testing.assert_array_equal(curves(axes)[-1], [[orbit.x0[0]] * 2])
+    assert "largest multiplier 0.001867" in axes.get_title(loc="left")
+
+
 def test_graph_shows_modes_transitions_and_directions():
     shown = texts(plot_graph(models.vibroimpact()))
     assert {"free", "contact", "impact ↑", "release ↓"} <= shown

@@ -81,10 +81,16 @@ def test_systems_that_grow(monkeypatch):
         parameters={"mu": 0.3},
     )
     starts = [(1.0, -0.1), (2.0, 0.1)]
-    found = simulate_many(block, starts, (0.0, 5.0), executor=2)
+    found = simulate_many(block, starts, (0.0, 4.0), executor=2)
     assert not found.status.any()
+    times = [0.5, 2.0]
+    sampled = simulate_many(block, starts, (0.0, 4.0), samples=times)
     for i, x0 in enumerate(starts):
-        np.testing.assert_array_equal(found.x_end[i], simulate(block, x0, (0.0, 5.0)).x[-1])
+        arc = simulate(block, x0, (0.0, 4.0))
+        assert arc.mode[-1] != arc.mode[1]
+        np.testing.assert_allclose(sampled.x[i], arc(times), atol=1e-9)
+    assert_one_by_one(found, block, starts, (0.0, 4.0))
+    np.testing.assert_array_equal(sampled.mode_end, found.mode_end)
 
 
 class Impatient:

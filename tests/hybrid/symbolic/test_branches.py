@@ -119,3 +119,48 @@ def test_a_loop_has_no_replacement():
 
 def test_a_branch_inside_numpy():
     assert "traced" in advice(lambda t, x, p: np.sort([x.q, x.v])[0])
+
+
+def written(lines, tmp_path):
+    """A function of these lines, with its source in a file."""
+    file = tmp_path / "model.py"
+    body = "".join(f"    {line}\n" for line in lines)
+    source = f"def f(t, x, p):\n    a, b = -x.q, [x.q, x.v]\n{body}    return a\n"
+    file.write_text(source)
+    space = {"np": np}
+    exec(compile(source, str(file), "exec"), space)
+    return space["f"]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("if x.v > 0:", "    a = 1.0", "else:", "    b = 2.0"),
+        ("if x.v > 0:", "    a = 1.0", "    b = 2.0", "else:", "    a = 2.0"),
+        ("if x.v > 0:", "    a = 1.0", "    b = 2.0"),
+        ("if x.v > 0:", "    b[0] = 1.0"),
+        ("if x.v > 0:", "    a += 1.0", "else:", "    a -= 2.0"),
+        ("if x.v > 0:", "    a *= 2.0"),
+        ("if x.v > 0:", "    return", "return a"),
+        ("if x.v > 0:", "    return a", "return"),
+        ("if x.v > 0:", "    a = 1.0", "elif x.q > 0:", "    b = 2.0", "else:", "    a = 3.0"),
+    ],
+)
+def test_statements_that_are_no_single_choice_have_no_replacement(lines, tmp_path):
+    assert OTHERWISE in advice(written(lines, tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"),
+    [
+        (("if x.v > 0:", "    a = 1.0", "a = a + 2.0"), "a = np.where(x.v > 0, 1.0, a)"),
+        (("if x.v > 0:", "    b[0] = 1.0", "else:", "    b[0] = a"), "b[0] = np.where(x.v > 0, 1.0, a)"),
+        (("if x.v > 0:", "    return a", "return 2 * a"), "return np.where(x.v > 0, a, 2 * a)"),
+        (("if x.v > 0:", "    return a, x.q", "return a"), "return np.where(x.v > 0, (a, x.q), a)"),
+        (("a = max(x.q, x.v, 0.0)",), "np.maximum(np.maximum(x.q, x.v), 0.0)"),
+        (("a = min([x.q, x.v])",), "np.minimum(x.q, x.v)"),
+        (("a = max((x.q, x.v))",), "np.maximum(x.q, x.v)"),
+    ],
+)
+def test_replacements(lines, told, tmp_path):
+    assert f"write ``{told}``" in advice(written(lines, tmp_path))

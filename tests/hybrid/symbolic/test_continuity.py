@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import sympy
 
 import hybrid
 import models
@@ -94,6 +95,54 @@ def pieces(rng):
 def test_random_pieces(seed):
     field, continuous = pieces(np.random.default_rng(seed))
     assert (jumps(field) == []) == continuous
+
+
+def random_choices(rng):
+    """A field of products, chosen by comparisons with connectives; most of its jumps cancel."""
+    a, b, c = (float(each) for each in rng.choice([-1.0, 0.5, 2.0], 3))
+    order = rng.permutation(4)
+    factors = [lambda q, v: 1.0, lambda q, v: q - a, lambda q, v: v - b, lambda q, v: (q - a) * (v - b)]
+    first, second = factors[order[0]], factors[order[1]]
+    kinds = rng.integers(0, 3, 2)
+
+    def field(t, x, p):
+        q, v = x.q, x.v
+        one = (q > a, q >= a, ~(q < a))[kinds[0]]
+        other = (v < b, v <= b, ~(v > b))[kinds[1]]
+        both, either = np.where(one & other, first(q, v), 0.0), np.where(one | other, 0.0, second(q, v))
+        return both + either + np.where(q > c, (q - c) * v, 0.0) + 0.5 * np.sign(v - b) * second(q, v)
+
+    return field, {"x[0]": {a, c}, "x[1]": {b}}
+
+
+class At:
+    def __init__(self, q, v):
+        self.q, self.v = np.float64(q), np.float64(v)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_exactly_the_surfaces_where_values_jump_are_named(seed):
+    """The values are compared on both sides of each surface, at many points of it."""
+    field, levels = random_choices(np.random.default_rng(seed))
+    jumping = set()
+    for name, several in levels.items():
+        for level in several:
+            for along in np.linspace(-3.1, 3.3, 23):
+                sides = [level - 1e-9, level + 1e-9]
+                places = [At(side, along) if name == "x[0]" else At(along, side) for side in sides]
+                below, above = (float(field(0.0, place, None)) for place in places)
+                if abs(above - below) > 1e-6:
+                    jumping.add(f"{name} = {level:g}")
+    named = {sympy_names(each) for each in jumps(field)}
+    assert named == jumping
+
+
+def sympy_names(surface):
+    """``x[0] = 0.5`` for ``0.5 = x[0]`` and for ``x[0] - 0.5 = 0``."""
+    one, other = (sympy.sympify(side.replace("[", "").replace("]", "")) for side in surface.split(" = "))
+    [variable] = (one - other).free_symbols
+    [level] = sympy.solve(one - other, variable)
+    return f"x[{variable.name[1:]}] = {float(level):g}"
 
 
 @pytest.mark.parametrize(

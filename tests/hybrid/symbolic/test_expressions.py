@@ -1,9 +1,40 @@
 """The library's own functions of SymPy's expressions."""
 
+import math
+from itertools import product as product_of
+
+import numpy as np
 import pytest
 import sympy
 
-from hybrid.symbolic.expressions import ONE, ZERO, Maximum, Minimum, product
+from hybrid.symbolic.expressions import (
+    ONE,
+    ZERO,
+    Absolute,
+    And,
+    Atan2,
+    Ceiling,
+    CubeRoot,
+    Equal,
+    Floor,
+    Gate,
+    Less,
+    LessEqual,
+    Maximum,
+    Minimum,
+    Not,
+    Or,
+    Remainder,
+    Select,
+    Sign,
+    Step,
+    Truncate,
+    TruncatedRemainder,
+    close_gates,
+    defined_at_origin,
+    hypot,
+    product,
+)
 
 x, y = sympy.symbols("x y", real=True)
 
@@ -25,3 +56,120 @@ def test_slopes_at_a_tie_are_halves(kind):
 def test_a_product_is_sympys():
     for factors in ((sympy.Float(2), x), (x, sympy.Float(2)), (x, y), (ZERO, x), (ONE, x), (2 * x, 3 * y)):
         assert product(*factors) == sympy.Mul(*factors)
+
+
+FUNCTIONS = {
+    Floor: (np.floor, 1),
+    Ceiling: (np.ceil, 1),
+    Truncate: (np.trunc, 1),
+    Sign: (np.sign, 1),
+    Step: (lambda u: np.heaviside(u, 0.5), 1),
+    Absolute: (np.abs, 1),
+    CubeRoot: (np.cbrt, 1),
+    Not: (lambda a: float(not a), 1),
+    Less: (lambda a, b: float(a < b), 2),
+    LessEqual: (lambda a, b: float(a <= b), 2),
+    Equal: (lambda a, b: float(a == b), 2),
+    And: (lambda a, b: float(np.logical_and(a, b)), 2),
+    Or: (lambda a, b: float(np.logical_or(a, b)), 2),
+    Maximum: (np.maximum, 2),
+    Minimum: (np.minimum, 2),
+    Remainder: (np.mod, 2),
+    TruncatedRemainder: (np.fmod, 2),
+    Atan2: (np.arctan2, 2),
+    Select: (lambda c, a, b: float(np.where(c, a, b)), 3),
+}
+PLACES = (-1.7, -0.6, 0.0, 0.45, 1.3)
+
+
+@pytest.mark.parametrize("kind", FUNCTIONS)
+def test_values_are_those_of_numpy(kind):
+    function, arity = FUNCTIONS[kind]
+    for place in product_of(PLACES, repeat=arity):
+        if kind in (Remainder, TruncatedRemainder) and place[1] == 0.0:
+            assert math.isnan(float(kind(*map(sympy.Float, place))))
+            continue
+        assert float(kind(*map(sympy.Float, place))) == pytest.approx(float(function(*place)), abs=1e-15)
+
+
+@pytest.mark.parametrize("kind", FUNCTIONS)
+def test_slopes_are_those_of_the_function(kind):
+    """Central differences at places that are no kinks."""
+    function, arity = FUNCTIONS[kind]
+    symbols = sympy.symbols(f"x:{arity}", real=True)
+    steps = 1e-5 * np.eye(arity)
+    for place in product_of((-1.7, -0.6, 0.45, 1.3), repeat=arity):
+        if len(set(place)) < arity:
+            continue
+        for symbol, step in zip(symbols, steps, strict=True):
+            slope = kind(*symbols).diff(symbol).subs(dict(zip(symbols, place, strict=True))).doit()
+            ahead, behind = function(*(place + step)), function(*(place - step))
+            assert float(slope) == pytest.approx(float(ahead - behind) / 2e-5, abs=1e-8)
+
+
+def test_slope_of_an_absolute_value_at_its_kink():
+    assert Absolute(x).diff(x).subs(x, 0.0) == 0
+
+
+def test_connectives_decide_as_far_as_numbers_do():
+    truth, number_two = Less(x, y), sympy.Float(2)
+    assert And(ZERO, x) == And(x, ZERO) == 0
+    assert And(number_two, truth) == And(truth, ONE) == truth
+    assert Or(number_two, x) == Or(x, ONE) == 1
+    assert Or(ZERO, truth) == Or(truth, ZERO) == truth
+    # What is not 0 or 1 is made so.
+    assert isinstance(And(ONE, x), And)
+    assert isinstance(Or(ZERO, x), Or)
+    assert isinstance(And(truth, x), And)
+    assert Select(truth, x, x) == x
+    assert Select(number_two, x, y) == x
+    assert Select(ZERO, x, y) == y
+
+
+@pytest.mark.parametrize(
+    ("slope", "at_origin"),
+    [
+        (x / hypot(x, y), 0.0),
+        (x * y / hypot(x, y), 0.0),
+        (x / sympy.sqrt(x**2 + y**2), 0.0),
+        (x / sympy.sqrt(x**2 + 3 * y**4), 0.0),
+    ],
+)
+def test_slopes_of_lengths_are_zero_at_the_origin(slope, at_origin):
+    made = defined_at_origin(slope)
+    for a, b in ((0.3, -0.4), (-2.0, 1.0)):
+        there = {x: a, y: b}
+        assert float(made.subs(there).doit()) == pytest.approx(float(slope.subs(there).doit()), rel=1e-14)
+    assert float(made.subs({x: 0.0, y: 0.0}).doit()) == at_origin
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        x / sympy.sqrt(x**2 - y**2),
+        x / sympy.sqrt(x**2 + y),
+        x / sympy.sqrt(x**2 + y**3),
+        x / (x**2 + y**2),
+        x / hypot(x, y) ** 2,
+        x * sympy.sqrt(x**2 + y**2),
+    ],
+)
+def test_other_powers_stay_as_they_are(other):
+    assert defined_at_origin(other) == other
+
+
+def test_products_are_zero_where_a_factor_switches_them_off():
+    steep = x ** sympy.Rational(-3, 4)
+    assert close_gates(Step(x) * steep) == Gate(x, steep)
+    assert close_gates(2 * Step(y) * x) == Gate(y, 2 * x)
+    assert close_gates(Step(x)) == Step(x)
+    assert close_gates(Step(x) * Step(y)) in (Gate(x, Step(y)), Gate(y, Step(x)))
+    choice = Select(Less(x, y), ZERO, y)
+    assert close_gates(choice * steep) == Select(Less(x, y), ZERO, y * steep)
+    other = Select(Less(x, y), x, ZERO)
+    assert close_gates(other * steep) == Select(Less(x, y), x * steep, ZERO)
+    open_choice = Select(Less(x, y), x, y)
+    assert close_gates(open_choice * steep) == open_choice * steep
+    assert close_gates(1 + Step(x) * steep) == 1 + Gate(x, steep)
+    plain = x * y
+    assert close_gates(plain) is plain

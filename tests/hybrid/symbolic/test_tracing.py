@@ -205,3 +205,11 @@ def test_piecewise_with_and_without_a_default(x):
     for function in (with_default, without):
         found = evaluate(traced_scalar(function), 0.0, np.array([x, 0.0]), [])
         assert found[0] == function(np.array([x]), None)[0]
+
+
+def test_a_traced_number_is_real():
+    expressions = trace(
+        lambda t, x, p: (x.a.real, x.b * x.a.imag, x.a.conjugate(), np.imag(x.a) + np.real(x.b)), NAMES, ()
+    )
+    a, b = model_symbols(2, 0).x
+    assert expressions == [a, 0, a, b]

@@ -45,6 +45,32 @@ def test_the_complex_step_catches_the_eighth_digit():
         oscillator(lambda t, x, p: ((0, 1 + 1e-8, 0), (-3 * p.k * x.q**2, 0, -p.w * np.sin(p.w * t))))
 
 
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+def test_a_wrong_derivative_is_found_in_any_units_of_the_rates(unit):
+    """The kink is smaller than 1 in some units and larger in others."""
+
+    def smooth(t, x, p):
+        return unit * x.v, -unit * np.sin(x.q + t)
+
+    def bent(t, x, p):
+        return unit * x.v, -unit * np.abs(x.q - 1.0)
+
+    def slopes(t, x, p, factor=1.0):
+        force = -factor * unit * np.cos(x.q + t)
+        return (0.0, unit, 0.0), (force, 0.0, force)
+
+    oscillator(slopes, field=smooth)
+    with pytest.raises(ModelError, match="entry D_q of v"):
+        oscillator(lambda t, x, p: slopes(t, x, p, 1.0 + 1e-7), field=smooth)
+    oscillator(lambda t, x, p: ((0, unit), (-unit * np.sign(x.q - 1.0), 0)), field=bent)
+    with pytest.raises(ModelError, match="entry D_q of v"):
+        oscillator(lambda t, x, p: ((0, unit), (unit * np.sign(x.q - 1.0), 0)), field=bent)
+    for field, smooth_there in ((smooth, True), (bent, False)):
+        system = oscillator(field=field)
+        error = complex_step_error(system.variables, field_function(system.modes[0], 2))
+        assert (error is None) is smooth_there
+
+
 def test_a_missing_time_column_is_asked_for():
     with pytest.raises(ModelError, match=r"has 2 columns, but the field depends on t: D_t of v.*D_t last"):
         oscillator(lambda t, x, p: ((0, 1), (-3 * p.k * x.q**2, 0)))

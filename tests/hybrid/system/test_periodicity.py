@@ -67,6 +67,21 @@ def test_a_wrong_period_is_refused_when_the_system_is_made(period):
         forced(period)
 
 
+@pytest.mark.parametrize("unit", [1e-15, 1e-6, 1e6, 1e15])
+def test_a_wrong_period_is_refused_in_any_units_of_the_rates(unit):
+    def of(period):
+        return HybridSystem(
+            state=("q", "v"),
+            parameters={"w": 1.3},
+            modes=[Mode("a", lambda t, x, p: (unit * x.v, unit * np.cos(p.w * t)))],
+            period=period,
+        )
+
+    of(right)
+    with pytest.raises(ModelError, match="is not a period of the functions"):
+        of(2 * np.pi / 1.3 * (1 + 1e-9))
+
+
 @pytest.mark.parametrize(
     ("name", "functions"),
     [

@@ -50,6 +50,24 @@ def test_a_switch_at_the_edge_of_its_mode_is_none():
     assert system(field, [other]).switching == {"m": ["maximum"]}
 
 
+def test_a_clip_has_two_edges():
+    def field(t, x, p):
+        return x.v, -np.clip(x.q, -1.0, 2.0)
+
+    low = Transition("m", None, Guard(lambda t, x, p: x.q + 1.0, -1), name="low")
+    high = Transition("m", None, Guard(lambda t, x, p: 4.0 - 2.0 * x.q, -1), name="high")
+    assert system(field, [low, high]).switching == {}
+    assert system(field, [low]).switching == {"m": ["clip"]}
+    assert system(field, [high]).switching == {"m": ["clip"]}
+
+
+def test_both_sides_of_a_branch_in_python_are_looked_into():
+    def field(t, x, p):
+        return x.v, np.abs(x.v) if x.q > 0.5 else 0.0
+
+    assert system(field).switching == {"m": [">", "abs"]}
+
+
 @pytest.mark.parametrize("name", ["vibroimpact", "stick_slip", "buck_converter", "chua_circuit"])
 def test_models_with_modes_have_none(name):
     assert getattr(models, name)().switching == {}

@@ -1,9 +1,12 @@
 """Orbits that slide to an intersection of two surfaces, or along it: which way they go on."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from hybrid import StatusCode, from_equations, simulate
+from hybrid.transform.corners import arrivals, exits
 
 QUADRANTS = [(-1, -1), (-1, 1), (1, -1), (1, 1)]
 
@@ -23,6 +26,23 @@ def plane(rates, slopes=None):
         return at(0), at(1), 1.0
 
     return from_equations(field, state=("x", "y", "z"))
+
+
+def test_ways_to_go_on_are_listed_in_order():
+    """Sliding along all surfaces first; the side that the orbit comes from is not among them."""
+    assert arrivals([4], 7, -1) == [
+        *({4: 0, 7: 0}, {4: 0, 7: 1}),
+        *({4: 1, 7: 0}, {4: 1, 7: 1}, {4: -1, 7: 0}, {4: -1, 7: 1}),
+    ]
+    assert arrivals([4], 7, 1)[1] == {4: 0, 7: -1}
+    ways = exits([4, 7], 4, -1)
+    assert ways[0] == {7: 0, 4: -1}
+    every = [dict(zip((4, 7), sides, strict=True)) for sides in product((0, 1, -1), repeat=2)]
+    assert {tuple(sorted(way.items())) for way in ways} == {
+        tuple(sorted(way.items())) for way in every if any(way.values())
+    }
+    assert len(ways) == 8
+    assert exits([3], 3, 1) == [{3: 1}, {3: -1}]
 
 
 def visited(arc):

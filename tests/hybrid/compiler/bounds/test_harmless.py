@@ -209,3 +209,24 @@ def test_a_series_sees_a_high_power_of_the_state(power):
     s = np.linspace(1.0, 51.0, 500_001)
     expected = np.trapezoid(np.exp(s - 51.0) * power(s), s)
     assert arc.x[-1, 0] == pytest.approx(expected, rel=1e-7)
+
+
+# Functions of time by the number of factors that they count as.
+COUNTED = {
+    "power": (lambda t, k: t**k, 1),
+    "power of a difference": (lambda t, k: (t - 5.0) ** k / 7.0, 1),
+    "power of a sum": (lambda t, k: (2.0 * t + 1.0) ** k + t, 1),
+    "product with an exponential": (lambda t, k: t**k * np.exp(-3.0 * t), 1),
+    "harmonics": (lambda t, k: np.sin(2.0 * t) ** k, 2),
+    "sum of harmonics": (lambda t, k: np.cos(t) ** k + np.sin(t) * t, 2),
+    "chirps": (lambda t, k: np.sin(t**2) ** k, 4),
+    "hyperbolic functions": (lambda t, k: np.sinh(t) ** k, 1),
+    "mixed": (lambda t, k: (t * np.cos(t)) ** k, 3),
+}
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_as_many_factors_as_are_allowed_are_harmless_and_not_one_more(name):
+    function, factors = COUNTED[name]
+    for k in range(1, MOST_FACTORS + 3):
+        assert is_free(lambda t, k=k: function(t, k)) == (factors * k <= MOST_FACTORS), k

@@ -47,6 +47,7 @@ FUNCTIONS = {
     "quotient of two": (lambda u: u / ((2 + u) * (3 + u)), lambda u: u / ((2 + u) * (3 + u))),
     "power": (lambda u: u**2.3, lambda u: u ** mp.mpf(2.3)),
     "variable power": (lambda u: u**u, lambda u: u**u),
+    "power of a number": (lambda u: 2.3**u, lambda u: mp.mpf(2.3) ** u),
     "nested": (lambda u: np.exp(np.sin(u) * u), lambda u: mp.exp(mp.sin(u) * u)),
     "shared": (
         lambda u: np.sin(u) * np.cos(u) + np.sin(u) ** 2,

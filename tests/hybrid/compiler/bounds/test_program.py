@@ -1,0 +1,135 @@
+"""Programs of expressions, run on numbers, have the values of the expressions."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+from hybrid.compiler.bounds.program import programs
+from hybrid.kernels.arithmetic import operations as op
+from hybrid.symbolic.tracing import model_symbols, trace
+
+SYMBOLS = model_symbols(2, 1)
+T, Q, V, K = 0.8, 0.45, -1.3, 1.7
+OPERATIONS = {
+    **{op.SUM: lambda a, b: a + b, op.PRODUCT: lambda a, b: a * b, op.QUOTIENT: lambda a, b: a / b},
+    **{op.MAXIMUM: max, op.MINIMUM: min, op.ANGLE: math.atan2},
+    **{op.LESS: lambda a, b: a < b, op.LESS_EQUAL: lambda a, b: a <= b, op.EQUAL: lambda a, b: a == b},
+    **{op.AND: lambda a, b: a and b, op.OR: lambda a, b: a or b, op.NOT: lambda a: not a},
+    **{op.SELECT: lambda condition, a, b: a if condition else b},
+    **{op.SQRT: math.sqrt, op.EXP: math.exp, op.LOG: math.log, op.CUBE_ROOT: np.cbrt},
+    **{op.SIN: math.sin, op.COS: math.cos, op.TAN: math.tan},
+    **{op.ASIN: math.asin, op.ACOS: math.acos, op.ATAN: math.atan},
+    **{op.SINH: math.sinh, op.COSH: math.cosh, op.TANH: math.tanh},
+    **{op.ASINH: math.asinh, op.ACOSH: math.acosh, op.ATANH: math.atanh},
+    **{op.LOG1P: math.log1p, op.EXPM1: math.expm1, op.ABSOLUTE: abs, op.SIGN: np.sign},
+    **{op.FLOOR: math.floor, op.CEILING: math.ceil, op.TRUNCATE: math.trunc},
+    **{op.STEP: lambda u: np.heaviside(u, 0.5)},
+}
+ARITY = {
+    op.SELECT: 3,
+    **dict.fromkeys((op.SUM, op.PRODUCT, op.QUOTIENT, op.MAXIMUM, op.MINIMUM, op.ANGLE), 2),
+    **dict.fromkeys((op.LESS, op.LESS_EQUAL, op.EQUAL, op.AND, op.OR), 2),
+}
+
+
+def value(found, place):
+    """Value of one program."""
+    registers = []
+    for code, a, b, c in found.rows[found.first[place] : found.first[place + 1]]:
+        match code:
+            case op.TIME:
+                registers.append(T)
+            case op.STATE:
+                registers.append((Q, V)[a])
+            case op.PARAMETER:
+                registers.append((K,)[a])
+            case op.NUMBER:
+                registers.append(found.numbers[a])
+            case op.WHOLE_POWER:
+                registers.append(registers[a] ** b)
+            case op.FIXED_POWER:
+                registers.append(registers[a] ** found.numbers[b])
+            case _:
+                operands = [registers[each] for each in (a, b, c)[: ARITY.get(code, 1)]]
+                registers.append(float(OPERATIONS[code](*operands)))
+    return registers[-1]
+
+
+def written(*functions):
+    """Programs of guards."""
+    expressions = trace(lambda t, x, p: [each(t, x.q, x.v, p.k) for each in functions], ("q", "v"), ("k",))
+    return programs(expressions, [], [], SYMBOLS)
+
+
+FUNCTIONS = [
+    lambda t, q, v, k: q,
+    lambda t, q, v, k: 3.5 + 0.0 * q,
+    lambda t, q, v, k: q + v + t + k,
+    lambda t, q, v, k: q - 2.0 * v * k / t,
+    lambda t, q, v, k: -q / (v * t**2),
+    lambda t, q, v, k: 1.0 / (v * q),
+    lambda t, q, v, k: v**5 + v**-3 + q**0.5 + q**-0.5 + q**2.3 + q**-1.7,
+    lambda t, q, v, k: q**2.0 + k**v + 2.3**q,
+    lambda t, q, v, k: np.sqrt(q) + np.cbrt(v) + np.exp(v) + np.log(q) + np.exp2(v),
+    lambda t, q, v, k: np.sin(q) + np.cos(v) * np.tan(t) + np.arcsin(q) - np.arccos(q) + np.arctan(v),
+    lambda t, q, v, k: np.sinh(q) + np.cosh(v) * np.tanh(t) + np.arcsinh(v) - np.arccosh(k) + np.arctanh(q),
+    lambda t, q, v, k: np.log1p(q) + np.expm1(v) + np.log2(q) + np.log10(q) + np.hypot(q, v),
+    lambda t, q, v, k: np.abs(v) + np.sign(v) + np.heaviside(v, 0.5) + np.heaviside(q, 0.5),
+    lambda t, q, v, k: np.floor(v) + 10 * np.ceil(v) + 100 * np.trunc(v),
+    lambda t, q, v, k: np.maximum(q, v) - 10 * np.minimum(q, v) + np.arctan2(v, q),
+    lambda t, q, v, k: np.mod(v, 0.4) + 10 * np.fmod(v, 0.4) + 100 * np.mod(q, -0.4),
+    lambda t, q, v, k: np.where(q < v, 1.0, 2.0) + np.where(v <= q, 10.0, 20.0) + np.where(q == v, 5.0, 7.0),
+    lambda t, q, v, k: np.where((q > 0) & (v > 0), q, v) + np.where((q > 0) | (v > 0), k, t),
+    lambda t, q, v, k: np.where(~(q > 0), q, k),
+    lambda t, q, v, k: np.sin(q * v) * np.sin(q * v) + np.cos(q * v),
+]
+
+
+@pytest.mark.parametrize("k", range(len(FUNCTIONS)))
+def test_values(k):
+    with np.errstate(all="ignore"):
+        expected = float(FUNCTIONS[k](*map(np.float64, (T, Q, V, K))))
+    assert value(written(FUNCTIONS[k]), 0) == pytest.approx(expected, rel=1e-13)
+
+
+def test_several_programs_share_their_numbers():
+    found = written(*FUNCTIONS)
+    assert len(set(found.numbers)) == len(found.numbers)
+    assert len(found.rows) == found.first[-1] == len(found.checked)
+    for k, function in enumerate(FUNCTIONS):
+        with np.errstate(all="ignore"):
+            expected = float(function(*map(np.float64, (T, Q, V, K))))
+        assert value(found, k) == pytest.approx(expected, rel=1e-13)
+
+
+def test_common_parts_have_one_row():
+    found = written(lambda t, q, v, k: np.sin(q * v) + np.cos(q * v) + np.sin(q * v) * t)
+    codes = [row[0] for row in found.rows]
+    assert codes.count(op.SIN) == codes.count(op.COS) == codes.count(op.STATE) // 2 == 1
+
+
+def test_the_last_row_is_the_expression_even_if_it_occurs_inside_of_itself():
+    """Rows that a remainder needs again come before it."""
+    found = written(lambda t, q, v, k: np.mod(v, 0.4) - np.mod(v, 0.4) + v, lambda t, q, v, k: v)
+    assert value(found, 0) == pytest.approx(V)
+    assert value(found, 1) == V
+
+
+def test_what_has_no_program_has_no_rows():
+    q = SYMBOLS.x[0]
+    found = programs([None, sympy.gamma(q), q], [], [], SYMBOLS)
+    assert found.first == (0, 0, 0, 1)
+
+
+def test_rows_of_forcings_that_may_hide_a_pulse_are_checked():
+    t, q = SYMBOLS.t, SYMBOLS.x[0]
+    pulse = sympy.exp(-(t**2)) + q
+    found = programs([pulse], [pulse], [pulse], SYMBOLS)
+    marks = [found.checked[found.first[k] : found.first[k + 1]] for k in range(3)]
+    assert not any(marks[0])
+    assert not any(marks[2])
+    codes = [row[0] for row in found.rows[found.first[1] : found.first[2]]]
+    checked = [code for code, mark in zip(codes, marks[1], strict=True) if mark]
+    assert checked == [op.EXP, op.SUM]

@@ -1,0 +1,169 @@
+"""Printed code has the values of its expressions, at ties and without a value too."""
+
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+from hybrid.symbolic.expressions import (
+    Equal,
+    Gate,
+    Less,
+    LessEqual,
+    Maximum,
+    Minimum,
+    Not,
+    Or,
+    Select,
+    Sign,
+    Step,
+    exp2,
+)
+from hybrid.symbolic.printer import assignments, power_text, unprintable
+
+A, B, C = sympy.symbols("a b c", real=True)
+PLACES = [(0.7, -1.3, 2.1), (-0.4, 0.9, -1.6), (1.9, 1.1, 0.3)]
+
+
+def run(expressions, a, b, c, **options):
+    """Values of the printed code."""
+    out = np.zeros(len(expressions))
+    lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions, **options)
+    with np.errstate(all="ignore"):
+        exec("\n".join(lines), {"a": a, "b": b, "c": c, "out": out, **vars(math), "abs": abs})
+    return out
+
+
+def printed(expression):
+    """The code of one expression."""
+    return assignments(["y"], [expression])[0].removeprefix("y0 = ")
+
+
+def random_expression(rng, depth, place):
+    """An expression, and its value at a place."""
+    if depth == 0 or rng.random() < 0.1:
+        numbers = (sympy.Rational(2, 3), sympy.Float(0.37), sympy.Integer(-3), sympy.Integer(2))
+        k = rng.integers(0, 7)
+        return ((A, B, C, *numbers)[k], float((*place, *numbers)[k]))
+    (u, x), (v, y) = (random_expression(rng, depth - 1, place) for _ in range(2))
+    whole, halves = int(rng.integers(2, 5)), sympy.Rational(int(rng.integers(-5, 6)), 2)
+    made = [
+        (u + v, x + y),
+        (u - v, x - y),
+        (u * v, x * y),
+        (-u, -x),
+        (u / (2 + v**2), x / (2 + y**2)),
+        (u**whole, x**whole),
+        ((1 + u**2) ** halves, (1 + x**2) ** float(halves)),
+        ((1 + u**2) ** sympy.Rational(-1, 3), (1 + x**2) ** (-1 / 3)),
+        (sympy.sin(u) * sympy.exp(-(v**2)), math.sin(x) * math.exp(-(y**2))),
+        (Select(Less(u, v), u, v - 1), x if x < y else y - 1),
+        (Maximum(u, v) - Minimum(u, sympy.Float(0.5)), max(x, y) - min(x, 0.5)),
+        (Step(u) * v, float(np.heaviside(x, 0.5)) * y),
+        (sympy.Mul(u, u + v, evaluate=False), x * (x + y)),
+    ]
+    return made[rng.integers(0, len(made))]
+
+
+@pytest.mark.parametrize("thorough", [True, False])
+@pytest.mark.parametrize("seed", range(15))
+def test_random_expressions_keep_their_values(seed, thorough):
+    for place in PLACES:
+        rng = np.random.default_rng(seed)
+        expressions, expected = zip(*(random_expression(rng, 4, place) for _ in range(4)), strict=True)
+        found = run(expressions, *place, thorough=thorough)
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [*range(-18, 0), *range(2, 19)])
+@pytest.mark.parametrize("halves", [1, 2])
+def test_powers(exponent, halves):
+    power = A ** sympy.Rational(exponent, halves)
+    for a in (0.7, 1.9):
+        np.testing.assert_allclose(
+            run([power, B * power], a, 3.0, 0.0), [a ** (exponent / halves) * k for k in (1, 3)]
+        )
+
+
+@pytest.mark.parametrize(
+    ("expression", "text"),
+    [
+        (A - 1, "a - 1.0"),
+        (-A, "-a"),
+        (-A - B, "-b - a"),
+        (A - (B - C) * 2, "-2.0*b + 2.0*c + a"),
+        ((A + B) * C, "c*(b + a)"),
+        (A / (B * C), "a/(b*c)"),
+        (1 / A, "1.0/a"),
+        (2 * A / 3, "2.0*a/3.0"),
+        (A / 4, "0.25*a"),
+        (-2 / (3 * A), "-2.0/(a*3.0)"),
+        (sympy.sqrt(A), "sqrt(a)"),
+        (1 / sympy.sqrt(A), "1.0/sqrt(a)"),
+        (A**3, "a*a*a"),
+        (A ** sympy.Rational(3, 2), "a*sqrt(a)"),
+        (A**B, "a**b"),
+        ((A + 1) ** B, "(a + 1.0)**b"),
+        (A ** (-B), "a**(-b)"),
+        (A ** sympy.Rational(1, 3), "a**0.3333333333333333"),
+        (exp2(A + B), "2.0**(b + a)"),
+        (sympy.exp(A + B), "exp(b + a)"),
+        (Less(A, B), "(1.0 if a < b else 0.0)"),
+        (LessEqual(A, B), "(1.0 if a <= b else 0.0)"),
+        (Equal(A, B), "(1.0 if a == b else 0.0)"),
+        (Or(Less(A, B), Not(Less(B, C))), "(1.0 if (a < b) or (not (b < c)) else 0.0)"),
+        (Select(A, B, C), "(b if a != 0.0 else c)"),
+    ],
+)
+def test_texts(expression, text):
+    shown = printed(expression)
+    assert shown.replace(" ", "") == text.replace(" ", "")
+
+
+@pytest.mark.parametrize(
+    ("expression", "function"),
+    [
+        (Step(A), lambda a, b: np.heaviside(a, 0.5)),
+        (Sign(A), lambda a, b: np.sign(a)),
+        (Maximum(A, B), np.maximum),
+        (Minimum(A, B), np.minimum),
+        (Maximum(A, sympy.Float(1)), lambda a, b: np.maximum(a, 1.0)),
+        (Minimum(sympy.Float(1), A), lambda a, b: np.minimum(a, 1.0)),
+        (Gate(A, B), lambda a, b: 0.0 if a < 0 else np.heaviside(a, 0.5) * b),
+    ],
+)
+def test_ties_infinities_and_nan(expression, function):
+    values = (-np.inf, -1.0, 0.0, 1.0, 2.0, np.inf, np.nan)
+    for a in values:
+        for b in values:
+            with np.errstate(invalid="ignore"):
+                expected = function(a, b)
+            np.testing.assert_equal(float(run([expression], a, b, 0.0)[0]), float(expected))
+
+
+def test_stores_come_after_all_values():
+    """Targets may be variables that the expressions read."""
+    lines = assignments(["a", "b"], [A + B, A - B])
+    space = {"a": 3.0, "b": 1.0}
+    exec("\n".join(lines), space)
+    assert (space["a"], space["b"]) == (4.0, 2.0)
+
+
+@pytest.mark.parametrize("thorough", [True, False])
+def test_what_is_used_twice_is_computed_once(thorough):
+    long = sympy.sin(A * B + C)
+    text = "\n".join(assignments(["y", "z"], [long + 1, long * A], thorough=thorough))
+    assert text.count("sin(") == 1
+
+
+def test_functions_without_code_are_named():
+    assert unprintable([sympy.sin(A) + A * sympy.pi, Maximum(A, B)]) is None
+    assert unprintable([A, sympy.gamma(A)]) == "gamma"
+
+
+@pytest.mark.parametrize("exponent", [-7, -3, -1, 1, 3, 7])
+def test_half_integer_powers_in_series(exponent):
+    text = power_text("z", sympy.Rational(exponent, 2), "n")
+    assert eval(text, {"z": 1.7, "sqrt": math.sqrt}) == pytest.approx(1.7 ** (exponent / 2), rel=1e-15)
+    assert power_text("z", sympy.Rational(exponent, 3), "n") == "z**n"

@@ -1,0 +1,120 @@
+"""Defaults of the public calls and classes: part of what the library promises, like the names.
+
+A changed default changes the results of every script that relies on it.
+"""
+
+import inspect
+
+import pytest
+
+import hybrid
+import hybrid.plot
+import hybrid.testing
+import lyapunov
+
+MODEL = {"mode": None, "parameters": None}
+RUN = {**MODEL, "solver": None}
+LONG = {**RUN, "t0": 0.0, "progress": False}
+TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
+CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
+PLAIN = {"parameters": None, "period": None, "name": "", "units": None}
+DEFAULTS = {
+    hybrid.DOP853: TOLERANCES,
+    hybrid.RadauIIA: TOLERANCES,
+    hybrid.Taylor: TOLERANCES,
+    hybrid.Tsit5: TOLERANCES,
+    hybrid.Guard: {"direction": 0, "gradient": None, "when": None, "at_start": False},
+    hybrid.Mode: {"jacobian": None, "part_of": None},
+    hybrid.Reset: {"jacobian": None},
+    hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},
+    hybrid.HybridSystem: {"transitions": (), "period": None, "name": "", "notes": (), "growth": None},
+    hybrid.Answer: {
+        **{"times": None, "saltation": None, "fundamental": None, "exponents": None},
+        **{"steps": None, "seconds": None},
+    },
+    hybrid.filippov: {"period": None, "name": "", "units": None},
+    hybrid.from_equations: PLAIN,
+    hybrid.global_error: {**RUN, "max_jumps": 100_000},
+    hybrid.simulate: {**RUN, "tangent": None, "samples": None, "max_jumps": 100_000},
+    hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None},
+    hybrid.periodic_orbit: {
+        **RUN,
+        **{"t0": 0.0, "periods": 1, "period": None, "tolerance": 1e-10, "max_iterations": 30},
+    },
+    hybrid.poincare_section: {**LONG, "transient": 0},
+    hybrid.stroboscopic_section: {**LONG, "transient": 0},
+    hybrid.saltation_matrix: {"parameters": None},
+    hybrid.sweep: {"store": None, "executor": None, "progress": None},
+    lyapunov.chart: {
+        **{**LONG, "progress": None, "k": 1, "intervals": 1000, "interval": None, "transient": 200},
+        **{"section": 0, "at": None, "continue_from": None, "store": None, "executor": None},
+    },
+    lyapunov.compare_models: {
+        **RUN,
+        **{"points": ({},), "k": None, "intervals": 300, "interval": None, "transient": 200},
+        "progress": False,
+    },
+    lyapunov.lyapunov_spectrum: {
+        **{**LONG, "k": None, "intervals": 1000, "interval": None, "transient": 200, "history": True},
+    },
+    lyapunov.two_orbit_exponents: {
+        **{**LONG, "separation": 1e-8, "direction": None, "intervals": 1000, "interval": None},
+        "transient": 0,
+    },
+    hybrid.plot.plot_orbit: {"x": 0, "y": None, "ax": None},
+    hybrid.plot.plot_section: {"x": 0, "y": None, "ax": None},
+    hybrid.plot.plot_work_precision: {"quantity": "state", "ax": None},
+}
+
+
+def defaults(callable_):
+    """The defaults of a signature, without those that attrs makes anew for each object."""
+    found = inspect.signature(callable_).parameters.values()
+    return {
+        each.name: each.default
+        for each in found
+        if each.default is not each.empty and type(each.default).__name__ not in ("_Nothing", "NothingType")
+    }
+
+
+@pytest.mark.parametrize("callable_", DEFAULTS, ids=lambda each: each.__name__)
+def test_defaults(callable_):
+    found = defaults(callable_)
+    if callable_ is lyapunov.compare_models:
+        # Its parameters are those of its points.
+        assert found == {name: value for name, value in DEFAULTS[callable_].items() if name != "parameters"}
+    else:
+        assert found == DEFAULTS[callable_]
+
+
+def test_defaults_of_checks():
+    found = defaults(hybrid.testing.check_system)
+    assert found["examples"] == 50
+    assert found["solver"] == hybrid.DOP853(**CHECKING)
+    names = ("states", "parameters", "t_span", "mode", "elastic")
+    assert [found[name] for name in names] == [None] * 5
+
+
+def test_defaults_of_work_precision():
+    found = defaults(hybrid.work_precision)
+    assert found["methods"] == {"Taylor": hybrid.Taylor(), "DOP853": hybrid.DOP853(), "Tsit5": hybrid.Tsit5()}
+    assert found["tolerances"] == (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+    assert (found["tangent"], found["repeats"], found["longest"]) == (False, 5, 10.0)
+
+
+def test_every_public_call_is_listed():
+    listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
+    # Bases, errors and results are made by the library.
+    made = {"Solver", "Status", "StatusCode"}
+    for package in (hybrid, lyapunov):
+        for name in package.__all__:
+            each = getattr(package, name)
+            if (
+                inspect.ismodule(each)
+                or name in made
+                or (isinstance(each, type)
+                and issubclass(each, Exception))
+            ):
+                continue
+            if defaults(each) and not name.endswith("Orbit"):
+                assert name in listed | made, name
