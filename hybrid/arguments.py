@@ -6,7 +6,6 @@ booleans and complex numbers are not accepted as numbers.
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Callable, Iterable, Mapping
 from math import inf, isfinite
 from numbers import Real
@@ -15,17 +14,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hybrid.errors import ArgumentError, unknown_name
+from hybrid.errors import shown as shown
 
 Kind = TypeVar("Kind")
 LARGEST_COUNT = int(np.iinfo(np.int64).max)
-
-_short = reprlib.Repr()
-_short.maxstring = _short.maxother = 100
-
-
-def shown(value: object) -> str:
-    """A value as error texts show it; long values are shortened."""
-    return _short.repr(value)
 
 
 def refusal(name: str, wanted: str, value: object) -> ArgumentError:
@@ -138,7 +130,7 @@ def mapping(name: str, value: object, wanted: str = "map names to numbers") -> d
 
 def items(name: str, value: object, wanted: str) -> list[Any]:
     """The items of a collection; a string is not a collection here."""
-    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes | bytearray):
         raise refusal(name, wanted, value)
     try:
         return list(value)

@@ -10,6 +10,7 @@ from typing import Any
 
 import attrs
 
+from hybrid.compiler.interrupts import between_passes
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import COMPLEX_STEP
 from hybrid.system.variables import PARAMETERS, STATE, plain_class
@@ -76,6 +77,7 @@ def check_plain(title: str, function: Callable[..., Any]) -> None:
         )
 
 
+@between_passes()
 def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
     """A function and its derivative, compiled, by their names in generated text; they never raise.
 

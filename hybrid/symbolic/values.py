@@ -19,7 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from hybrid.errors import ModelError
+from hybrid.errors import ModelError, shown
 from hybrid.symbolic.branches import refused_branch
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
@@ -331,7 +331,7 @@ def _content(value: Any) -> Any:
     try:
         return _ALGEBRA.get().number(value)
     except (TypeError, ValueError, OverflowError):
-        raise refusal(f"{value!r} is not a number") from None
+        raise refusal(f"{shown(value)} is not a number") from None
 
 
 def _plain(value: Any) -> np.ndarray:

@@ -99,8 +99,31 @@ NAME = ["nope", 3, 1.5, True, math.nan, [1], np.array(["a", "b"]), Odd()]
 UNITS = [[1], "a", 3, {"nope": "m"}, {3: "m"}, {"q": 3}, {"q": None}, Odd()]
 TEXT = [None, 3, True, [1], Odd()]
 SYSTEM = [None, "a", 3, models.bouncing_ball, HybridSystem, [BALL], Odd()]
-PARAMETERS = [[1], "a", 3, True, ["c"], {"nope": 1.0}, {3: 1.0}, Odd(), *({"c": value} for value in NUMBER)]
-OF_BALL = [[1], "a", 3, True, ["e"], {"nope": 1.0}, {3: 1.0}, Odd(), *({"e": value} for value in NUMBER)]
+EMPTY = ["", [], (), np.array([]), np.array(["1", "2"]), np.ma.masked]
+PARAMETERS = [
+    *EMPTY,
+    [1],
+    "a",
+    3,
+    True,
+    ["c"],
+    {"nope": 1.0},
+    {3: 1.0},
+    Odd(),
+    *({"c": value} for value in NUMBER),
+]
+OF_BALL = [
+    *EMPTY,
+    [1],
+    "a",
+    3,
+    True,
+    ["e"],
+    {"nope": 1.0},
+    {3: 1.0},
+    Odd(),
+    *({"e": value} for value in NUMBER),
+]
 SOLVER = ["DOP853", hybrid.DOP853, 3, 0, False, "", [hybrid.DOP853()], Odd()]
 FUNCTION = ["a", 3, True, [1], np.array([1.0])]
 GUARD = [None, "a", 3, lambda t, x, p: x.q, Guard, Odd()]
@@ -122,7 +145,7 @@ BIG_TIMES = [1e300, -1e300, 1e17]
 EXPONENTS = {
     **RUN,
     "intervals": [0, *COUNT],
-    "interval": [*OPTIONAL_POSITIVE, 1e-300],
+    "interval": [*OPTIONAL_POSITIVE, 1e-300, 1e308],
     "transient": COUNT,
     "t0": [*NUMBER, *BIG_TIMES],
     "progress": FLAG,

@@ -15,6 +15,7 @@ from typing import Any
 
 from hybrid.compiler.cache import second_process
 from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, source_key
+from hybrid.compiler.interrupts import between_passes
 from hybrid.symbolic.branches import PARSER
 
 DRIVER = "hybrid.kernels.drive"
@@ -52,9 +53,10 @@ def load_kernels(module: str = DRIVER) -> ModuleType:
     with nullcontext() if kept else announced(MESSAGE):
         if module in EVENTS:
             second_process.finish()
-        _import_numba()
-        with compiled_into(_folder(module)):
-            return importlib.import_module(module)
+        with between_passes():
+            _import_numba()
+            with compiled_into(_folder(module)):
+                return importlib.import_module(module)
 
 
 # Numba's cache folder is a setting of the whole process, so only one thread may change it at a time.

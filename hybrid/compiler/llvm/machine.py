@@ -10,6 +10,7 @@ from typing import Any
 import attrs
 from llvmlite import binding, ir
 
+from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, OwnFunction, Signature, lower
 
 # LLVM's highest optimisation level.
@@ -48,6 +49,7 @@ def processor() -> str:
     return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
 
+@between_passes()
 def machine_code(
     functions: Sequence[tuple[ast.FunctionDef, Signature, bool]],
     calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,
@@ -72,6 +74,7 @@ def machine_code(
     return code
 
 
+@between_passes()
 def load(code: bytes, names: Sequence[str], needs: Sequence[Any] = ()) -> dict[str, Compiled]:
     """The functions of an object file, ready to be called; ``needs`` are objects that must outlive them."""
     # Each engine needs its own target, since it frees the target when it is freed itself.

@@ -119,3 +119,10 @@ def test_a_loop_has_no_replacement():
 
 def test_a_branch_inside_numpy():
     assert "traced" in advice(lambda t, x, p: np.sort([x.q, x.v])[0])
+
+
+def test_a_search_in_a_tuple_has_no_replacement():
+    def force(t, x, p):
+        return 1.0 if x.q in (1.0, 2.0) else 0.0
+
+    assert OTHERWISE in advice(force)
