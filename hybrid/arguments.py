@@ -6,7 +6,7 @@ booleans and complex numbers are not accepted as numbers.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from math import inf, isfinite
 from numbers import Real
 from typing import Any, TypeVar
@@ -78,14 +78,11 @@ def numbers(name: str, value: object, wanted: str) -> np.ndarray:
 
 def time_span(name: str, value: object) -> tuple[float, float]:
     """A pair of finite times, the second not before the first."""
-    pair: Any = value
-    try:
-        begin, end = pair
-    except (TypeError, ValueError):
-        raise refusal(name, "be a pair (t0, t1)", value) from None
-    t0, t1 = _as_float(begin), _as_float(end)
-    if t0 is None or t1 is None:
+    # A set has no order.
+    pair = None if isinstance(value, Set) else floats(value)
+    if pair is None or pair.shape != (2,):
         raise refusal(name, "be a pair (t0, t1) of numbers", value)
+    t0, t1 = pair.tolist()
     if not (isfinite(t0) and isfinite(t1)):
         raise ArgumentError(f"{name} must be finite; got ({t0}, {t1}).")
     if t1 < t0:
@@ -188,10 +185,14 @@ def _as_float(value: object) -> float | None:
 def floats(value: object) -> np.ndarray | None:
     """Real numbers as a new array of floats; None if any item is not a real number."""
     if isinstance(value, np.ndarray):
-        if value.dtype.kind in "fiu" and not np.ma.is_masked(value):
+        if np.ma.is_masked(value):
+            return None
+        if value.dtype.kind in "fiu":
             return np.array(value, dtype=float)
     elif isinstance(value, list | tuple) and all(type(each) is float for each in value):
         return np.array(value, dtype=float)
+    if isinstance(value, bytes | bytearray):
+        return None
     try:
         given = np.array(value, dtype=object)
     except (TypeError, ValueError):

@@ -61,6 +61,7 @@ NUMBERS = [
     Odd(),
     [None, 1.0],
 ]
+NUMBERS += [bytearray(b"ab"), np.ma.array([1.0, 2.0], mask=[False, True]), np.ma.masked]
 NUMBERS += [np.array(["a", "b"]), np.array([None, Odd()]), np.array([True, False]), np.array([1j, 2j])]
 STATE = [
     *NUMBERS,
@@ -84,6 +85,7 @@ SPAN = [
     (0.0, math.nan),
     (0.0, math.inf),
 ]
+SPAN += [b"ab", bytearray(b"ab"), {0.0, 1.0}, np.ma.array([0.0, 1.0], mask=[False, True])]
 SPAN += [(False, True), (0.0, 1j), np.array([None, 1.0]), (0.0, None), Odd()]
 SAMPLES = [*NUMBERS[1:], 0.5, [[0.1, 0.2]], [0.5, 0.1], [-1.0], [0.1, math.nan], [2.0], [math.inf]]
 TANGENT = [
@@ -225,7 +227,7 @@ def table(made):
                 "parameters": OF_BALL,
                 "methods": [None, [], {}, "a", 3, {"T": 3}, {"T": "Taylor"}, {"T": None}],
                 "tolerances": [None, [], "a", ["1"], [0.0], [-1.0], [math.nan], [True], 1e-3, [[1e-3]]],
-                "reference": [*NUMBERS[1:], (1.0,), BALL],
+                "reference": [*NUMBERS[1:], (1.0,), BALL, (math.nan, 0.0), (math.inf, 0.0)],
                 "reference_error": [
                     [1],
                     "a",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import pickle
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,8 +10,7 @@ from typing import Any
 from numba.core import caching, ccallback, dispatcher
 
 from hybrid.compiler.cache.folder import say
-
-DIGEST_LENGTH = 32
+from hybrid.compiler.cache.seal import sealed, unsealed
 
 
 class DamagedError(Exception):
@@ -20,23 +18,32 @@ class DamagedError(Exception):
 
 
 class _CheckedFile(caching.IndexDataCacheFile):
-    """A data file that starts with the SHA-256 digest of its content."""
+    """An index and the files of data that it names, all with checksums."""
 
     def _dump(self, obj: Any) -> bytes:
         data: bytes = super()._dump(obj)
         return data
 
     def _save_data(self, name: str, data: Any) -> None:
-        content = self._dump(data)
         with self._open_for_write(self._data_path(name)) as file:
-            file.write(hashlib.sha256(content).digest() + content)
+            file.write(sealed(name, self._dump(data)))
 
     def _load_data(self, name: str) -> Any:
         with open(self._data_path(name), "rb") as file:
-            digest, content = file.read(DIGEST_LENGTH), file.read()
-        if hashlib.sha256(content).digest() != digest:
+            content = unsealed(name, file.read())
+        if content is None:
             raise DamagedError(name)
         return pickle.loads(content)
+
+    def _save_index(self, overloads: Any) -> None:
+        self._save_data(self._index_name, (self._version, self._source_stamp, overloads))
+
+    def _load_index(self) -> Any:
+        try:
+            version, stamp, overloads = self._load_data(self._index_name)
+        except FileNotFoundError:
+            return {}
+        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 
 
 class _InFolder(caching.CompileResultCacheImpl):

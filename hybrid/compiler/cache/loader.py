@@ -38,6 +38,8 @@ ALL_KERNELS = (
     "lyapunov.kernels",
     "lyapunov.study.kernels",
 )
+# The modules that decide the form of the files.
+FORM = (PACKAGE / "compiler" / "cache" / "checked.py", PACKAGE / "compiler" / "cache" / "seal.py")
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
@@ -120,8 +122,11 @@ def sources_in(folder: Path) -> list[Path]:
 
 @cache
 def kernels_key(module: str = DRIVER) -> str:
-    """Hash of all sources of a kernel module: our kernels, and files of its own package if it has another."""
-    sources = sources_in(PACKAGE / "kernels")
+    """Hash of all sources of a kernel module: our kernels, and files of its own package if it has another.
+
+    The form of the files in the cache belongs to them, too.
+    """
+    sources = [*sources_in(PACKAGE / "kernels"), *FORM]
     if not module.startswith("hybrid."):
         sources += sorted(_own_sources(module))
     return source_key(*(path.read_text(encoding="utf-8") for path in sources))

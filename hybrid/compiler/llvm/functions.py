@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.compiler.cache.folder import keep, kept, say, source_key
+from hybrid.compiler.cache.folder import keep, kept, source_key
 from hybrid.compiler.cache.store import models_folder
 from hybrid.compiler.cases import Case, cases_of, function_text
 from hybrid.compiler.llvm.lowering import (
@@ -102,10 +100,10 @@ def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int
 def shared_functions(source: str, names: tuple[str, ...]) -> dict[str, Compiled]:
     """The compiled functions of a text that calls no user function, shared by all systems with it."""
     path = models_folder() / f"model_{source_key(source, processor())}.o"
-    code = _checked(path)
+    code = kept(path)
     if code is None:
         code = _code(source, names, {})
-        keep(path, hashlib.sha256(code).digest() + code)
+        keep(path, code)
     return load(code, names)
 
 
@@ -117,16 +115,3 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
         for name, kind in zip(names, kinds, strict=True)
     ]
     return machine_code(wanted, calls)
-
-
-def _checked(path: Path) -> bytes | None:
-    """The machine code in a file; None if the file is missing or does not match its checksum."""
-    content = kept(path)
-    if content is None:
-        return None
-    size = hashlib.sha256().digest_size
-    digest, code = content[:size], content[size:]
-    if hashlib.sha256(code).digest() == digest:
-        return code
-    say(f"hybrid: compiled code in {path.parent} is damaged; it is compiled again.")
-    return None
