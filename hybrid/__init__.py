@@ -4,6 +4,9 @@ A model is a graph: modes are smooth vector fields, transitions are guards and r
 imported and runs only when a call first needs it.
 """
 
+from importlib import import_module
+from types import ModuleType
+
 from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
@@ -68,5 +71,15 @@ __all__ = [
 ]
 
 
+# Modules that are imported when they are first asked for: they need Matplotlib and Hypothesis.
+ON_DEMAND = ("plot", "testing")
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in ON_DEMAND:
+        return import_module(f"hybrid.{name}")
+    raise AttributeError(f"module 'hybrid' has no attribute {name!r}")
+
+
 def __dir__() -> list[str]:
-    return [*__all__, "__version__", "plot", "testing"]
+    return [*__all__, "__version__", *ON_DEMAND]

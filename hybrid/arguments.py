@@ -6,8 +6,7 @@ booleans and complex numbers are not accepted as numbers.
 
 from __future__ import annotations
 
-import reprlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from math import inf, isfinite
 from numbers import Real
 from typing import Any, TypeVar
@@ -15,17 +14,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hybrid.errors import ArgumentError, unknown_name
+from hybrid.errors import shown as shown
 
 Kind = TypeVar("Kind")
 LARGEST_COUNT = int(np.iinfo(np.int64).max)
-
-_short = reprlib.Repr()
-_short.maxstring = _short.maxother = 100
-
-
-def shown(value: object) -> str:
-    """A value as error texts show it; long values are shortened."""
-    return _short.repr(value)
 
 
 def refusal(name: str, wanted: str, value: object) -> ArgumentError:
@@ -86,14 +78,11 @@ def numbers(name: str, value: object, wanted: str) -> np.ndarray:
 
 def time_span(name: str, value: object) -> tuple[float, float]:
     """A pair of finite times, the second not before the first."""
-    pair: Any = value
-    try:
-        begin, end = pair
-    except (TypeError, ValueError):
-        raise refusal(name, "be a pair (t0, t1)", value) from None
-    t0, t1 = _as_float(begin), _as_float(end)
-    if t0 is None or t1 is None:
+    # A set has no order.
+    pair = None if isinstance(value, Set) else floats(value)
+    if pair is None or pair.shape != (2,):
         raise refusal(name, "be a pair (t0, t1) of numbers", value)
+    t0, t1 = pair.tolist()
     if not (isfinite(t0) and isfinite(t1)):
         raise ArgumentError(f"{name} must be finite; got ({t0}, {t1}).")
     if t1 < t0:
@@ -138,7 +127,7 @@ def mapping(name: str, value: object, wanted: str = "map names to numbers") -> d
 
 def items(name: str, value: object, wanted: str) -> list[Any]:
     """The items of a collection; a string is not a collection here."""
-    if not isinstance(value, Iterable) or isinstance(value, str | bytes):
+    if not isinstance(value, Iterable) or isinstance(value, str | bytes | bytearray):
         raise refusal(name, wanted, value)
     try:
         return list(value)
@@ -196,10 +185,14 @@ def _as_float(value: object) -> float | None:
 def floats(value: object) -> np.ndarray | None:
     """Real numbers as a new array of floats; None if any item is not a real number."""
     if isinstance(value, np.ndarray):
-        if value.dtype.kind in "fiu" and not np.ma.is_masked(value):
+        if np.ma.is_masked(value):
+            return None
+        if value.dtype.kind in "fiu":
             return np.array(value, dtype=float)
     elif isinstance(value, list | tuple) and all(type(each) is float for each in value):
         return np.array(value, dtype=float)
+    if isinstance(value, bytes | bytearray):
+        return None
     try:
         given = np.array(value, dtype=object)
     except (TypeError, ValueError):

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterable
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = 100
 
 
 class HybridError(Exception):
@@ -18,12 +22,17 @@ class ArgumentError(ModelError):
     """An argument of a call is out of range or of the wrong shape for the model it is used with."""
 
 
+def shown(value: object) -> str:
+    """A value as error texts show it; long values are shortened, and a ``repr`` may fail."""
+    return _short.repr(value)
+
+
 def unknown_name(what: str, name: object, allowed: Iterable[str], kind: str) -> str:
     """Error text for an unknown name: lists the existing names and suggests the closest one.
 
     ``what`` opens the sentence (``"Transition 'impact': target mode"``), ``kind`` heads the list.
     """
     known = list(allowed)
-    text = f"{what} {name!r} does not exist. {kind}: {', '.join(known) if known else '(none)'}."
-    close = difflib.get_close_matches(str(name), known, n=1)
+    text = f"{what} {shown(name)} does not exist. {kind}: {', '.join(known) if known else '(none)'}."
+    close = difflib.get_close_matches(name, known, n=1) if isinstance(name, str) else []
     return f"{text} Did you mean {close[0]!r}?" if close else text

@@ -18,6 +18,7 @@ from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
@@ -218,6 +219,7 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
     else:
         norm = np.linalg.norm(trajectory.jacobian(), 2)
         length = 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
+    check_time("interval", length, period)
     latest = period or max(abs(trajectory.t), abs(trajectory.t + length * intervals))
     if not math.ulp(latest) <= FINEST_INTERVAL * length:
         where = f"a period of {period}" if period else f"t0 = {trajectory.t} and {intervals} intervals"

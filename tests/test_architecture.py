@@ -226,3 +226,11 @@ def test_importing_hybrid_is_light():
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == [], f"import hybrid also imports {done.stdout}"
+
+
+def test_every_name_of_the_package_can_be_asked_for():
+    import hybrid
+
+    assert [name for name in dir(hybrid) if not hasattr(hybrid, name)] == []
+    with pytest.raises(AttributeError, match="no attribute 'plots'"):
+        hybrid.plots  # noqa: B018

@@ -266,6 +266,8 @@ def work_precision(
         floor = errors_of(check, truth)
     else:
         truth = as_answer("reference", reference, n, span)
+        if not np.all(np.isfinite(truth.state)):
+            raise arguments.refusal("reference", "be a finite state", reference)
         floor = rounding_of(truth) | known_errors
     rows = []
     while runs:

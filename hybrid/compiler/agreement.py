@@ -201,8 +201,10 @@ def _told(
     values: np.ndarray,
     cause: str,
 ) -> str:
+    # As many digits as tell the two apart.
+    digits = next((n for n in (10, 14) if f"{found:.{n}g}" != f"{wanted:.{n}g}"), 17)
     return (
-        f"{what} is {found:.10g} compiled and {wanted:.10g} in Python, "
+        f"{what} is {found:.{digits}g} compiled and {wanted:.{digits}g} in Python, "
         f"{system.variables.described(t, x, values)}. "
         f"Likely: {cause}."
     )

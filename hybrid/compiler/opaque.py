@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 
 from hybrid.compiler.cache.loader import import_numba
+from hybrid.compiler.interrupts import between_passes
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import COMPLEX_STEP
 from hybrid.system.variables import PARAMETERS, STATE, plain_class
@@ -88,6 +89,11 @@ def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
         If numba cannot compile the function.
     """
     import_numba()
+    with between_passes():
+        return _compiled(name, opaque)
+
+
+def _compiled(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
     from numba import cfunc, float64, int64, njit, void
 
     from hybrid.compiler.whole_numbers import WholeNumberCompiler, readonly

@@ -117,7 +117,8 @@ class Bursts:
     def judged(self, code: int) -> int:
         """The code of a kernel: GO_ON if only the burst has ended, INTERRUPTED if the run is to stop."""
         seconds = perf_counter() - self.begin
-        if seconds < SECONDS:
+        # Only a burst that used up its steps says that more of them fit.
+        if seconds < SECONDS and code == codes.MAX_STEPS:
             self.steps *= 2
         elif seconds > 2 * SECONDS:
             self.steps = max(1, int(self.steps * SECONDS / seconds))

@@ -52,7 +52,7 @@ def start(
     solver = check_solver(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
     plan = plan_of(compiled, solver, tangents)
-    model = compiled.at(parameters, plan.model) if parameters else plan.model
+    model = plan.model if parameters is None else compiled.at(parameters, plan.model)
     check_time(time, t0, model.period)
     run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
     work = fresh_work(plan.work_layout, plan.method)

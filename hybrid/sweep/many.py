@@ -88,13 +88,17 @@ def simulate_many(
     [1, 1, 1]
     """
     as_system("system", system)
+    # Before the runs, so that their results come at once after Ctrl-C.
+    import xarray  # noqa: F401
+
     t0, t1 = arguments.time_span("t_span", t_span)
     times = np.empty(0) if samples is None else arguments.increasing_times("samples", samples, t0, t1)
     origins = _origins(system, x0)
     most = arguments.count("max_jumps", max_jumps, 0)
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
     system.parameter_values(parameters)
-    options = {"mode": mode, "parameters": dict(parameters or {}), "solver": check_solver(solver)}
+    overrides = {} if parameters is None else dict(parameters)
+    options = {"mode": mode, "parameters": overrides, "solver": check_solver(solver)}
     found = _Found(origins, times, t1)
     if system.growth is not None or (mode is not None and len(system.parts_of(mode)) > 1):
         work: Any = _OneByOne(system, (t0, t1), options, most, found)
@@ -110,7 +114,7 @@ def simulate_many(
             _in_threads(work.run, blocks, threads)
         # An interrupt that came too late to stop anything is not raised either.
         CTRL_C.is_set()
-    return found.dataset(system, dict(parameters or {}))
+    return found.dataset(system, overrides)
 
 
 def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int) -> None:

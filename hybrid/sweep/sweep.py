@@ -92,6 +92,9 @@ def sweep(
         as_executor(executor)
     along = getattr(task, "along", None)
     lines = None if along is None else points.lines(along)
+    # Before the runs, so that their results come at once after Ctrl-C.
+    import xarray  # noqa: F401
+
     labels = getattr(task, "labels", None) or Labels()
     sheet = Sheet(points)
     date = datetime.now(UTC).isoformat(timespec="seconds")

@@ -52,6 +52,9 @@ def _replacement(frame: FrameType) -> tuple[int, str, str] | None:
             if isinstance(block, list):
                 following |= dict(pairwise(block))
         if isinstance(node, ast.expr | ast.stmt) and _is_branch(node) and _holds(node, line, column):
+            if any(isinstance(each, ast.In | ast.NotIn) for each in ast.walk(node)):
+                # NumPy has no operator for a search in a tuple.
+                return None
             old, new = _shown(node), _rewritten(node, following.get(node))
             if new is not None and len(old) <= LONGEST and len(new) <= LONGEST:
                 return node.lineno, old, new

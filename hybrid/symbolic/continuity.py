@@ -35,6 +35,7 @@ from hybrid.symbolic.expressions import (
     Step,
     Truncate,
     TruncatedRemainder,
+    WholeQuotient,
 )
 from hybrid.symbolic.nodes import (
     MOST_EXPANDED,
@@ -69,8 +70,10 @@ def jumps_of(field: Iterable[sympy.Expr], states: Sequence[sympy.Symbol]) -> lis
 
 
 def _surfaces(entry: sympy.Expr, states: Sequence[sympy.Symbol]) -> list[str]:
-    if not contains(entry, JUMPS):
+    if not contains(entry, (*JUMPS, WholeQuotient)):
         return []
+    quotients = nodes_of(WholeQuotient, entry)
+    entry = replaced(entry, {each: Floor(each.args[0] / each.args[1]) for each in quotients})
     entry = _with_exact_turns(entry)
     jumps = (
         node for node in nodes_of(JUMPS, entry) if mentions(node, states) and not isinstance(node, Level)

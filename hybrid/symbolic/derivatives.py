@@ -12,7 +12,17 @@ import sympy
 from sympy.codegen.cfunctions import expm1, hypot
 from sympy.core.parameters import distribute, global_parameters
 
-from hybrid.symbolic.expressions import ONE, TWO, ZERO, Select, close_gates, defined_at_origin, power, product
+from hybrid.symbolic.expressions import (
+    ONE,
+    TWO,
+    ZERO,
+    Equal,
+    Select,
+    close_gates,
+    defined_at_origin,
+    power,
+    product,
+)
 from hybrid.symbolic.nodes import interned, once
 
 Partials = dict[sympy.Symbol, sympy.Expr]
@@ -141,7 +151,10 @@ def _outer(expression: sympy.Expr, index: int) -> sympy.Expr:
     """Derivative of the outermost function with respect to the argument ``index``."""
     if expression.is_Pow:
         base, exponent = expression.args
-        return exponent * power(base, exponent - 1) if index == 0 else expression * sympy.log(base)
+        if index == 0:
+            return exponent * power(base, exponent - 1)
+        # A power of zero has slope zero, not 0*inf.
+        return expression * sympy.log(base if base.is_positive else Select(Equal(base, ZERO), ONE, base))
     if isinstance(expression, hypot):
         return expression.args[index] / expression
     slope = SLOPES.get(expression.func)

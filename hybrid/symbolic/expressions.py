@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, ClassVar
 
+import numpy as np
 import sympy
 from sympy.codegen.cfunctions import exp2, hypot
 
@@ -290,6 +291,20 @@ class Minimum(RealFunction):
         return Step(other - mine)
 
 
+class LargerNumber(Maximum):
+    """The larger of two, or the one that is a number if the other is nan."""
+
+
+class SmallerNumber(Minimum):
+    """The smaller of two, or the one that is a number if the other is nan."""
+
+
+class WholeQuotient(PiecewiseConstant):
+    """``floor(a/b)`` of the exact quotient: ``1 // 0.1`` is 9, because 0.1 is stored as a little more."""
+
+    value = staticmethod(lambda a, b: float(np.floor_divide(a, b)))
+
+
 class Remainder(RealFunction):
     """``a - b*floor(a/b)``, with the sign of ``b``."""
 
@@ -348,6 +363,8 @@ class Gate(RealFunction):
     def eval(cls, u: sympy.Expr, rest: sympy.Expr) -> sympy.Expr | None:
         return None
 
+
+IN_OTHER_TERMS[WholeQuotient] = lambda a, b: Floor(a / b)
 
 # Functions whose derivative does not show their jumps: a constant derivative proves nothing about them.
 JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)

@@ -257,9 +257,18 @@ class _Printer:
         beaten = "<" if isinstance(expression, sym.Maximum) else ">"
         a, b = sorted(expression.args, key=lambda argument: bool(argument.is_Number))
         left, right = self.name(a), self.name(b)
+        if isinstance(expression, sym.LargerNumber | sym.SmallerNumber):
+            return f"({right} if {left} {beaten} {right} or {left} != {left} else {left})", ATOM
         if b.is_Number:
             return f"({right} if {left} {beaten} {right} else {left})", ATOM
         return f"({right} if {left} {beaten} {right} or {right} != {right} else {left})", ATOM
+
+    def _whole_quotient(self, expression: sympy.Expr) -> tuple[str, int]:
+        """As in Python: the remainder is exact, so the rest is a multiple of the divisor up to rounding."""
+        a, b = (self.name(argument) for argument in expression.args)
+        rest = self.name(sym.TruncatedRemainder(*expression.args))
+        below = f"({rest} < 0.0 and {b} > 0.0) or ({rest} > 0.0 and {b} < 0.0)"
+        return f"(np.floor(({a} - {rest})/{b} + 0.5) - (1.0 if {below} else 0.0))", ATOM
 
     def _remainder(self, expression: sympy.Expr) -> tuple[str, int]:
         a, b = (self.text(argument, ATOM) for argument in expression.args)
@@ -293,6 +302,9 @@ class _Printer:
         sympy.sign: _sign,
         sym.Maximum: _extremum,
         sym.Minimum: _extremum,
+        sym.LargerNumber: _extremum,
+        sym.SmallerNumber: _extremum,
+        sym.WholeQuotient: _whole_quotient,
         sym.Remainder: _remainder,
         sym.CubeRoot: _cube_root,
         exp2: _exp2,

@@ -34,12 +34,13 @@ from hybrid.symbolic.expressions import (
     Step,
     Truncate,
     TruncatedRemainder,
+    WholeQuotient,
 )
 from hybrid.symbolic.nodes import contains, is_larger_than, mentions, nodes_of, replaced, symbols_of
 from hybrid.symbolic.tracing import Symbols
 
 COMPARISONS = (Less, LessEqual, Equal)
-COUNTS = (Floor, Ceiling, Truncate, Remainder, TruncatedRemainder)
+COUNTS = (Floor, Ceiling, Truncate, WholeQuotient, Remainder, TruncatedRemainder)
 SWITCHING = (*COMPARISONS, *COUNTS, Sign, Step, Absolute, Maximum, Minimum)
 QUARTER = sympy.Rational(1, 4)
 # Surfaces written as longer trees are not expanded, so two of them are the same only if written alike.
@@ -313,6 +314,9 @@ def _rewritten(atom: sympy.Expr) -> sympy.Expr | None:
     if isinstance(atom, Equal):
         # It holds on a surface only, not beside it.
         return ZERO
+    if isinstance(atom, WholeQuotient):
+        a, b = atom.args
+        return Floor(a / b)
     if isinstance(atom, Remainder):
         a, b = atom.args
         return a - b * Floor(a / b)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid import arguments
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import check_derivative, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction
@@ -195,10 +196,16 @@ def _check_derivative_shape(variables: Variables, function: ModelFunction, value
 
 
 def _as_sequence(title: str, value: Any, wanted: str) -> list[Any]:
-    try:
-        return list(value)
-    except TypeError:
-        raise ModelError(f"{title} must return a sequence of {wanted}; got {value!r}.") from None
+    # A set has no order, and a generator can be read only once.
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str | bytes) or _is_scalar(value):
+        raise ModelError(
+            f"{title} must return a tuple or an array of {wanted}; got {arguments.shown(value)}."
+        )
+    return list(value)
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 0
 
 
 def _check_numbers(title: str, values: list[Any]) -> None:
@@ -209,7 +216,7 @@ def _check_numbers(title: str, values: list[Any]) -> None:
 
 def _is_number(value: Any) -> bool:
     if isinstance(value, np.ndarray):
-        return value.ndim == 0 and value.dtype.kind in "fiub"
+        return _is_scalar(value) and value.dtype.kind in "fiub"
     return isinstance(value, numbers.Real | np.bool_)
 
 

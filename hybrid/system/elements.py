@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.errors import ModelError
+from hybrid.errors import ModelError, shown
 from hybrid.system.portable import Portable
 
 Function = Callable[..., Any]
@@ -18,9 +18,8 @@ END = "(end)"
 
 def _callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
     if not callable(value):
-        raise ModelError(
-            f"{type(instance).__name__}: {attribute.name} must be a function of (t, x, p); got {value!r}."
-        )
+        owner = type(instance).__name__
+        raise ModelError(f"{owner}: {attribute.name} must be a function of (t, x, p); got {shown(value)}.")
 
 
 def _optional_callable(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
@@ -36,7 +35,7 @@ def _optional_name(instance: Any, attribute: attrs.Attribute[Any], value: object
 def _nonempty_name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
     if not isinstance(value, str) or not value:
         raise ModelError(
-            f"{type(instance).__name__}: {attribute.name} must be a non-empty string; got {value!r}."
+            f"{type(instance).__name__}: {attribute.name} must be a non-empty string; got {shown(value)}."
         )
 
 
@@ -77,7 +76,7 @@ class Guard(Portable):
     @at_start.validator
     def _check_at_start(self, attribute: attrs.Attribute[bool], value: object) -> None:
         if not isinstance(value, bool):
-            raise ModelError(f"Guard: at_start must be True or False; got {value!r}.")
+            raise ModelError(f"Guard: at_start must be True or False; got {shown(value)}.")
         if value and self.direction == 0:
             raise ModelError(
                 "Guard: at_start=True needs direction -1 or +1, the side that the mode excludes."
@@ -88,7 +87,7 @@ class Guard(Portable):
         whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
         if not whole or value not in (-1, 0, 1):
             raise ModelError(
-                f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {value!r}."
+                f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {shown(value)}."
             )
 
 
@@ -146,7 +145,7 @@ def _as_guard(value: Any) -> Guard:
     if isinstance(value, Guard):
         return value
     raise ModelError(
-        f"Transition: guard must be a Guard; got {value!r}. Write Guard(function, direction=...)."
+        f"Transition: guard must be a Guard; got {shown(value)}. Write Guard(function, direction=...)."
     )
 
 
@@ -154,7 +153,7 @@ def _as_reset(value: Any) -> Reset | None:
     if value is None or isinstance(value, Reset):
         return value
     raise ModelError(
-        f"Transition: reset must be a Reset or None (identity); got {value!r}. Write Reset(function)."
+        f"Transition: reset must be a Reset or None (identity); got {shown(value)}. Write Reset(function)."
     )
 
 

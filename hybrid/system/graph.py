@@ -262,7 +262,9 @@ class HybridSystem(Portable):
         for what, items, kind in (("mode", self.modes, Mode), ("transition", self.transitions, Transition)):
             for item in items:
                 if not isinstance(item, kind):
-                    raise ModelError(f"HybridSystem: each {what} must be a {kind.__name__}; got {item!r}.")
+                    raise ModelError(
+                        f"HybridSystem: each {what} must be a {kind.__name__}; got {arguments.shown(item)}."
+                    )
             names = [item.name for item in items]
             if END in names:
                 raise ModelError(

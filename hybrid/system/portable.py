@@ -6,7 +6,7 @@ import io
 import pickle
 import sys
 from collections.abc import Callable
-from types import FrameType, MappingProxyType
+from types import FrameType
 from typing import Any, Self
 
 import attrs
@@ -36,8 +36,6 @@ class Portable:
 
     def _stored(self, name: str) -> Any:
         value = getattr(self, name)
-        if isinstance(value, MappingProxyType):
-            return dict(value)
         if callable(value) and not _can_store(_pickler_at_work(), value):
             own = getattr(self, "name", "")
             owner = f"{type(self).__name__} {own!r}" if own else type(self).__name__

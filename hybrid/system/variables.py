@@ -7,7 +7,6 @@ from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
 from math import isfinite
-from types import MappingProxyType
 from typing import Any
 
 import attrs
@@ -15,6 +14,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError, ModelError, unknown_name
+from hybrid.system.frozen import FrozenMapping
 
 STATE = "State components"
 PARAMETERS = "Parameters"
@@ -114,7 +114,7 @@ class Variables:
             names = [*self.state_names, *self.parameter_names, "t"]
             arguments.known("HybridSystem: units: Name", name, names, "Names")
             arguments.instance(f"HybridSystem: units[{name!r}]", unit, str)
-        return MappingProxyType(given)
+        return FrozenMapping(given)
 
     def state_values(self, name: str, value: object) -> np.ndarray:
         """A finite state ``(n,)`` from the argument ``name``: numbers in order, or a mapping by name.
@@ -199,7 +199,7 @@ def as_parameters(value: Any) -> Mapping[str, float]:
     """Default values of parameters by name, read-only."""
     given = arguments.mapping("HybridSystem: parameters", value)
     _check_identifiers(tuple(given), "parameter")
-    return MappingProxyType(
+    return FrozenMapping(
         {name: arguments.number(f"HybridSystem: parameter {name!r}", each) for name, each in given.items()}
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hybrid.errors import ModelError
+from hybrid.errors import ModelError, shown
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import Variables, as_parameters, as_state
@@ -99,7 +99,7 @@ def filippov(
     state, parameters = as_state(state), as_parameters(parameters)
     for what, function in (("below", below), ("above", above), ("switching", switching)):
         if not callable(function):
-            raise ModelError(f"filippov: {what} must be a function of (t, x, p); got {function!r}.")
+            raise ModelError(f"filippov: {what} must be a function of (t, x, p); got {shown(function)}.")
     variables = Variables(state, parameters)
     _check_traceable(variables, below, above, switching)
     surface = SwitchingSurface(variables, below, above, switching)

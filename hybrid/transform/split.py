@@ -52,7 +52,7 @@ def from_equations(
     return split(
         HybridSystem(
             state=state,
-            parameters=parameters or {},
+            parameters={} if parameters is None else parameters,
             modes=[Mode("smooth", field)],
             period=period,
             name=name,

@@ -61,6 +61,7 @@ NUMBERS = [
     Odd(),
     [None, 1.0],
 ]
+NUMBERS += [bytearray(b"ab"), np.ma.array([1.0, 2.0], mask=[False, True]), np.ma.masked]
 NUMBERS += [np.array(["a", "b"]), np.array([None, Odd()]), np.array([True, False]), np.array([1j, 2j])]
 STATE = [
     *NUMBERS,
@@ -84,6 +85,7 @@ SPAN = [
     (0.0, math.nan),
     (0.0, math.inf),
 ]
+SPAN += [b"ab", bytearray(b"ab"), {0.0, 1.0}, np.ma.array([0.0, 1.0], mask=[False, True])]
 SPAN += [(False, True), (0.0, 1j), np.array([None, 1.0]), (0.0, None), Odd()]
 SAMPLES = [*NUMBERS[1:], 0.5, [[0.1, 0.2]], [0.5, 0.1], [-1.0], [0.1, math.nan], [2.0], [math.inf]]
 TANGENT = [
@@ -99,8 +101,31 @@ NAME = ["nope", 3, 1.5, True, math.nan, [1], np.array(["a", "b"]), Odd()]
 UNITS = [[1], "a", 3, {"nope": "m"}, {3: "m"}, {"q": 3}, {"q": None}, Odd()]
 TEXT = [None, 3, True, [1], Odd()]
 SYSTEM = [None, "a", 3, models.bouncing_ball, HybridSystem, [BALL], Odd()]
-PARAMETERS = [[1], "a", 3, True, ["c"], {"nope": 1.0}, {3: 1.0}, Odd(), *({"c": value} for value in NUMBER)]
-OF_BALL = [[1], "a", 3, True, ["e"], {"nope": 1.0}, {3: 1.0}, Odd(), *({"e": value} for value in NUMBER)]
+EMPTY = ["", [], (), np.array([]), np.array(["1", "2"]), np.ma.masked]
+PARAMETERS = [
+    *EMPTY,
+    [1],
+    "a",
+    3,
+    True,
+    ["c"],
+    {"nope": 1.0},
+    {3: 1.0},
+    Odd(),
+    *({"c": value} for value in NUMBER),
+]
+OF_BALL = [
+    *EMPTY,
+    [1],
+    "a",
+    3,
+    True,
+    ["e"],
+    {"nope": 1.0},
+    {3: 1.0},
+    Odd(),
+    *({"e": value} for value in NUMBER),
+]
 SOLVER = ["DOP853", hybrid.DOP853, 3, 0, False, "", [hybrid.DOP853()], Odd()]
 FUNCTION = ["a", 3, True, [1], np.array([1.0])]
 GUARD = [None, "a", 3, lambda t, x, p: x.q, Guard, Odd()]
@@ -122,7 +147,7 @@ BIG_TIMES = [1e300, -1e300, 1e17]
 EXPONENTS = {
     **RUN,
     "intervals": [0, *COUNT],
-    "interval": [*OPTIONAL_POSITIVE, 1e-300],
+    "interval": [*OPTIONAL_POSITIVE, 1e-300, 1e308],
     "transient": COUNT,
     "t0": [*NUMBER, *BIG_TIMES],
     "progress": FLAG,
@@ -202,7 +227,7 @@ def table(made):
                 "parameters": OF_BALL,
                 "methods": [None, [], {}, "a", 3, {"T": 3}, {"T": "Taylor"}, {"T": None}],
                 "tolerances": [None, [], "a", ["1"], [0.0], [-1.0], [math.nan], [True], 1e-3, [[1e-3]]],
-                "reference": [*NUMBERS[1:], (1.0,), BALL],
+                "reference": [*NUMBERS[1:], (1.0,), BALL, (math.nan, 0.0), (math.inf, 0.0)],
                 "reference_error": [
                     [1],
                     "a",

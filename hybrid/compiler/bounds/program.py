@@ -52,6 +52,8 @@ ONE_OPERAND: dict[type[sympy.Basic], int] = {
 TWO_OPERANDS: dict[type[sympy.Basic], int] = {
     sym.Maximum: op.MAXIMUM,
     sym.Minimum: op.MINIMUM,
+    sym.LargerNumber: op.MAXIMUM,
+    sym.SmallerNumber: op.MINIMUM,
     sym.Atan2: op.ANGLE,
     sym.Less: op.LESS,
     sym.LessEqual: op.LESS_EQUAL,

@@ -17,6 +17,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from hybrid.compiler.cache.seal import sealed, unsealed
+
 # Folder of this package.
 PACKAGE = Path(__file__).parents[2]
 _SAID: set[str] = set()
@@ -98,14 +100,14 @@ def _compiler_version() -> str:
 
 
 def keep(path: Path, content: bytes) -> bool:
-    """Write a file atomically, since other processes may be reading or writing it.
+    """Write a file with its checksum, atomically: other processes may be reading or writing it.
 
     If the file cannot be written, one line says so, and the next process does the work again.
     """
     draft = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:16]}")
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        draft.write_bytes(content)
+        draft.write_bytes(sealed(path.name, content))
         draft.replace(path)
     except OSError as error:
         with suppress(OSError):
@@ -116,29 +118,15 @@ def keep(path: Path, content: bytes) -> bool:
 
 
 def kept(path: Path) -> bytes | None:
-    """Content of a file; None if the file does not exist or cannot be read."""
+    """Content of a file that was written by ``keep``; None if it is missing or damaged, which a line says."""
     try:
-        return path.read_bytes()
+        found = path.read_bytes()
     except OSError:
         return None
-
-
-def keep_code(path: Path, code: bytes) -> bool:
-    """Write machine code as ``keep`` does, with a checksum."""
-    return keep(path, hashlib.sha256(code).digest() + code)
-
-
-def kept_code(path: Path) -> bytes | None:
-    """The machine code in a file; None if the file is missing or does not match its checksum."""
-    content = kept(path)
+    content = unsealed(path.name, found)
     if content is None:
-        return None
-    size = hashlib.sha256().digest_size
-    digest, code = content[:size], content[size:]
-    if hashlib.sha256(code).digest() == digest:
-        return code
-    say(f"hybrid: compiled code in {path.parent} is damaged; it is compiled again.")
-    return None
+        say(f"hybrid: compiled code in {path.parent} is damaged; it is compiled again.")
+    return content
 
 
 def say(message: str) -> None:

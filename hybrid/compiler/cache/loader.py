@@ -14,8 +14,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from hybrid.compiler.cache import second_process
-from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, keep_code, kept_code, source_key
+from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, keep, kept, source_key
 from hybrid.compiler.cache.kernel import file_of, kernels_in
+from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import processor
 from hybrid.kernels.types.kinds import text_of
 from hybrid.symbolic.branches import PARSER
@@ -40,6 +41,8 @@ ALL_KERNELS = (
     "lyapunov.kernels",
     "lyapunov.study.kernels",
 )
+# The modules that decide the form of the files.
+FORM = (PACKAGE / "compiler" / "cache" / "kernel.py", PACKAGE / "compiler" / "cache" / "seal.py")
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
@@ -55,17 +58,17 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
     """
     path = _path(module)
     with _COMPILING:
-        content = kept_code(path)
+        content = kept(path)
         if content is None:
             with announced(MESSAGE):
                 if module == DRIVER:
                     second_process.start([each for each in EVENTS if not is_kept(each)])
                 elif module in EVENTS:
                     second_process.finish()
-                    content = kept_code(path)
+                    content = kept(path)
                 if content is None:
                     content = compiled(module)
-                    keep_code(path, content)
+                    keep(path, content)
     return SimpleNamespace(**kernels_in(content))
 
 
@@ -74,12 +77,13 @@ def compiled(module: str) -> bytes:
     import_numba()
     from hybrid.kernels.types.export import exports_of, object_code
 
-    return file_of(
-        {
-            name: (object_code(name, *export), text_of(export.result), [*map(text_of, export.arguments)])
-            for name, export in exports_of(importlib.import_module(module)).items()
-        }
-    )
+    with between_passes():
+        return file_of(
+            {
+                name: (object_code(name, *export), text_of(export.result), [*map(text_of, export.arguments)])
+                for name, export in exports_of(importlib.import_module(module)).items()
+            }
+        )
 
 
 @cache
@@ -126,8 +130,11 @@ def _source_of(module: str) -> Path | None:
 
 @cache
 def kernels_key(module: str = DRIVER) -> str:
-    """Hash of all sources of a kernel module: our kernels, and files of its own package if it has another."""
-    sources = sources_in(PACKAGE / "kernels")
+    """Hash of all sources of a kernel module: our kernels, and files of its own package if it has another.
+
+    The form of the files in the cache belongs to them, too.
+    """
+    sources = [*sources_in(PACKAGE / "kernels"), *FORM]
     if not module.startswith("hybrid."):
         sources += sorted(_own_sources(module))
     return source_key(processor(), *(path.read_text(encoding="utf-8") for path in sources))

@@ -9,6 +9,8 @@ from typing import Any
 import attrs
 from llvmlite import binding
 
+from hybrid.compiler.interrupts import between_passes
+
 # LLVM's highest optimisation level.
 SPEED = 3
 
@@ -45,6 +47,7 @@ def processor() -> str:
     return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
 
 
+@between_passes()
 def load(code: bytes, names: Sequence[str], needs: Sequence[Any] = ()) -> dict[str, Compiled]:
     """The functions of an object file, ready to be called; ``needs`` are objects that must outlive them."""
     # Each engine needs its own target, since it frees the target when it is freed itself.

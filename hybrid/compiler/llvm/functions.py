@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.compiler.cache.folder import keep_code, kept_code, source_key
+from hybrid.compiler.cache.folder import keep, kept, source_key
 from hybrid.compiler.cache.store import models_folder
 from hybrid.compiler.cases import Case, cases_of, function_text
 from hybrid.compiler.llvm.engine import load, processor
@@ -101,10 +101,10 @@ def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int
 def shared_functions(source: str, names: tuple[str, ...]) -> dict[str, Compiled]:
     """The compiled functions of a text that calls no user function, shared by all systems with it."""
     path = models_folder() / f"model_{source_key(source, processor())}.o"
-    code = kept_code(path)
+    code = kept(path)
     if code is None:
         code = _code(source, names, {})
-        keep_code(path, code)
+        keep(path, code)
     return load(code, names)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from llvmlite import binding, ir
 
+from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import SPEED, target
 from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, OwnFunction, Signature, lower
 
@@ -28,6 +29,7 @@ def _optimise(module: Any) -> None:
     passes.run(module, binding.create_pass_builder(target(), options))
 
 
+@between_passes()
 def machine_code(
     functions: Sequence[tuple[ast.FunctionDef, Signature, bool]],
     calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,

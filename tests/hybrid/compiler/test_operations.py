@@ -11,6 +11,7 @@ import pytest
 import models
 from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition
 from hybrid.compiler.cache import store
+from hybrid.compiler.cache.seal import sealed, unsealed
 from hybrid.compiler.cache.store import models_folder
 from hybrid.compiler.compiled import emitted_of
 from hybrid.compiler.emit import emit
@@ -274,14 +275,14 @@ def test_a_damaged_file_is_written_anew(emissions):
     system = models.bouncing_ball()
     first = emitted_of(system)
     [path] = models_folder().glob("emitted_*.json")
-    whole = path.read_text()
-    unlike = json.loads(whole.partition("\n")[2])
+    whole = path.read_bytes()
+    unlike = json.loads(unsealed(path.name, whole))
     del unlike["propagators"][0]["kind"]
-    others = [f"{store._checksum(text)}\n{text}" for text in ("[]", "{}", json.dumps(unlike))]
-    for damaged in ("", whole[:-20], *others):
-        path.write_text(damaged)
+    others = [sealed(path.name, text.encode()) for text in ("[]", "{}", json.dumps(unlike))]
+    for damaged in (b"", whole[:-20], *others):
+        path.write_bytes(damaged)
         assert emitted_of(system) == first
-        assert path.read_text() == whole
+        assert path.read_bytes() == whole
     assert len(emissions) == 6
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ import hybrid
 import lyapunov
 import models
 from hybrid import StatusCode
+from hybrid.kernels.types import codes
 from hybrid.simulation import interrupt
 from hybrid.simulation.interrupt import CTRL_C, CtrlC
+from lyapunov.two_orbit import INTERVALS_AT_ONCE
 
 RISING = hybrid.Guard(lambda t, x, p: x.v, +1)
 ROOT = Path(__file__).parents[3]
@@ -259,3 +262,22 @@ def test_the_limit_of_steps_holds_across_bursts():
     assert (arc.status.code, arc.steps) == (StatusCode.MAX_STEPS, 1000)
     found = lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), interval=1e5, solver=solver)
     assert found.status.code == StatusCode.MAX_STEPS
+
+
+@pytest.mark.parametrize("code", [codes.DONE, codes.MAX_STEPS])
+def test_bursts_grow_only_if_they_use_up_their_steps(code):
+    """A kernel that returns early for another reason says nothing about the time of a step."""
+    run = SimpleNamespace(stop=threading.Event(), max_steps=10**12, steps=0)
+    bursts = interrupt.Bursts([run])
+    for _ in range(70):
+        bursts.most()
+        bursts.judged(code)
+    assert (bursts.steps == interrupt.FIRST_BURST) == (code == codes.DONE)
+
+
+def test_many_short_calls_of_a_kernel():
+    """Two orbits of so many intervals are followed in more calls than an integer has digits."""
+    found = lyapunov.two_orbit_exponents(
+        models.bouncing_ball(), (1.0, 0.0), intervals=70 * INTERVALS_AT_ONCE, interval=1e-7
+    )
+    assert found.intervals == 70 * INTERVALS_AT_ONCE

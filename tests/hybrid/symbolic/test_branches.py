@@ -164,3 +164,10 @@ def test_statements_that_are_no_single_choice_have_no_replacement(lines, tmp_pat
 )
 def test_replacements(lines, told, tmp_path):
     assert f"write ``{told}``" in advice(written(lines, tmp_path))
+
+
+def test_a_search_in_a_tuple_has_no_replacement():
+    def force(t, x, p):
+        return 1.0 if x.q in (1.0, 2.0) else 0.0
+
+    assert OTHERWISE in advice(force)

@@ -92,3 +92,14 @@ def test_matrices_of_zeros():
         reset_function(system.transitions[0], system.dimension), 0, 0.3, x, np.zeros(0)
     )
     np.testing.assert_array_equal(reset, np.diag([0.5] + [1.0] * (n - 1) + [0.0])[:n])
+
+
+def test_a_power_of_zero_has_slope_zero_in_its_exponent():
+    flow = HybridSystem(
+        state=("q", "v"),
+        parameters={"k": 0.0},
+        modes=[Mode("a", lambda t, x, p: (np.abs(x.q) ** x.v, p.k**x.v + 2.0**t))],
+    )
+    compiled, function = compile_system(flow), field_function(flow.modes[0], 2)
+    found = compiled.derivative(function, 0, 3.0, np.array([0.0, 1.5]), flow.parameter_values())
+    np.testing.assert_allclose(found, [[0.0, 0.0, 0.0], [0.0, 0.0, 8.0 * np.log(2.0)]], rtol=1e-14)

@@ -59,7 +59,18 @@ def test_number_of_values():
         field=lambda t, x, p: (1.0, 2.0, 3.0),
     )
     fails("Transition 'bounce': reset returned 1 values; the state has 2", reset=lambda t, x, p: (1.0,))
-    fails("Mode 'flight': field must return a sequence of one value per state", field=lambda t, x, p: x.q)
+    fails(
+        "Mode 'flight': field must return a tuple or an array of one value per state",
+        field=lambda t, x, p: x.q,
+    )
+    for kind in (
+        set,
+        iter,
+        dict.fromkeys,
+        lambda pair: map(float, pair),
+        lambda pair: (each for each in pair),
+    ):
+        fails("field must return a tuple or an array", field=lambda t, x, p, kind=kind: kind((x.v, -x.q)))
 
 
 def test_kind_of_values():

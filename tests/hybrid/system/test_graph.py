@@ -79,7 +79,7 @@ CONSTRUCTION = [
     ),
     (
         lambda: ball(transitions=bounce(reset=Reset(lambda t, x, p: x.q))),
-        "Transition 'bounce': reset must return a sequence of one value per state (q, v); got",
+        "Transition 'bounce': reset must return a tuple or an array of one value per state (q, v); got",
     ),
     (lambda: ball(period=lambda t, p: 1.0), "HybridSystem: period must take (p); got a function of (t, p)"),
     (lambda: ball(period=lambda p: "long"), "HybridSystem: period must return a number; got 'long'."),

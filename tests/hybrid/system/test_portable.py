@@ -151,3 +151,15 @@ def test_functions_without_a_name(system, text):
     arc, again = (hybrid.simulate(each, START, (0.0, 1.0)) for each in (system, other.system))
     np.testing.assert_array_equal(arc.x, again.x)
     assert copy.deepcopy(system) is system
+
+
+def test_parts_of_a_system_can_be_pickled_and_copied():
+    ball = models.bouncing_ball()
+    for part in (ball.parameters, ball.units, ball.variables):
+        for made in (pickle.loads(pickle.dumps(part)), copy.copy(part), copy.deepcopy(part)):
+            assert type(made) is type(part)
+    assert ball.parameters | {"e": 0.5} == {**ball.parameters, "e": 0.5}
+    assert {"more": 1.0} | ball.parameters == {"more": 1.0, **ball.parameters}
+    assert ball.parameters == pickle.loads(pickle.dumps(ball.parameters)) == dict(ball.parameters)
+    with pytest.raises(TypeError):
+        ball.parameters["e"] = 0.5

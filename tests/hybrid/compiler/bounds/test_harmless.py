@@ -39,14 +39,14 @@ JUMPING = {
     "clip": lambda t: np.clip(t, 0.1, 0.2),
     "kink": lambda t: np.abs(t - 5) / 10,
 }
-FUNCTIONS = sorted(name for name in UFUNCS - {"clip", "invert"} if getattr(np, name).nin == 1)
+FUNCTIONS = sorted(name for name in UFUNCS - {"clip"} if getattr(np, name).nin == 1)
 
 
 @pytest.mark.parametrize("jumping", JUMPING)
 @pytest.mark.parametrize("name", [*FUNCTIONS, "power"])
 def test_no_function_of_a_jump_is_harmless(name, jumping):
     def outer(u):
-        return u**3 + 2**u if name == "power" else getattr(np, name)(u)
+        return u**3 + 2**u if name == "power" else 1.0 * getattr(np, name)(u)
 
     inner = JUMPING[jumping]
     for function in (

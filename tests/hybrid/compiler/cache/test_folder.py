@@ -20,6 +20,7 @@ from hybrid.compiler.cache.folder import (
     source_key,
 )
 from hybrid.compiler.cache.loader import kernels_key, load_kernels
+from hybrid.compiler.cache.seal import sealed
 from hybrid.compiler.llvm.functions import shared_functions
 
 ROOT = Path(__file__).parents[4]
@@ -219,7 +220,16 @@ def flip(path):
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize("damage", [truncate, empty, flip])
+def replace(path):
+    """The whole and undamaged file of another model in its place."""
+    others = [each for each in sorted(path.parent.glob(f"*{path.suffix}")) if each != path]
+    if others:
+        shutil.copy(others[0], path)
+    else:
+        path.write_bytes(sealed("another" + path.suffix, b"{}"))
+
+
+@pytest.mark.parametrize("damage", [truncate, empty, flip, replace])
 @pytest.mark.parametrize("pattern", ["model_*.o", "emitted_*.json"])
 def test_what_is_damaged_is_made_again(new_process, monkeypatch, capsys, damage, pattern):
     monkeypatch.setenv("HYBRID_CACHE_DIR", str(new_process))
@@ -279,12 +289,13 @@ def test_kernels_of_another_package_depend_on_what_they_are_made_of(tmp_path, mo
     assert kernels_key("lyapunov.kernels") != kernels_key()
 
 
-def test_damaged_kernels_are_compiled_again(tmp_path):
+@pytest.mark.parametrize("damage", [truncate, replace])
+def test_damaged_kernels_are_compiled_again(tmp_path, damage):
     load_kernels("hybrid.kernels.steps.dense")
     for kernels in cache_directory().glob("kernels-*"):
         shutil.copytree(kernels, tmp_path / kernels.name)
     for path in tmp_path.rglob("*.dense.o"):
-        truncate(path)
+        damage(path)
     program = "import hybrid, models; print(hybrid.simulate(models.bouncing_ball(), (1, 0), (0, 1))(0.25)[0])"
     environment = os.environ | {"HYBRID_CACHE_DIR": str(tmp_path)}
     for lines in (1, 0):
@@ -310,6 +321,7 @@ KERNELS, SPECTRUM, COMPILER, TRACER = range(4)
     [
         ("hybrid/kernels/arithmetic/linear.py", {KERNELS, SPECTRUM, COMPILER}),
         ("hybrid/kernels/deeper/new.py", {KERNELS, SPECTRUM, COMPILER}),
+        ("hybrid/compiler/cache/seal.py", {KERNELS, SPECTRUM, COMPILER, TRACER}),
         ("hybrid/compiler/llvm/lowering.py", {COMPILER, TRACER}),
         ("hybrid/compiler/llvm/deeper/new.py", {COMPILER, TRACER}),
         ("hybrid/compiler/taylor/series.py", {TRACER}),
