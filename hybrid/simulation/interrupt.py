@@ -117,11 +117,12 @@ class Bursts:
     def judged(self, code: int) -> int:
         """The code of a kernel: GO_ON if only the burst has ended, INTERRUPTED if the run is to stop."""
         seconds = perf_counter() - self.begin
-        if seconds < SECONDS:
+        ended = code == codes.MAX_STEPS and all(run.steps < self.limit for run in self.runs)
+        # A kernel that has done its work before the end of the burst does not tell how long a burst takes.
+        if ended and seconds < SECONDS:
             self.steps *= 2
         elif seconds > 2 * SECONDS:
             self.steps = max(1, int(self.steps * SECONDS / seconds))
-        ended = code == codes.MAX_STEPS and all(run.steps < self.limit for run in self.runs)
         if code != codes.DONE and not ended:
             return code
         if self.stop.is_set():

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import hybrid
 import lyapunov
 import models
 from hybrid import StatusCode
+from hybrid.kernels.types import codes
 from hybrid.simulation import interrupt
 from hybrid.simulation.interrupt import CTRL_C, CtrlC
 
@@ -259,3 +261,17 @@ def test_the_limit_of_steps_holds_across_bursts():
     assert (arc.status.code, arc.steps) == (StatusCode.MAX_STEPS, 1000)
     found = lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), interval=1e5, solver=solver)
     assert found.status.code == StatusCode.MAX_STEPS
+
+
+class TestBursts:
+    def test_calls_that_end_before_their_burst_do_not_lengthen_it(self):
+        """A kernel that works in small portions ends most calls without reaching the limit of steps."""
+        run = SimpleNamespace(stop=threading.Event(), max_steps=10**12, steps=0)
+        bursts = interrupt.Bursts([run])
+        for _ in range(2000):
+            bursts.most()
+            assert bursts.judged(codes.DONE) == codes.DONE
+        assert bursts.steps == interrupt.FIRST_BURST
+        bursts.most()
+        assert bursts.judged(codes.MAX_STEPS) == codes.GO_ON
+        assert bursts.steps == 2 * interrupt.FIRST_BURST
