@@ -156,8 +156,8 @@ def lyapunov_spectrum(
     k
         Number of exponents, 1 to n; all by default.
     intervals, interval
-        Number of intervals to average over, and their length; by default the forcing period, or the
-        reciprocal of the norm of ``D_x f`` at the start for an autonomous system.
+        Number of intervals to average over, and their length; by default the forcing period, or for an
+        autonomous system the time scale of its field at the start (see ``time_scale``).
     transient
         Number of intervals to run first, with tangent vectors, and discard.
     t0
@@ -207,7 +207,7 @@ def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
 
 
 def interval_length(trajectory: Trajectory, interval: float | None, intervals: int) -> float:
-    """The given interval, or the forcing period, or the reciprocal norm of the Jacobian at the start.
+    """The given interval, or the forcing period, or the time scale of the field at the start.
 
     The interval must be long compared with the rounding of the time after ``intervals`` intervals.
     """
@@ -217,8 +217,7 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
     elif period > 0:
         return period
     else:
-        norm = np.linalg.norm(trajectory.jacobian(), 2)
-        length = 1.0 / float(norm) if np.isfinite(norm) and norm > 0 else 1.0
+        length = time_scale(trajectory)
     check_time("interval", length, period)
     latest = period or max(abs(trajectory.t), abs(trajectory.t + length * intervals))
     if not math.ulp(latest) <= FINEST_INTERVAL * length:
@@ -228,6 +227,25 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
             f"{math.ulp(latest):.2g} apart. Lengthen it, or start nearer to time zero."
         )
     return length
+
+
+def time_scale(trajectory: Trajectory) -> float:
+    """How long the field takes to change a state at the start, in any units of the states.
+
+    It is the reciprocal of the spectral radius of ``abs(D_x f)``, the smallest norm of the Jacobian in any
+    units of the states. If that is zero, as in free flight, it is the longest time in which rate and
+    acceleration change a component by its size. It is 1 if there is no such component.
+    """
+    jacobian, x, rate = trajectory.jacobian(), np.abs(trajectory.x), trajectory.field()
+    if not np.all(np.isfinite(jacobian)):
+        return 1.0
+    radius = float(np.abs(np.linalg.eigvals(np.abs(jacobian))).max())
+    if radius > 0:
+        return 1.0 / radius
+    speed, acceleration = np.abs(rate), np.abs(jacobian @ rate)
+    per_size = speed + np.sqrt(speed * speed + 2.0 * acceleration * x)
+    moves = (x > 0) & (per_size > 0)
+    return float(np.max(2.0 * x[moves] / per_size[moves], initial=0.0)) or 1.0
 
 
 @cache

@@ -146,8 +146,8 @@ def two_orbit_exponents(
         ``(n,)``: direction from the reference to the companion, of any length; by default all components are
         equal.
     intervals, interval
-        Number of intervals to follow the orbits, and their length; by default the forcing period, or the
-        reciprocal of the norm of ``D_x f`` at the start for an autonomous system.
+        Number of intervals to follow the orbits, and their length; by default the forcing period, or for an
+        autonomous system the time scale of its field at the start.
     transient
         Number of intervals to run the reference orbit before the companion is placed.
     t0

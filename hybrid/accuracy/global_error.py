@@ -15,12 +15,11 @@ from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
+from hybrid.solvers.solver import LEAST_RTOL
 from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
 TIGHTER = (10.0, 100.0)
-# Below this rounding is all that a tolerance controls.
-LEAST_RTOL = 1e-14
 EPSILON = float(np.finfo(float).eps)
 # Rounding of a run in units in the last place of its start, over the root of the number of its steps.
 ROUNDING = 16.0
@@ -130,7 +129,7 @@ def _estimated(
     system: HybridSystem, solver: Solver, run: Callable[..., HybridArc], x0: ArrayLike, mode: str | None
 ) -> GlobalError:
     arc = run(solver, x0, mode)
-    rungs = [_tightened(solver, factor) for factor in TIGHTER]
+    rungs = [solver.tightened(factor) for factor in TIGHTER]
     aside = ROUNDING * EPSILON * np.sqrt(1 + arc.steps) * np.abs(arc.x).max(axis=0)
     # Two directions, so that no component has a difference of zero in both runs.
     signs = np.ones(system.dimension), (-1.0) ** np.arange(system.dimension)
@@ -150,11 +149,6 @@ def _estimated(
     if not CTRL_C.is_set():
         return found
     return attrs.evolve(found, status=interrupted_status("the run up to there, without an estimate"))
-
-
-def _tightened(solver: Solver, factor: float) -> Solver:
-    rtol = max(solver.rtol / factor, LEAST_RTOL)
-    return attrs.evolve(solver, rtol=rtol, atol=solver.atol * rtol / solver.rtol)
 
 
 def _starts_alike(one: HybridArc, other: HybridArc) -> bool:

@@ -14,6 +14,7 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.labelled import labelled_orbit
+from hybrid.orbits.newton import Newton, Point, Shot
 from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
@@ -29,7 +30,7 @@ from hybrid.system.growth import growing
 if TYPE_CHECKING:
     import xarray
 
-# Newton steps are halved at most to this share; then the full step is taken.
+# Newton steps are halved at most to this share.
 SHORTEST_STEP = 1 / 64
 # A period below this share of the guess is a point, not an orbit.
 SHORTEST_PERIOD = 1e-3
@@ -46,9 +47,19 @@ LEAST_MOTION = 1e3
 # Share of its states by which a point that hardly moves may still be wrong.
 POINT_ERROR = 1e-8
 # Where Newton's method cannot tell which of many orbits it is at, that is one only if it closes up to this
-# share of its motion, and is at most so many times larger than the solution through the guess.
+# share of its motion, is at most so many times larger than the solution through the guess, and the last step
+# moved it by less than a share of its motion.
 DRIFT = 1e-3
 FARTHEST = 1e3
+SETTLED = 0.1
+# And it closes better the tighter the tolerances are: by this factor, where they are tighter by its square.
+TIGHTER = 10.0
+# The guess of a period is changed by this share at most, if the solution then returns that much nearer.
+PERIOD_OFF = 0.1
+NEARER = 0.5
+# Directions in which the matrix of Newton's method is smaller than this share of its size may be those of a
+# family of orbits.
+NEARLY_SINGULAR = 1e-5
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -191,7 +202,7 @@ def periodic_orbit(
             raise ArgumentError(
                 f"period is for autonomous systems; this one has the forcing period {forcing}. Use periods=."
             )
-        point = _Point(guess, t0, periods * forcing)
+        point = Point(guess, t0, periods * forcing)
         compile_system(system)
         with CTRL_C:
             return _kept(shooting.newton(point, False, tolerance, max_iterations))
@@ -200,7 +211,7 @@ def periodic_orbit(
     length = arguments.positive("period", period)
     compile_system(system)
     with CTRL_C:
-        return _kept(shooting.autonomous(_Point(guess, t0, length), tolerance, max_iterations))
+        return _kept(shooting.autonomous(Point(guess, t0, length), tolerance, max_iterations))
 
 
 def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
@@ -211,64 +222,19 @@ def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
 
 
 @attrs.frozen(eq=False)
-class _Point:
-    """Unknowns of the shooting: a state, the time there, and the time to close."""
-
-    x: np.ndarray
-    t: float
-    period: float
-
-
-@attrs.frozen(eq=False)
-class _Shot:
-    """What one integration over the period gives.
-
-    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value.
-    """
-
-    point: _Point
-    mode: str
-    end: np.ndarray
-    end_mode: str
-    fundamental: np.ndarray
-    field: np.ndarray
-    end_field: np.ndarray
-    extent: np.ndarray
-    magnitude: np.ndarray
-    status: Status
-
-    @property
-    def gap(self) -> np.ndarray:
-        return self.end - self.point.x
-
-    @property
-    def whole(self) -> bool:
-        """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
-        return self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
-
-    def size(self, scale: np.ndarray) -> float:
-        """The residual in units of ``scale (n,)``, infinite where there is none."""
-        return float(np.linalg.norm(self.gap / scale)) if self.whole else np.inf
-
-    def closes(self, tolerance: float, rounding: np.ndarray) -> bool:
-        """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component."""
-        return self.whole and bool(np.all(np.abs(self.gap) <= np.maximum(tolerance * self.extent, rounding)))
-
-
-@attrs.frozen(eq=False)
 class _Shooting:
     system: HybridSystem
     mode: str | None
     parameters: Mapping[str, float] | None
     solver: Solver
 
-    def shoot(self, point: _Point) -> _Shot:
+    def shoot(self, point: Point) -> Shot:
         trajectory = self._trajectory(point, self.mode)
         mode, field = trajectory.mode, trajectory.field()
         code = trajectory.advance(point.t + point.period, trajectory.no_record())
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
-        return _Shot(
+        return Shot(
             point,
             mode,
             trajectory.x,
@@ -281,7 +247,7 @@ class _Shooting:
             status_of(trajectory, code),
         )
 
-    def _trajectory(self, point: _Point, mode: str | None) -> Trajectory:
+    def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
         """A run from a point that carries the columns of the identity."""
         return start(
             self.system,
@@ -294,11 +260,11 @@ class _Shooting:
         )
 
     def newton(
-        self, point: _Point, free_period: bool, tolerance: float, max_iterations: int
+        self, point: Point, free_period: bool, tolerance: float, max_iterations: int
     ) -> PeriodicOrbit:
         """Newton's method from ``point``; the period may be unknown too."""
         shot, iterations = self.shoot(point), 0
-        newton = _Newton.begin(shot, self.solver.atol, free_period)
+        newton = Newton.begin(shot, self.solver.atol, free_period)
         while iterations < max_iterations and shot.whole:
             if shot.closes(tolerance, FINEST_GAP * EPSILON * shot.magnitude):
                 break
@@ -306,31 +272,42 @@ class _Shooting:
             iterations += 1
             if better is None:
                 break
+            newton = newton.advanced(shot, better)
             shot = better
-            newton = attrs.evolve(newton, scale=np.maximum(newton.scale, shot.magnitude))
         return self._result(shot, iterations, self._status(shot, newton, iterations, tolerance))
 
-    def _along(self, shot: _Shot, newton: _Newton) -> _Shot | None:
-        """The first shot along the step, halved as often as allowed, that closes better; else None."""
-        step, longer = newton.step(shot)
+    def _along(self, shot: Shot, newton: Newton) -> Shot | None:
+        """The shot after the step, or after a shorter one, that closes better; None if there is none.
+
+        Where orbits come in families, the step along the family is arbitrary and may be long, so the step
+        without it is tried too.
+        """
+        full = newton.step(shot)
+        best = self._better(shot, shot, newton, full)
+        if best.size(newton.scale) > NEARER * shot.size(newton.scale):
+            best = self._better(best, shot, newton, newton.step(shot, NEARLY_SINGULAR))
         part = 1.0
-        while part >= SHORTEST_STEP:
-            period = shot.point.period + part * longer
-            if period > 0:
-                trial = self._tried(attrs.evolve(shot.point, x=shot.point.x + part * step, period=period))
-                if trial is not None and trial.size(newton.scale) < shot.size(newton.scale):
-                    return trial
+        while best is shot and part > SHORTEST_STEP:
             part /= 2
-        return None
+            best = self._better(shot, shot, newton, full, part)
+        return None if best is shot else best
 
-    def _tried(self, point: _Point) -> _Shot | None:
-        """A shot, or None from a point that no mode allows."""
+    def _better(
+        self, best: Shot, shot: Shot, newton: Newton, step: tuple[np.ndarray, float], part: float = 1.0
+    ) -> Shot:
+        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better."""
+        change, longer = step
+        period = shot.point.period + part * longer
+        if not period > 0:
+            return best
         try:
-            return self.shoot(point)
+            trial = self.shoot(attrs.evolve(shot.point, x=shot.point.x + part * change, period=period))
         except ArgumentError:
-            return None
+            # No mode allows the point.
+            return best
+        return trial if trial.size(newton.scale) < best.size(newton.scale) else best
 
-    def autonomous(self, guess: _Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
+    def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
 
         At a jump the end of the shot would depend discontinuously on the period.
@@ -350,7 +327,7 @@ class _Shooting:
             return orbit
         return self._nearest(orbit, guess)
 
-    def _quiet_time(self, guess: _Point) -> float:
+    def _quiet_time(self, guess: Point) -> float:
         """Time after the guess at which neither it nor one period later is close to a jump."""
         arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
@@ -361,18 +338,33 @@ class _Shooting:
         )
         return float(candidates[np.argmax(distance)])
 
-    def _moved(self, guess: _Point, shift: float) -> tuple[_Shooting, _Point]:
+    def _moved(self, guess: Point, shift: float) -> tuple[_Shooting, Point]:
         arc = self._follow(guess, shift, self.mode)
         shooting = attrs.evolve(self, mode=str(arc.mode[-1]))
-        return shooting, _Point(arc.x[-1], guess.t + shift, guess.period)
+        moved = Point(arc.x[-1], guess.t + shift, guess.period)
+        return shooting, attrs.evolve(moved, period=shooting._time_of_return(moved))
 
-    def _nearest(self, orbit: PeriodicOrbit, guess: _Point) -> PeriodicOrbit:
+    def _time_of_return(self, guess: Point) -> float:
+        """The guessed period, or a time near it at which the solution returns much nearer to its start.
+
+        With a wrong period, Newton's method prefers smaller orbits where orbits come in families.
+        """
+        arc = self._follow(guess, (1 + PERIOD_OFF) * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        times = guess.period * (1 + PERIOD_OFF * np.linspace(-1, 1, 2 * SAMPLES - 1))
+        if not arc.status.ok:
+            return guess.period
+        extent = np.ptp(arc.x, axis=0)
+        gaps = np.linalg.norm((arc(guess.t + times) - guess.x) / np.where(extent > 0, extent, 1.0), axis=1)
+        nearest = int(np.argmin(gaps))
+        return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
+
+    def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
         """The same orbit from the point of its arc, both sides of jumps included, nearest to the guess."""
         arc = orbit.arc(self.solver)
         i = int(np.argmin(np.linalg.norm(arc.x - guess.x, axis=1)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
-    def _result(self, shot: _Shot, iterations: int, status: Status) -> PeriodicOrbit:
+    def _result(self, shot: Shot, iterations: int, status: Status) -> PeriodicOrbit:
         eigenvalues = self._eigenvalues(shot)
         return PeriodicOrbit(
             system=self.system,
@@ -394,17 +386,29 @@ class _Shooting:
         values = self.system.parameter_values(self.parameters).tolist()
         return dict(zip(self.system.parameters, values, strict=True))
 
-    def _eigenvalues(self, shot: _Shot) -> ProductEigenvalues:
+    def _eigenvalues(self, shot: Shot) -> ProductEigenvalues:
         """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
         return fundamental_eigenvalues(
             lambda: self._trajectory(shot.point, shot.mode), shot.point.t + shot.point.period
         )
 
-    def _signature(self, shot: _Shot) -> tuple[str, ...]:
+    def _drifts(self, shot: Shot, newton: Newton, tolerance: float, rounding: np.ndarray) -> bool:
+        """Whether the part of the gap that no step removes is more than the error of the solver.
+
+        A solution that drifts does so at any tolerance.
+        """
+        finer = attrs.evolve(self, mode=shot.mode, solver=self.solver.tightened(TIGHTER**2)).shoot(shot.point)
+        if not finer.whole:
+            return True
+        rough, drift = (newton.drift(shot, each, np.sqrt(tolerance)) for each in (shot, finer))
+        noise = np.maximum(np.abs(rough - drift) / TIGHTER, rounding[:, None])
+        return bool(np.any(np.abs(drift) > noise))
+
+    def _signature(self, shot: Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)
         return (shot.mode, *(jump.target for jump in arc.jumps if jump.target is not None))
 
-    def _follow(self, point: _Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
+    def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""
         return simulate(
             self.system,
@@ -416,7 +420,7 @@ class _Shooting:
             max_jumps=max_jumps,
         )
 
-    def _status(self, shot: _Shot, newton: _Newton, iterations: int, tolerance: float) -> Status:
+    def _status(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> Status:
         """How Newton's method ended: with an orbit, or why there is none."""
         if not shot.status.ok:
             return shot.status
@@ -429,12 +433,13 @@ class _Shooting:
             "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations.",
         )
 
-    def _objection(self, shot: _Shot, newton: _Newton, iterations: int, tolerance: float) -> str | None:
+    def _objection(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> str | None:
         """Why the last shot is no periodic orbit, or None if it is one.
 
         The ends agree; the orbit moves, if nothing but its motion has a period; and what is left of Newton's
         step is small. At infinity, or where a solution drifts, the ends may agree and that step is large. It
-        is arbitrary where orbits come in families: then the orbit has to be near to the guess, and to close.
+        is arbitrary where orbits come in families: then the orbit has to be near to the guess, the method has
+        to have settled at it, and the solver's error alone may keep it from closing.
         """
         if shot.end_mode != shot.mode:
             return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
@@ -450,47 +455,12 @@ class _Shooting:
         enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
         if np.all(np.abs(step) <= np.maximum(enough, nothing)):
             return None
-        near = np.all(shot.extent <= FARTHEST * newton.first)
-        if near and np.all(np.abs(shot.gap) <= DRIFT * shot.extent):
+        near = np.all((shot.extent <= FARTHEST * newton.first) & (np.abs(shot.gap) <= DRIFT * shot.extent))
+        sizes = np.where(shot.extent > noise, shot.extent, shot.magnitude)
+        settled = np.all(np.abs(newton.moved) <= np.maximum(SETTLED * sizes, noise))
+        if near and settled and not self._drifts(shot, newton, tolerance, rounding):
             return None
         return (
             f"the ends agree to {np.linalg.norm(shot.gap):.3g}, but the next step would move the start by "
             f"{np.linalg.norm(step):.3g}: the solution drifts, or no orbit is near"
         )
-
-
-@attrs.frozen(eq=False)
-class _Newton:
-    """Newton's step in units of ``scale (n,)``, so that the units of the states do not matter.
-
-    ``first (n,)`` is the scale of the first shot; where the period is unknown too the state stays in the
-    plane ``plane (n,)`` through ``anchor (n,)``, across the field there.
-    """
-
-    scale: np.ndarray
-    first: np.ndarray
-    free_period: bool
-    anchor: np.ndarray
-    plane: np.ndarray
-
-    @classmethod
-    def begin(cls, shot: _Shot, atol: float, free_period: bool) -> _Newton:
-        """From the first shot; sizes below the solver's absolute tolerance count as that."""
-        scale = np.maximum(shot.magnitude, max(atol, np.finfo(float).tiny))
-        return cls(scale, scale, free_period, shot.point.x, shot.field / scale**2)
-
-    def step(self, shot: _Shot) -> tuple[np.ndarray, float]:
-        """Newton step of the state and of the period."""
-        n, scale, period = len(shot.end), self.scale, shot.point.period
-        matrix = (shot.fundamental - np.eye(n)) / scale[:, None] * scale
-        gap = shot.gap / scale
-        if not self.free_period:
-            return np.linalg.lstsq(matrix, -gap, rcond=None)[0] * scale, 0.0
-        row = self.plane * scale
-        size = max(float(np.linalg.norm(row)), np.finfo(float).tiny)
-        bordered = np.block(
-            [[matrix, (shot.end_field / scale * period)[:, None]], [row[None, :] / size, np.zeros((1, 1))]]
-        )
-        right = np.append(-gap, -row @ ((shot.point.x - self.anchor) / scale) / size)
-        step = np.linalg.lstsq(bordered, right, rcond=None)[0]
-        return step[:n] * scale, float(step[n]) * period

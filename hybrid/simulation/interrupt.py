@@ -122,7 +122,6 @@ class Bursts:
             self.steps *= 2
         elif seconds > 2 * SECONDS:
             self.steps = max(1, int(self.steps * SECONDS / seconds))
-        ended = code == codes.MAX_STEPS and all(run.steps < self.limit for run in self.runs)
         if code != codes.DONE and not ended:
             return code
         if self.stop.is_set():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import attrs
 
@@ -11,6 +11,9 @@ from hybrid.errors import ArgumentError
 
 if TYPE_CHECKING:
     from hybrid.solvers.tableau import Tableau
+
+# Below this rounding is all that a relative tolerance controls.
+LEAST_RTOL = 1e-14
 
 
 @attrs.frozen
@@ -49,6 +52,11 @@ class Solver:
     atol: float = attrs.field(default=1e-12, kw_only=True)
     max_step: float = attrs.field(default=float("inf"), kw_only=True)
     max_steps: int = attrs.field(default=1_000_000_000, kw_only=True)
+
+    def tightened(self, factor: float) -> Self:
+        """The same solver with tolerances smaller by a factor, or as small as rounding lets them count."""
+        rtol = min(self.rtol, max(self.rtol / factor, LEAST_RTOL))
+        return attrs.evolve(self, rtol=rtol, atol=self.atol * rtol / self.rtol)
 
     @property
     def series_order(self) -> int:

@@ -392,3 +392,20 @@ def test_steps_and_jumps_are_counted_per_interval():
     assert spectrum.jumps_per_interval * 40 == pytest.approx(len(arc.jumps), abs=1e-9)
     # The end of an interval cuts a step in two.
     assert arc.steps <= spectrum.steps_per_interval * 40 <= arc.steps + 40
+
+
+@pytest.mark.parametrize("small", [1.0, 1e-9])
+@pytest.mark.parametrize(
+    ("field", "x0", "expected"),
+    [
+        # sqrt(k / m) of an oscillator, and the time of a fall from rest.
+        (lambda x, s: (x.v / s, -4.0 * x.q * s), (1.0, 0.0), 0.5),
+        (lambda x, s: (x.v / s, -8.0 * s), (1.0, 0.0), 0.5),
+        (lambda x, s: (0.5 * s, 0.0), (0.0, 0.0), 1.0),
+    ],
+)
+def test_the_default_interval_does_not_depend_on_the_units_of_the_states(field, x0, expected, small):
+    """The speed is measured in units that are smaller by a factor."""
+    system = hybrid.HybridSystem(state=("q", "v"), modes=[hybrid.Mode("free", lambda t, x, p: field(x, small))])
+    spectrum = lyapunov.lyapunov_spectrum(system, x0, intervals=2, transient=0)
+    assert spectrum.interval == pytest.approx(expected, rel=1e-12)

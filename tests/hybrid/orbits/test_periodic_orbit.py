@@ -194,6 +194,20 @@ class TestOwnScale:
         arc = orbit.arc()
         np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-9)
 
+    @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+    def test_one_of_a_family_near_the_guess_although_the_period_is_not(self, unit):
+        """With the period wrong by 5 %, Newton's method itself would prefer smaller and smaller orbits."""
+        spring = HybridSystem(
+            state=("q", "v"),
+            parameters={"unit": 1.0},
+            modes=[Mode("swing", lambda t, x, p: (x.v, -x.q - (x.q / p.unit) ** 2 * x.q))],
+        )
+        orbit = periodic_orbit(spring, (unit, 0.0), parameters={"unit": unit}, period=5.0)
+        assert orbit.status.ok
+        energy = orbit.x0[1] ** 2 / 2 + orbit.x0[0] ** 2 / 2 + orbit.x0[0] ** 4 / unit**2 / 4
+        assert energy == pytest.approx(0.75 * unit**2, rel=0.05)
+        assert orbit.residual < 1e-10 * unit
+
 
 class TestNoOrbit:
     def test_says_how_far_it_got(self):
@@ -252,6 +266,32 @@ class TestNoOrbit:
         )
         orbit = periodic_orbit(system, (1.0,), **({} if forced else period))
         assert orbit.status.code == StatusCode.NOT_CONVERGED
+
+    @pytest.mark.parametrize(
+        "force",
+        [
+            lambda q, v: 1e-4 * v**3,
+            lambda q, v: -1e-4 * v**3,
+            lambda q, v: 1e-11 * v,
+            lambda q, v: 1e-3 * q**2 * v,
+        ],
+    )
+    @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+    def test_a_spiral_is_none_however_slow(self, force, unit):
+        """Newton's method creeps to the equilibrium; on its way the ends agree ever better."""
+        system = HybridSystem(
+            state=("q", "v"), modes=[Mode("on", lambda t, x, p: (x.v, -x.q - force(x.q / unit, x.v / unit) * unit))]
+        )
+        orbit = periodic_orbit(system, (unit, 0.0), period=6.0)
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+
+    def test_a_drift_that_the_forcing_hides_is_none(self):
+        system = HybridSystem(
+            state=("q",),
+            modes=[Mode("on", lambda t, x, p: (np.cos(t) + 1 / (1 + x.q**4),))],
+            period=2 * np.pi,
+        )
+        assert periodic_orbit(system, (0.3,)).status.code == StatusCode.NOT_CONVERGED
 
     @pytest.mark.parametrize("guess", [(0.0, 0.0), (1e-9, 0.0), (1e-3, 0.0)])
     @pytest.mark.parametrize("offset", [0.0, 5.0])
