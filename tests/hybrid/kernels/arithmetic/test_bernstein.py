@@ -227,6 +227,15 @@ def test_no_side_takes_the_first_sign():
     assert crossing(coefficients, 0, 0)[0] == pytest.approx(0.6)
 
 
+def test_without_a_side_roots_at_the_start_up_to_rounding_are_no_crossings():
+    """With a side they are one crossing at the start, if their number is odd."""
+    cluster = bernstein(powers((1e-17, 2e-17, 3e-17, 0.5)), 7)
+    assert cluster[0] > 0.0 > cluster[1]
+    assert crossing(cluster, 0, 0)[0] == pytest.approx(0.5)
+    assert crossing(cluster, 0, +1)[0] == pytest.approx(0.5)
+    assert crossing(cluster, 1, 0)[0] == pytest.approx(0.0, abs=1e-14)
+
+
 def test_side_after_crossings_against_the_direction():
     assert crossing(bernstein(powers((0.2,)), 7), -1, -1) == (NONE, 1)
     assert crossing(bernstein(powers((0.2, 0.4)), 7), 1, 1)[1] == 1

@@ -137,3 +137,53 @@ def test_all_forms_of_a_guard_fire_at_its_zeros(form, kind, solver):
                 assert arc.status.code == StatusCode.SUCCESS
                 if not name.startswith("third"):
                     assert ("proved" in arc.status.message) == (form == "hidden")
+
+
+DIPS = {
+    "affine": lambda t, x, p: x.q,
+    "moving": lambda t, x, p: x.q + p.s * t,
+    "product": lambda t, x, p: x.q * (2.0 + x.v * x.v),
+    "angle": lambda t, x, p: np.arctan(x.q),
+    "larger": lambda t, x, p: np.maximum(x.q, 3.0 * x.q),
+}
+
+
+@cache
+def dip(form, direction):
+    """``q = d + a (t - 1)^2``, seen in a moving frame where the guard moves."""
+    speed = (lambda p: p.s) if form == "moving" else (lambda p: 0.0)
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"a": 1.0, "s": 0.5},
+        modes=[Mode("m", lambda t, x, p: (x.v - speed(p), 2.0 * p.a + 0.0 * x.q))],
+        transitions=[Transition("m", "m", Guard(DIPS[form], direction))],
+    )
+
+
+@pytest.mark.parametrize("solver", ["Taylor", "DOP853"])
+@pytest.mark.parametrize("form", DIPS)
+@pytest.mark.parametrize("direction", [-1, 0, 1])
+def test_a_dip_is_two_crossings_or_none(form, direction, solver):
+    for a in (1.0, 2.0**10):
+        for exponent in (*range(-48, -2, 3), -60):
+            for sign in (-1.0, 1.0):
+                depth = a * sign * 2.0**exponent
+                arc = simulate(
+                    dip(form, direction),
+                    (a + depth, -2.0 * a),
+                    (0.0, 3.0),
+                    parameters={"a": a},
+                    solver=SOLVERS[solver],
+                )
+                assert arc.status.code == StatusCode.SUCCESS
+                half = 2.0 ** (exponent / 2)
+                expected = [1.0 - half, 1.0 + half] if sign < 0.0 else []
+                if direction:
+                    expected = expected[:1] if direction < 0 else expected[1:]
+                if exponent > -40:
+                    assert len(arc.jumps) == len(expected), (a, depth)
+                    np.testing.assert_allclose(arc.jumps.t, expected, rtol=0, atol=1e-14 / half + 1e-10)
+                elif a == 1.0:
+                    # Rounding may hide the dip.
+                    assert len(arc.jumps) <= (2 if direction == 0 else 1)
+                assert arc.x[-1, 0] + (1.5 if form == "moving" else 0.0) == pytest.approx(depth + 4.0 * a)

@@ -198,3 +198,61 @@ def test_a_crossing_that_was_refused_does_not_fire_later(solver, source):
     arc = simulate(system, (0.0, start, 1.0, 0.0), (0.0, 1.0), solver=solver)
     assert [str(name) for name in arc.jumps.transition][-2:] == ["fire", "open"]
     assert arc.x[-1, 3] == 1.0
+
+
+@cache
+def bouncing_beside():
+    """A bouncing ball, and beside it ``s' = -s^2``, whose Jacobian varies; ``s = s0 / (1 + s0 t)``."""
+    return HybridSystem(
+        state=("q", "v", "s"),
+        parameters={"e": 0.5},
+        modes=[
+            Mode("fall", lambda t, x, p: (x.v, -2.0, -x.s * x.s)),
+            Mode("rest", lambda t, x, p: (0.0, 0.0, -x.s * x.s)),
+        ],
+        transitions=[
+            Transition(
+                "fall", "fall", Guard(lambda t, x, p: x.q, -1), Reset(lambda t, x, p: (0.0, -p.e * x.v, x.s)),
+                accumulates_to="rest",
+            )
+        ],
+    )  # fmt: skip
+
+
+@SOLVERS
+@pytest.mark.parametrize("e", [0.0, 0.1, 0.5, 0.8, 0.93])
+def test_a_chatter_changes_nothing_of_what_goes_on_beside_it(solver, e):
+    end = 3.0 + 2.0 * e / (1.0 - e)
+    arc = simulate(
+        bouncing_beside(),
+        (1.0, 0.0, 1.0),
+        (0.0, end),
+        mode="fall",
+        parameters={"e": e},
+        solver=solver,
+        tangent=True,
+    )
+    assert arc.mode[-1] == "rest"
+    np.testing.assert_allclose(arc.x[-1], [0.0, 0.0, 1.0 / (1.0 + end)], rtol=0, atol=1e-9)
+    expected = np.zeros((3, 3))
+    expected[2, 2] = (1.0 + end) ** -2
+    np.testing.assert_allclose(arc.fundamental, expected, rtol=0, atol=1e-9)
+
+
+@SOLVERS
+@pytest.mark.parametrize("k", [1, 2])
+def test_the_sum_rule_counts_the_divergence_with_any_number_of_vectors(solver, k):
+    """``x'' = -x - 0.2 x'`` with a velocity that is halved once per unit of time."""
+    system = HybridSystem(
+        state=("x", "v", "y"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -x.x - 0.2 * x.v, 1.0))],
+        transitions=[
+            Transition(
+                "m", "m", Guard(lambda t, x, p: x.y - 1.0, +1), Reset(lambda t, x, p: (x.x, 0.5 * x.v, 0.0))
+            )
+        ],
+    )
+    spectrum = lyapunov_spectrum(
+        system, (1.0, 0.0, 0.5), k=k, interval=4.0, intervals=5, transient=4, solver=solver
+    )
+    assert spectrum.sum_rule == pytest.approx(-0.2 - np.log(2.0), abs=1e-9)
