@@ -159,13 +159,18 @@ def test_a_mass_that_rests_at_once_keeps_what_does_not_rest(solver, count):
 
 @SOLVERS
 def test_the_mode_of_rest_may_be_left_at_once(solver):
-    """Its guard is beyond as the mass comes to rest."""
-    arc = simulate(
-        stopped(), (1.0, 0.0, 2.0, 0.0), (0.0, 3.0), mode="fall", parameters={"level": 1.5}, solver=solver
-    )
+    """Its guard is beyond as the mass comes to rest; all happens at the time of the landing."""
+    options = {"mode": "fall", "parameters": {"level": 1.5}, "solver": solver}
+    arc = simulate(stopped(), (1.0, 0.0, 2.0, 0.0), (0.0, 3.0), tangent=True, **options)
     assert [str(name) for name in arc.jumps.transition] == ["land", "alarm"]
     np.testing.assert_allclose(arc.jumps.t, 1.0, rtol=1e-12)
-    np.testing.assert_allclose(arc.x[-1, 2:], [4.0 * np.exp(-0.5), 6.0], rtol=0, atol=1e-10)
+    u = 4.0 * np.exp(-0.5)
+    np.testing.assert_allclose(arc.x[-1, 2:], [u, 6.0], rtol=0, atol=1e-10)
+    expected = [[-0.25 * u, -0.25 * u, 0.5 * u, 0.0], [-1.5, -1.5, 0.0, 1.0]]
+    np.testing.assert_allclose(arc.fundamental[2:], expected, rtol=0, atol=1e-9)
+    without = simulate(stopped(), (1.0, 0.0, 2.0, 0.0), (0.0, 3.0), **options)
+    np.testing.assert_allclose(without.x[-1], arc.x[-1], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(without.jumps.saltation, arc.jumps.saltation, rtol=0, atol=1e-9)
 
 
 @SOLVERS
