@@ -187,3 +187,54 @@ def test_a_dip_is_two_crossings_or_none(form, direction, solver):
                     # Rounding may hide the dip.
                     assert len(arc.jumps) <= (2 if direction == 0 else 1)
                 assert arc.x[-1, 0] + (1.5 if form == "moving" else 0.0) == pytest.approx(depth + 4.0 * a)
+
+
+CLOCKS = {
+    "affine": lambda t, x, p: t - p.at,
+    "angle": lambda t, x, p: np.arctan(3.0 * (t - p.at)),
+    "product": lambda t, x, p: (t - p.at) * (2.0 + x.v * x.v),
+    "jump": lambda t, x, p: np.sign(t - p.at),
+}
+
+
+def alarm(t, x, p):
+    """Not to be traced."""
+    if x.z > 100.0:
+        return 1.0
+    return t - p.at
+
+
+@cache
+def contact(form):
+    """A point that is pushed against a Hertz contact, whose steps have a clock of their own."""
+    opaque = {"gradient": lambda t, x, p: (0.0 * t, 0.0 * t, 0.0 * t, 1.0)} if form == "hidden" else {}
+    return HybridSystem(
+        state=("z", "v", "n"),
+        parameters={"at": 1.0},
+        modes=[
+            Mode("free", lambda t, x, p: (x.v, 1.0, 0.0)),
+            Mode("contact", lambda t, x, p: (x.v, 1.0 - np.maximum(x.z, 0.0) ** 1.5, 0.0)),
+        ],
+        transitions=[
+            Transition("free", "contact", Guard(lambda t, x, p: x.z, +1)),
+            Transition("contact", "free", Guard(lambda t, x, p: x.z, -1)),
+            Transition(
+                "contact", "contact", Guard(alarm if form == "hidden" else CLOCKS[form], +1, **opaque),
+                Reset(lambda t, x, p: (x.z, x.v, x.n + 1.0)), name="alarm",
+            ),
+        ],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("form", [*CLOCKS, "hidden"])
+def test_guards_in_time_on_steps_with_a_clock_of_their_own(form):
+    plain = simulate(contact("affine"), (0.0, 0.5, 0.0), (0.0, 12.0), mode="contact", parameters={"at": 50.0})
+    # Back in the contact, the guard would be beyond.
+    leaves = plain.jumps.t[0]
+    end = leaves + 0.2
+    for at in np.linspace(0.01, 0.99, 9) * leaves:
+        arc = simulate(contact(form), (0.0, 0.5, 0.0), (0.0, end), mode="contact", parameters={"at": at})
+        assert arc.propagators["contact"] == "Taylor series, desingularised"
+        assert [each.t for each in arc.jumps["alarm"]] == [pytest.approx(at, rel=1e-12)]
+        np.testing.assert_allclose(arc.x[-1, :2], plain(end)[:2], rtol=0, atol=1e-8)
+        assert arc.x[-1, 2] == 1.0
