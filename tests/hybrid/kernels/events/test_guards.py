@@ -123,3 +123,41 @@ def test_sizes_are_at_least_what_the_flow_changes_in_a_common_time():
     trajectory.run.scale[:] = large
     widened(trajectory.model, trajectory.run, T, trajectory.work)
     np.testing.assert_array_equal(trajectory.run.scale, large)
+
+
+@cache
+def pushed():
+    """Forces that cancel where ``cos t = f``, among other forcings, in a mode and in the guard of another."""
+    return HybridSystem(
+        state=("x", "v"),
+        parameters={"f": 1.0},
+        modes=[
+            Mode("first", lambda t, x, p: (np.sin(t) + x.v, np.cos(3.0 * t) - x.x)),
+            Mode("second", lambda t, x, p: (x.v, np.cos(t) - p.f - x.x)),
+        ],
+        transitions=[
+            Transition("first", "second", Guard(lambda t, x, p: np.cos(t) - p.f - x.x, +1)),
+            Transition("second", "first", Guard(lambda t, x, p: x.v, +1)),
+        ],
+    )
+
+
+@njit
+def bands_of_residues(model, run, t, x, work, out):
+    for transition in range(2):
+        model.field(transition, t, x, model.parameters, work.field)
+        _speed(model, transition, t, x, work.field, work.gradient)
+        out[transition, 0] = _smooth(model, run, transition, t, x, work)
+        out[transition, 1] = _speed_rounding(model, run, transition, t, work)
+
+
+def test_terms_that_cancel_leave_their_own_rounding():
+    """At ``x = 0`` and ``t = 2 pi`` neither the state nor any derivative tells how large the terms were."""
+    t, x, out = 2 * np.pi, np.zeros(2), np.zeros((2, 2))
+    trajectory = start(pushed(), x, t, mode="first", solver=DOP853())
+    trajectory.run.scale[:] = 0.0
+    bands_of_residues(trajectory.model, trajectory.run, t, x, trajectory.work, out)
+    # The guard of the first and the speed of the guard of the second are sums of cos(t) and f.
+    assert 1e-17 < out[0, 0] < 1e-14
+    assert 1e-17 < out[1, 1] < 1e-14
+    assert out[1, 0] == 0.0
