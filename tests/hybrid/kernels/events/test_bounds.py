@@ -146,7 +146,7 @@ paths = st.lists(st.lists(coefficient, min_size=5, max_size=5), min_size=3, max_
 pieces = st.tuples(st.floats(0.05, 0.9), st.sampled_from([1e-6, 1e-3, 0.05]))
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(expressions({**SMOOTH, **JUMPING}), paths, pieces, st.sampled_from([-1, 2]))
 def test_values_slopes_and_middles_are_enclosed(expression, path, piece, clock):
     middle, radius = piece
@@ -166,7 +166,7 @@ def test_values_slopes_and_middles_are_enclosed(expression, path, piece, clock):
     assert row[LEAST_SLOPE] - slack <= slopes.min() <= slopes.max() <= row[MOST_SLOPE] + slack
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(expressions(), paths, st.floats(0.05, 0.9), st.sampled_from([-1, 2]))
 def test_bounds_of_one_place_are_its_value_and_slope(expression, path, place, clock):
     around = expression.parts_along(path, place + 1e-6 * np.arange(-1.0, 2.0), clock)
