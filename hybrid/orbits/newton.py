@@ -1,4 +1,4 @@
-"""Newton's method for a solution that ends where it begins: one integration, and the step that it asks for."""
+"""Newton's method for a solution that ends where it begins: one integration, and the step that follows."""
 
 from __future__ import annotations
 

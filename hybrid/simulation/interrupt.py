@@ -117,8 +117,9 @@ class Bursts:
     def judged(self, code: int) -> int:
         """The code of a kernel: GO_ON if only the burst has ended, INTERRUPTED if the run is to stop."""
         seconds = perf_counter() - self.begin
-        # Only a burst that used up its steps says that more of them fit.
-        if seconds < SECONDS and code == codes.MAX_STEPS:
+        ended = code == codes.MAX_STEPS and all(run.steps < self.limit for run in self.runs)
+        # A kernel that has done its work before the end of the burst does not tell how long a burst takes.
+        if ended and seconds < SECONDS:
             self.steps *= 2
         elif seconds > 2 * SECONDS:
             self.steps = max(1, int(self.steps * SECONDS / seconds))

@@ -38,7 +38,9 @@ def forward(run, period, span):
     phase, lost = sum_in_two_parts(run.phase, span)
     phase, low = sum_in_two_parts(phase, lost + run.phase_low)
     while period > 0.0 and phase >= period:
-        phase, low = sum_in_two_parts(phase - period, low)
+        # A step may be longer than a period: the difference is then rounded, too.
+        phase, lost = sum_in_two_parts(phase, -period)
+        phase, low = sum_in_two_parts(phase, lost + low)
         run.cycle += 1
     run.phase, run.phase_low = phase, low
 

@@ -291,13 +291,12 @@ def _bound_constant(row, value):
 
 @njit(**INLINE)
 def _constant_leaf(programs, place, row):
-    """Set the row of a number or a parameter; returns whether the leaf is a number or a parameter."""
+    """Set the row of a number or a parameter; other rows are left alone."""
     code, a = programs.rows[place, 0], programs.rows[place, 1]
     if code == op.NUMBER:
         _bound_constant(row, programs.numbers[a])
     elif code == op.PARAMETER:
         _bound_constant(row, programs.parameters[a])
-    return code == op.NUMBER or code == op.PARAMETER
 
 
 @exported(INTEGER, Programs, INTEGER, MATRIX, INTEGER, INTEGER, REAL, REAL, REAL, REAL, MATRIX)

@@ -414,16 +414,38 @@ def finish_chatter(task, transition, remaining):
     return follow_rounds(task, remaining)
 
 
+@njit(**KERNEL)
+def change_mode_of_instant(model, run, target, work):
+    """Include a change to the mode ``target`` in the tangent map of this instant; the state stays the same.
+
+    The change happens at the time of the first jump of the instant.
+    """
+    n, t = model.dimension, run.phase
+    model.field(run.mode, t, run.y, model.parameters, work.field)
+    model.field(target, t, run.y, model.parameters, work.field_after)
+    for i in range(n):
+        work.settled[i] = work.field_after[i] - work.field[i]
+        for j in range(n):
+            work.reset_jacobian[i, j] = 1.0 if i == j else 0.0
+    follow(run, n, work)
+
+
 @exported(None, Task, INTEGER)
 def rest(task, limit_mode):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     _, model, _, run, _, work = task_of(task)
-    transition, tangents = run.last_fired, task.tangents
+    n, transition, tangents = model.dimension, run.last_fired, task.tangents
     recall_map(model, run, tangents, work)
+    change_mode_of_instant(model, run, limit_mode, work)
     chatter_matrix(model, run, transition, work)
-    multiply(work.saltation, run.instant, model.dimension, model.dimension, work.state)
+    multiply(work.saltation, run.instant, n, n, work.state)
     if tangents > 0:
-        assume_sizes(model.dimension, work)
-        carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
+        map_of_instant(run, n, work.saltation)
+        assume_sizes(n, work)
+        restore_tangents(run, n, tangents)
+        apart = run.last_kind == GRAZING
+        grown = carry_tangents(model, run, tangents, task.orthonormal != 0, apart, work)
+        if apart:
+            run.ill_conditioned_growth += grown
     run.previous_mode = run.mode
     run.mode = limit_mode

@@ -47,6 +47,34 @@ def test_long_runs_go_on_after_each_burst():
     assert_one_by_one(found, OSCILLATOR, STARTS[:2], (0.0, 3000.0), solver=hybrid.DOP853())
 
 
+def test_samples_of_runs_that_go_on_after_each_burst():
+    times = np.linspace(1.0, 3000.0, 41)
+    options = {"samples": times, "solver": hybrid.DOP853(rtol=1e-6)}
+    found = simulate_many(OSCILLATOR, STARTS[:2], (0.0, 3000.0), executor=1, **options)
+    for i, x0 in enumerate(STARTS[:2]):
+        # Of two runs that stop at the same places: the impacts are chaotic.
+        for j in (0, 7, 40):
+            until = simulate_many(
+                OSCILLATOR,
+                x0[None],
+                (0.0, times[j]),
+                executor=1,
+                samples=times[: j + 1],
+                solver=options["solver"],
+            )
+            np.testing.assert_array_equal(found.x[i, : j + 1], until.x[0])
+        assert found.x[i, -1].values == pytest.approx(found.x_end[i].values, abs=0.0)
+    assert len(np.unique(found.x[0, :, 0])) == 41
+
+
+def test_the_mode_of_a_start_on_a_guard_is_that_of_simulate():
+    """Where both modes allow the state the start is refused; one that is left at once does not count."""
+    system = systems.pendulum()
+    starts = np.array([[0.3, 1.0], [0.3, -1.0], [0.2, 0.5], [0.4, 0.5], [0.3, 0.0]])
+    found = simulate_many(system, starts, (0.0, 2.0))
+    assert_one_by_one(found, system, starts, (0.0, 2.0))
+
+
 def test_runs_that_end_early_say_so():
     """A chatter, a limit of jumps, and starts that no mode allows."""
     ball = models.bouncing_ball()

@@ -18,7 +18,7 @@ _first_crossing, _divide_by_theta, _stays = (
     bernstein.divide_by_theta,
     bernstein.stays,
 )
-_value_and_slope = bernstein.value_and_slope
+_value_and_slope, _lowest, _restrict = bernstein.value_and_slope, bernstein.lowest, bernstein.restrict
 
 
 @njit
@@ -42,6 +42,17 @@ def stays(coefficients, side, band):
 @njit
 def value_and_slope(coefficients, theta):
     return _value_and_slope(coefficients, coefficients.size - 1, theta)
+
+
+@njit
+def restricted(coefficients, start):
+    _restrict(coefficients, coefficients.size - 1, start)
+    return coefficients
+
+
+@njit
+def lowest(coefficients, side):
+    return _lowest(coefficients, coefficients.size - 1, side, np.zeros((64, coefficients.size + 3)))
 
 
 def powers(roots, pairs=()):
@@ -219,6 +230,15 @@ def test_no_side_takes_the_first_sign():
     assert crossing(coefficients, 0, 0)[0] == pytest.approx(0.6)
 
 
+def test_without_a_side_roots_at_the_start_up_to_rounding_are_no_crossings():
+    """With a side they are one crossing at the start, if their number is odd."""
+    cluster = bernstein(powers((1e-17, 2e-17, 3e-17, 0.5)), 7)
+    assert cluster[0] > 0.0 > cluster[1]
+    assert crossing(cluster, 0, 0)[0] == pytest.approx(0.5)
+    assert crossing(cluster, 0, +1)[0] == pytest.approx(0.5)
+    assert crossing(cluster, 1, 0)[0] == pytest.approx(0.0, abs=1e-14)
+
+
 def test_side_after_crossings_against_the_direction():
     assert crossing(bernstein(powers((0.2,)), 7), -1, -1) == (NONE, 1)
     assert crossing(bernstein(powers((0.2, 0.4)), 7), 1, 1)[1] == 1
@@ -264,3 +284,33 @@ def test_value_and_slope(values, theta):
     assert value == pytest.approx(expected, abs=1e-13)
     expected = 3 * ((b - a) * s**2 + 2 * (c - b) * s * theta + (d - c) * theta**2)
     assert slope == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.lists(st.floats(-5, 5), min_size=2, max_size=9), st.floats(0, 0.99), st.floats(0, 1))
+def test_the_restriction_has_the_same_values(values, start, theta):
+    expected = value_and_slope(np.array(values), start + theta * (1 - start))[0]
+    assert value_and_slope(restricted(np.array(values), start), theta)[0] == pytest.approx(
+        expected, abs=1e-13
+    )
+
+
+def test_values_and_slopes_of_a_constant():
+    assert value_and_slope(np.array([3.0]), 0.3) == (3.0, 0.0)
+
+
+@given(apart, st.sampled_from([-1, 1]), st.floats(-1.0, 1.0))
+def test_the_deepest_minimum_inside(turns, side, height):
+    """Of ``height`` plus the integral of a product of factors: its turns are known."""
+    slope = np.array([float(c) for c in powers(turns)])
+    power = np.polynomial.polynomial.polyint(slope, k=height)
+    found, depth = lowest(bernstein([Fraction(float(c)) for c in power]), side)
+    inside = np.array([turn for turn in turns if 0 < turn < 1])
+    bends = np.polynomial.polynomial.polyval(inside, np.polynomial.polynomial.polyder(slope)) * side
+    minima = inside[bends > 0.0]
+    if not len(minima):
+        assert found == NONE
+        return
+    values = side * np.polynomial.polynomial.polyval(minima, power)
+    assert side * depth == pytest.approx(values.min(), abs=1e-9 * abs(power).sum())
+    if np.sum(values < values.min() + 1e-6 * abs(power).sum()) == 1:
+        assert found == pytest.approx(minima[values.argmin()], abs=1e-6)

@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
@@ -18,7 +19,7 @@ _product, _quotient, _whole, _fixed = (
     intervals.whole_power,
     intervals.fixed_power,
 )
-_angle = intervals.angle
+_angle, _truth, _comparison = intervals.angle, intervals.truth, intervals.comparison
 
 
 @njit
@@ -51,6 +52,16 @@ def fixed_power(a, b, exponent):
 @njit
 def angle(a, b, c, d):
     return _angle(a, b, c, d)
+
+
+@njit
+def truth(low, high):
+    return _truth(low, high)
+
+
+@njit
+def comparison(code, a, b, c, d):
+    return _comparison(code, a, b, c, d)
 
 
 # Each function with its derivative; None if the derivative is zero except at jumps.
@@ -133,6 +144,227 @@ def test_a_difference_is_at_most_the_slope_times_the_distance(code, case):
     slack = 1e-14 * (abs(function(u)) + abs(function(low)))
     assert below * (u - low) - slack <= rise
     assert rise <= (above * (u - low) if above else 0.0) + slack
+
+
+# Where the extremes of a function or of its slope may be, besides the ends of an interval.
+TURNS = np.array([0.0, *(np.pi / 2 * np.arange(-8, 9))])
+moderate = st.tuples(
+    st.floats(-6.0, 6.0).map(lambda v: round(v, 2)), st.sampled_from([1e-9, 0.1, 1.0, 5.0])
+).map(lambda v: (v[0], v[0] + v[1]))
+
+
+def extremes(function, low, high):
+    """Least and largest value at the ends, at turns between, and next to them; None without a value there."""
+    places = [low, high, *TURNS[(low < TURNS) & (high > TURNS)]]
+    try:
+        values = [function(place) for place in places]
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return None
+    return min(values), max(values)
+
+
+@pytest.mark.parametrize("code", FUNCTIONS)
+@settings(max_examples=100, suppress_health_check=[HealthCheck.filter_too_much])
+@given(moderate, st.floats(-0.9, 0.9), st.floats(-0.9, 0.9))
+def test_bounds_are_no_wider_than_rounding_makes_them(code, interval, one, other):
+    low, high = sorted((one, other)) if code in (op.ASIN, op.ACOS, op.ATANH) else interval
+    if code in (op.LOG, op.SQRT, op.ACOSH, op.LOG1P):
+        # Into the domain, which begins at 0, at 1 or at -1.
+        low, high = low + 7.001, high + 7.001
+        if code == op.LOG1P:
+            low, high = low - 1.9, high - 1.9
+    function, derivative = FUNCTIONS[code]
+    least, most, below, above = bounds(code, low, high)
+    if code in (op.SIN, op.COS):
+        # No sine is larger than 1, not even by rounding.
+        assert -1.0 <= min(least, below) <= max(most, above) <= 1.0
+    if code == op.TAN and math.floor(low / math.pi - 0.5) != math.floor(high / math.pi - 0.5):
+        assert (least, most, below, above) == (-math.inf, math.inf, -math.inf, math.inf)
+        return
+    exact = extremes(function, low, high)
+    slack = 3e-14 * max(map(abs, exact)) + 2e-15
+    assert exact[0] - slack <= least <= exact[0] + slack
+    assert exact[1] - slack <= most <= exact[1] + slack
+    if derivative is None:
+        # A jump downwards has any slope, one upwards none that is negative.
+        steady = least == most
+        steepest = (-math.inf if code == op.NOT else 0.0, math.inf)
+        assert (below, above) == ((0.0, 0.0) if steady else steepest)
+        return
+    if code == op.ABSOLUTE and low <= 0.0 <= high:
+        assert (below, above) == (-1.0 if low < 0.0 else below, 1.0 if high > 0.0 else above)
+        return
+    if code == op.CUBE_ROOT and low <= 0.0 <= high:
+        assert above == math.inf
+        return
+    exact = extremes(derivative, low, high)
+    slack = 1e-12 * max(map(abs, exact)) + 2e-15
+    assert exact[0] - slack <= below <= exact[0] + slack
+    assert exact[1] - slack <= above <= exact[1] + slack
+
+
+@pytest.mark.parametrize("code", [op.LOG, op.SQRT, op.ACOSH, op.LOG1P, op.ASIN, op.ACOS, op.ATANH])
+def test_only_the_part_of_an_interval_in_the_domain_counts(code):
+    """The domain ends at 0, 1, -1, or at both -1 and 1; outside nothing is known."""
+    end = {op.LOG: 0.0, op.SQRT: 0.0, op.ACOSH: 1.0, op.LOG1P: -1.0}.get(code, -1.0)
+    assert bounds(code, end - 2.0, end - 1.0)[:2] == (-math.inf, math.inf)
+    function = FUNCTIONS[code][0]
+    least, most, below, above = bounds(code, end - 1.0, end + 0.5)
+    at_end = {op.LOG: -math.inf, op.LOG1P: -math.inf, op.ATANH: -math.inf}
+    expected = sorted([at_end[code] if code in at_end else function(end), function(end + 0.5)])
+    np.testing.assert_allclose([least, most], expected, rtol=1e-14)
+    # The slope has no bound at the end of the domain.
+    steepest = -math.inf if code == op.ACOS else math.inf
+    assert steepest in (below, above)
+    if code in (op.ASIN, op.ACOS, op.ATANH):
+        assert bounds(code, 1.5, 2.5)[:2] == (-math.inf, math.inf)
+        mirrored = bounds(code, 0.5, 2.0)
+        shift = math.pi if code == op.ACOS else 0.0
+        np.testing.assert_allclose(mirrored[:2], [shift - most, shift - least], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(mirrored[2:], [below, above], rtol=1e-14)
+
+
+# Functions whose values are not numbers of the machine, on the interval where each is tested.
+EXACT = {
+    op.EXP: (mpmath.exp, -6.0, 6.0), op.LOG: (mpmath.log, 0.1, 9.0), op.SQRT: (mpmath.sqrt, 0.1, 9.0),
+    op.CUBE_ROOT: (lambda u: mpmath.sign(u) * mpmath.cbrt(abs(u)), -9.0, 9.0),
+    op.SIN: (mpmath.sin, -30.0, 30.0),
+    op.COS: (mpmath.cos, -30.0, 30.0), op.TAN: (mpmath.tan, -30.0, 30.0), op.ASIN: (mpmath.asin, -1.0, 1.0),
+    op.ACOS: (mpmath.acos, -1.0, 1.0), op.ATAN: (mpmath.atan, -9.0, 9.0), op.SINH: (mpmath.sinh, -6.0, 6.0),
+    op.COSH: (mpmath.cosh, -6.0, 6.0), op.TANH: (mpmath.tanh, -6.0, 6.0), op.ASINH: (mpmath.asinh, -9.0, 9.0),
+    op.ACOSH: (mpmath.acosh, 1.1, 9.0), op.ATANH: (mpmath.atanh, -1.0, 1.0),
+    op.LOG1P: (mpmath.log1p, -0.9, 9.0),
+    op.EXPM1: (mpmath.expm1, -6.0, 6.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", EXACT)
+def test_the_exact_value_lies_strictly_within_the_bounds_of_a_point(code):
+    """Bounds are rounded outwards: the exact value is never a number of the machine."""
+    exact, low, high = EXACT[code]
+    with mpmath.workdps(40):
+        for u in np.random.default_rng(code).uniform(low, high, 60):
+            least, most, below, above = bounds(code, u, u)
+            assert least < exact(mpmath.mpf(u)) < most
+            if code != op.ABSOLUTE:
+                assert (
+                    below - 4e-16 * abs(below)
+                    <= mpmath.diff(exact, mpmath.mpf(u))
+                    <= above + 4e-16 * abs(above)
+                )
+
+
+def test_exact_powers_products_sums_and_quotients_lie_within_the_bounds_of_points():
+    with mpmath.workdps(40):
+        for u, v in np.random.default_rng(0).uniform(0.1, 9.0, (60, 2)):
+            one, other = mpmath.mpf(u), mpmath.mpf(v)
+            for (least, most), exact in [
+                (product(u, u, -v, -v), -one * other),
+                (quotient(u, u, -v, -v), -one / other),
+                (angle(u, u, -v, -v), mpmath.atan2(one, -other)),
+                (whole_power(-u, -u, 3), -(one**3)),
+                (whole_power(u, u, -3), one**-3),
+                (whole_power(-u, -u, 2), one**2),
+                (fixed_power(u, u, -0.7), one ** mpmath.mpf(-0.7)),
+                (fixed_power(u, u, 0.7), one ** mpmath.mpf(0.7)),
+            ]:
+                assert least < exact < most
+
+
+@given(moderate, moderate)
+def test_products_quotients_and_angles_are_no_wider_than_their_corners(one, other):
+    corners = [(u, v) for u in one for v in other]
+    slack = 1e-14 * max(abs(u * v) for u, v in corners)
+    least, most = product(*one, *other)
+    assert least >= min(u * v for u, v in corners) - slack
+    assert most <= max(u * v for u, v in corners) + slack
+    least, most = quotient(*one, *other)
+    if other[0] < 0.0 < other[1]:
+        assert (least, most) == (-math.inf, math.inf)
+    elif 0.0 not in other:
+        slack = 1e-14 * max(abs(u / v) for u, v in corners)
+        assert least >= min(u / v for u, v in corners) - slack
+        assert most <= max(u / v for u, v in corners) + slack
+    least, most = angle(*one, *other)
+    if one[0] <= 0.0 <= one[1] and other[0] <= 0.0:
+        assert (least, most) == (-math.pi, math.pi)
+    else:
+        angles = [math.atan2(u, v) for u, v in corners]
+        np.testing.assert_allclose([least, most], [min(angles), max(angles)], rtol=1e-14)
+
+
+def test_quotients_by_an_interval_that_ends_at_zero():
+    np.testing.assert_allclose(quotient(1.0, 2.0, 0.0, 4.0), (0.25, math.inf), rtol=1e-14)
+    np.testing.assert_allclose(quotient(1.0, 2.0, -4.0, 0.0), (-math.inf, -0.25), rtol=1e-14)
+    assert quotient(1.0, 2.0, 0.0, 0.0) == (-math.inf, math.inf)
+
+
+@given(moderate, st.integers(-3, 6), st.sampled_from([0.25, 1.5, -0.5, -1.5]))
+def test_powers_are_no_wider_than_they_must(interval, whole, exponent):
+    low, high = interval
+    least, most = whole_power(low, high, whole)
+    around_zero = low <= 0.0 <= high
+    if whole >= 0:
+        values = [low**whole, high**whole, *([0.0**whole] if around_zero else [])]
+        slack = 1e-14 * max(map(abs, values))
+        assert min(values) - slack <= least <= min(values)
+        assert max(values) <= most <= max(values) + slack
+    elif not around_zero:
+        np.testing.assert_allclose([least, most], sorted([low**whole, high**whole]), rtol=1e-13)
+    least, most = fixed_power(low, high, exponent)
+    if high < 0.0:
+        assert (least, most) == (-math.inf, math.inf)
+    elif high > 0.0:
+        ends = [low**exponent if low > 0.0 else (0.0 if exponent > 0.0 else math.inf), high**exponent]
+        np.testing.assert_allclose([least, most], sorted(ends), rtol=1e-13)
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2, 7, 100, 12345])
+def test_a_pole_of_the_tangent_between_two_neighbouring_numbers_is_seen(turn):
+    for sign in (-1.0, 1.0):
+        pole = sign * (turn + 0.5) * math.pi
+        beside = [math.nextafter(pole, -math.inf), math.nextafter(pole, math.inf)]
+        assert bounds(op.TAN, *beside) == (-math.inf, math.inf, -math.inf, math.inf)
+
+
+def test_nothing_is_known_of_sines_far_from_zero():
+    for code in (op.SIN, op.COS):
+        assert bounds(code, 1e15, 1e15)[:2] == (-1.0, 1.0)
+        assert bounds(code, -1e15, -1e15)[:2] == (-1.0, 1.0)
+    assert bounds(op.TAN, 1e15, 1e15)[:2] == (-math.inf, math.inf)
+
+
+def test_truths():
+    assert truth(0.0, 0.0) == 0.0
+    assert [truth(*ends) for ends in [(0.5, 2.0), (-2.0, -0.5)]] == [1.0, 1.0]
+    assert [truth(*ends) for ends in [(-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0)]] == [0.5, 0.5, 0.5]
+
+
+small = st.sampled_from([-1.0, 0.0, 1.0, 2.0])
+short = st.tuples(small, small).map(sorted)
+
+
+@pytest.mark.parametrize("code", [op.LESS, op.LESS_EQUAL, op.EQUAL, op.AND, op.OR])
+@given(short, short)
+def test_comparisons_are_as_certain_as_they_can_be(code, one, other):
+    relation = {
+        op.LESS: np.less, op.LESS_EQUAL: np.less_equal, op.EQUAL: np.equal,
+        op.AND: np.logical_and, op.OR: np.logical_or,
+    }[code]  # fmt: skip
+    places = [
+        sorted({low, high, (low + high) / 2, *(v for v in (0.0, 1.0) if low <= v <= high)})
+        for low, high in (one, other)
+    ]
+    truths = {float(relation(u, v)) for u in places[0] for v in places[1]}
+    if (
+        one[0] < one[1]
+        and other[0] < other[1]
+        and code == op.EQUAL
+        and one[0] <= other[1]
+        and other[0] <= one[1]
+    ):
+        truths = {0.0, 1.0}
+    assert comparison(code, *one, *other) == (min(truths), max(truths))
 
 
 @given(intervals(), intervals())

@@ -75,6 +75,18 @@ def test_is_orthonormal_to_rounding(matrix):
     np.testing.assert_allclose(q.T @ q, np.eye(q.shape[1]), atol=1e-14)
 
 
+@pytest.mark.parametrize("images", [False, True])
+@pytest.mark.parametrize("scale", [2.0**-200, 2.0**-40, 2.0**40, 2.0**200])
+@pytest.mark.parametrize("rest", [0.0, 3e-16, 1e-9])
+def test_the_length_of_vectors_only_adds_to_their_growth(images, scale, rest):
+    matrix = np.array([[0.3, 0.7, 0.1], [0.6, 1.4 + rest, 0.0], [0.0, 0.0, 2.0]])
+    q, growth, indistinct = orthonormalise(matrix, images)
+    scaled_q, scaled_growth, scaled_indistinct = orthonormalise(scale * matrix, images)
+    np.testing.assert_array_equal(scaled_q, q)
+    np.testing.assert_allclose(scaled_growth, growth + math.log(scale), rtol=1e-13)
+    assert scaled_indistinct == indistinct
+
+
 def test_nearly_parallel_vectors_become_orthogonal():
     matrix = np.array([[1.0, 1.0], [0.0, 1e-9], [0.0, 0.0]])
     q, growth, _ = orthonormalise(matrix)

@@ -1,0 +1,163 @@
+"""How far rounding and tolerances move a guard, its speed and its acceleration, compared with NumPy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numba import njit
+
+from hybrid import DOP853, Guard, HybridSystem, Mode, Transition
+from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.simulation.trajectory import start
+
+KERNELS = load_kernels("hybrid.kernels.events.guards")
+_band, _smooth, _tolerated = KERNELS.rounding_band, KERNELS.smooth_band, KERNELS.error_band
+_speed, _speed_rounding = KERNELS.guard_speed, KERNELS.speed_rounding
+_acceleration, _acceleration_rounding = KERNELS.guard_acceleration, KERNELS.acceleration_rounding
+_widen, _time = KERNELS.widen_scale, KERNELS.size_of_time
+T, X, SCALE = 0.7, np.array([0.4, -1.2, 2.0]), np.array([3.0, 1.5, 2.5])
+
+
+@njit
+def judged(model, method, run, transition, t, x, work, out):
+    model.field(0, t, x, model.parameters, work.field)
+    out[0] = _speed(model, transition, t, x, work.field, work.gradient)
+    out[1] = _band(model, run, transition, t, x, work)
+    out[2] = _smooth(model, run, transition, t, x, work)
+    out[3] = _tolerated(method, run, work.gradient, model.dimension)
+    out[4] = _speed_rounding(model, run, 0, t, work)
+    out[5] = _acceleration(model, run, transition, 0, t, x, work)
+    out[6] = _acceleration_rounding(model, run, t, work)
+
+
+@njit
+def widened(model, run, t, work):
+    model.field(0, t, run.y, model.parameters, work.field)
+    _widen(model, run, work)
+
+
+def flat(t, x, p):
+    return 0.5 * x.a - 2.0 * x.b + 0.25 * x.c - 3.0 * t
+
+
+def hidden(t, x, p):
+    if x.a > 1e9:
+        return 0.0
+    return x.a * x.b + 0.3 * x.c * x.c - 0.5 * t
+
+
+@cache
+def system(period=0.0):
+    return HybridSystem(
+        state=("a", "b", "c"),
+        modes=[Mode("m", lambda t, x, p: (x.b * x.c, np.sin(6.25 * t) - x.a * x.a, -0.4 * x.a * x.c))],
+        transitions=[
+            Transition(
+                "m", "m", Guard(flat, +1), name="affine"
+            ),
+            Transition(
+                "m", "m", Guard(lambda t, x, p: x.a * x.b + 0.3 * x.c * x.c - 0.5 * t, +1), name="bent"
+            ),
+            Transition(
+                "m", "m",
+                Guard(hidden, +1, gradient=lambda t, x, p: (x.b, x.a, 0.6 * x.c, -0.5 + 0.0 * t)),
+                name="hidden",
+            ),
+        ],
+    )  # fmt: skip
+
+
+def field(t, x):
+    return np.array([x[1] * x[2], np.sin(6.25 * t) - x[0] ** 2, -0.4 * x[0] * x[2]])
+
+
+def jacobian(t, x):
+    return np.array(
+        [
+            [0.0, x[2], x[1], 0.0],
+            [-2 * x[0], 0.0, 0.0, 6.25 * np.cos(6.25 * t)],
+            [-0.4 * x[2], 0.0, -0.4 * x[0], 0.0],
+        ]
+    )
+
+
+def gradient(name, x):
+    return np.array([0.5, -2.0, 0.25, -3.0]) if name == "affine" else np.array([x[1], x[0], 0.6 * x[2], -0.5])
+
+
+@pytest.mark.parametrize("name", ["affine", "bent", "hidden"])
+def test_values_speeds_and_accelerations_with_their_rounding(name):
+    trajectory = start(system(), X, T, mode="m", solver=DOP853(rtol=1e-5, atol=1e-4))
+    trajectory.run.scale[:] = SCALE
+    out, transition = np.zeros(7), ["affine", "bent", "hidden"].index(name)
+    judged(trajectory.model, trajectory.method, trajectory.run, transition, T, X, trajectory.work, out)
+    f, J, g = field(T, X), jacobian(T, X), gradient(name, X)
+    share = 16 * EPSILON
+    speed = g[3] + g[:3] @ f
+    assert out[0] == pytest.approx(speed, rel=1e-14)
+    band = share * (abs(g[3]) * T + np.abs(g[:3]) @ SCALE)
+    assert out[1] == pytest.approx(band, rel=0.2)
+    assert out[2] == pytest.approx(band, rel=1e-12)
+    assert out[3] == pytest.approx(np.abs(g[:3]) @ (1e-4 + 1e-5 * SCALE), rel=1e-12)
+    # The field may be off by its own rounding and by that of its arguments.
+    spread = np.abs(f) + np.abs(J[:, 3]) * T + np.abs(J[:, :3]) @ SCALE
+    assert out[4] == pytest.approx(share * (abs(g[3]) + np.abs(g[:3]) @ spread), rel=1e-12)
+    curvature = 0.0 if name == "affine" else 2 * f[0] * f[1] + 0.6 * f[2] ** 2
+    acceleration = curvature + g[:3] @ (J[:, 3] + J[:, :3] @ f)
+    assert out[5] == pytest.approx(acceleration, rel=1e-12 if name != "hidden" else 1e-6)
+    bend = np.abs(J[:, 3]) + np.abs(J[:, :3]) @ spread
+    assert out[6] == pytest.approx(share * np.abs(g[:3]) @ bend, rel=1e-12)
+
+
+def test_sizes_are_at_least_what_the_flow_changes_in_a_common_time():
+    """The common time is that in which what moves changes by its own size."""
+    trajectory = start(system(), X, T, mode="m", solver=DOP853())
+    trajectory.run.scale[:] = 0.1
+    widened(trajectory.model, trajectory.run, T, trajectory.work)
+    f = np.abs(field(T, X))
+    np.testing.assert_allclose(
+        trajectory.run.scale, np.maximum(0.1, f * np.abs(X).max() / f.max()), rtol=1e-14
+    )
+    large = np.full(3, 100.0)
+    trajectory.run.scale[:] = large
+    widened(trajectory.model, trajectory.run, T, trajectory.work)
+    np.testing.assert_array_equal(trajectory.run.scale, large)
+
+
+@cache
+def pushed():
+    """Forces that cancel where ``cos t = f``, among other forcings, in a mode and in the guard of another."""
+    return HybridSystem(
+        state=("x", "v"),
+        parameters={"f": 1.0},
+        modes=[
+            Mode("first", lambda t, x, p: (np.sin(t) + x.v, np.cos(3.0 * t) - x.x)),
+            Mode("second", lambda t, x, p: (x.v, np.cos(t) - p.f - x.x)),
+        ],
+        transitions=[
+            Transition("first", "second", Guard(lambda t, x, p: np.cos(t) - p.f - x.x, +1)),
+            Transition("second", "first", Guard(lambda t, x, p: x.v, +1)),
+        ],
+    )
+
+
+@njit
+def bands_of_residues(model, run, t, x, work, out):
+    for transition in range(2):
+        model.field(transition, t, x, model.parameters, work.field)
+        _speed(model, transition, t, x, work.field, work.gradient)
+        out[transition, 0] = _smooth(model, run, transition, t, x, work)
+        out[transition, 1] = _speed_rounding(model, run, transition, t, work)
+
+
+def test_terms_that_cancel_leave_their_own_rounding():
+    """At ``x = 0`` and ``t = 2 pi`` neither the state nor any derivative tells how large the terms were."""
+    t, x, out = 2 * np.pi, np.zeros(2), np.zeros((2, 2))
+    trajectory = start(pushed(), x, t, mode="first", solver=DOP853())
+    trajectory.run.scale[:] = 0.0
+    bands_of_residues(trajectory.model, trajectory.run, t, x, trajectory.work, out)
+    # The guard of the first and the speed of the guard of the second are sums of cos(t) and f.
+    assert 1e-17 < out[0, 0] < 1e-14
+    assert 1e-17 < out[1, 1] < 1e-14
+    assert out[1, 0] == 0.0
