@@ -12,7 +12,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
 from hybrid.kernels.events.guards import error_band, guard_value, has_program, rounding_band, was_left_behind
-from hybrid.kernels.events.onset import BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
+from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.types.codes import (
     HIGH,
@@ -263,11 +263,12 @@ def first_change(
     # The last place where the guard was certain to be on its side, and where it came closest to zero.
     sure = 0.0
     touch, depth = NOWHERE, math.inf
-    base, tilt = 0.0, 0.0
+    base, tilt, leaves = 0.0, 0.0, False
     if is_zero(on_guard):
         row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
         value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
         base, tilt = known_part(value, 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]), on_guard)
+        leaves = on_guard == BY_SPEED and side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
     stack = work.intervals
     stack[0, 0], stack[0, 1] = SETTLED * length if on_guard > 0 else 0.0, length
     while top >= 0:
@@ -371,9 +372,10 @@ def first_change(
                 work,
             )
             touch, depth = NOWHERE, math.inf
-            # If the transition has just fired, the step only shows to which side its guard leaves zero.
+            # If the transition has just fired and its speed is uncertain, the step only shows to which side
+            # its guard leaves zero.
             again = place <= SETTLED * length and (
-                has_just_fired(run, transition, on_guard)
+                (has_just_fired(run, transition, on_guard) and not leaves)
                 or _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work)
             )
             side = after

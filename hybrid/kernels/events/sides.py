@@ -71,7 +71,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
         trend, order = speed, BY_SPEED
-        if abs(speed) <= speed_rounding(model, run, mode, t, work):
+        if abs(speed) <= speed_rounding(model, run, transition, mode, t, x, work):
             if may_jump(model, run, transition, t, x, work):
                 # The state is in the middle of the jump, on neither side.
                 if was_on and before != 0:
@@ -79,7 +79,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 trend, order = 0.0, BY_STEP
             else:
                 trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
-                if abs(trend) <= acceleration_rounding(model, run, t, work):
+                if abs(trend) <= acceleration_rounding(model, run, transition, t, x, work):
                     trend, order = 0.0, BY_STEP
     direction = model.direction[transition]
     if trend > 0.0:
@@ -166,7 +166,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             own
             and was_on
             and order == BY_STEP
-            and abs(run.last_transversality) <= speed_rounding(model, run, mode, t, work)
+            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
         )
         if own and order == BY_STEP and direction != 0 and not flat:
             # Its own reset has stopped the state on the guard, as a plastic impact does.
