@@ -160,7 +160,7 @@ def root_in_bracket(
             value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
         else:
             value = _value_at(model, transition, path, order, clock, start, pace, 0.0, row, base, tilt, work)
-            begins = value * side > 0.0
+            begins = value * side > 0.0 or math.isnan(value)
         if not begins and _rests_at_zero(value, row):
             # At a flat root the slope is zero too, but not a little farther on.
             beside = work.registers[
@@ -177,7 +177,8 @@ def root_in_bracket(
         value = _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work)
         slope = _least_slope(row)
         at_rest = _rests_at_zero(value, row)
-        if value * side > 0.0 or at_rest:
+        # A guard without a value has not crossed yet: it crosses after that.
+        if value * side > 0.0 or at_rest or math.isnan(value):
             low = place
         else:
             high = place
@@ -305,6 +306,17 @@ def first_change(
         shallow = smooth and not monotone and farthest <= max(rounding, tolerated)
         # If the guard's range on the piece is no wider than in its middle, halving the piece does not help.
         tells = not row[HIGH] - row[LOW] <= NO_BETTER * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
+        if not tells and not row[HIGH_MIDDLE] - row[LOW_MIDDLE] < math.inf:
+            # The guard has no value in the middle, but it may have one elsewhere.
+            tells = _has_value(
+                model, transition, path, order, clock, start, pace, low, work
+            ) or _has_value(model, transition, path, order, clock, start, pace, high, work)
+            last = model.bound(
+                model.programs, transition, path, order, clock, start, pace, middle, radius, work.registers
+            )
+            row = work.registers[last]
+            if base != 0.0 or tilt != 0.0:
+                _shifted(row, base, tilt, low, high)
         splits = low < middle < high and high - low > EPSILON * length and tells
         if splits and not (clear or monotone or shallow):
             if pieces <= MOST_PIECES:
