@@ -119,7 +119,7 @@ def chatter_status(where: str, names: Sequence[str]) -> Status:
     in_turn = "" if len(names) == 1 else " in turn"
     return Status(
         StatusCode.ACCUMULATION,
-        f"Jumps of {told}{in_turn} accumulate {where}: the times between jumps shrink by a constant ratio, "
+        f"Jumps of {told}{in_turn} accumulate {where}: the times between jumps become ever shorter, "
         "so infinitely many jumps take a finite time.",
         NAME_THE_LIMIT,
     )

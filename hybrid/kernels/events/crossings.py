@@ -12,7 +12,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
 from hybrid.kernels.events.guards import error_band, guard_value, has_program, rounding_band, was_left_behind
-from hybrid.kernels.events.onset import BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
+from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.types.codes import (
     HIGH,
@@ -161,7 +161,7 @@ def root_in_bracket(
             value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
         else:
             value = _value_at(model, transition, path, order, clock, start, pace, 0.0, row, base, tilt, work)
-            begins = value * side > 0.0
+            begins = value * side > 0.0 or math.isnan(value)
         if not begins and _rests_at_zero(value, row):
             # At a flat root the slope is zero too, but not a little farther on.
             beside = work.registers[
@@ -178,7 +178,8 @@ def root_in_bracket(
         value = _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work)
         slope = _least_slope(row)
         at_rest = _rests_at_zero(value, row)
-        if value * side > 0.0 or at_rest:
+        # A guard without a value has not crossed yet: it crosses after that.
+        if value * side > 0.0 or at_rest or math.isnan(value):
             low = place
         else:
             high = place
@@ -264,11 +265,12 @@ def first_change(
     # The last place where the guard was certain to be on its side, and where it came closest to zero.
     sure = 0.0
     touch, depth = NOWHERE, math.inf
-    base, tilt = 0.0, 0.0
+    base, tilt, leaves = 0.0, 0.0, False
     if is_zero(on_guard):
         row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
         value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
         base, tilt = known_part(value, 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]), on_guard)
+        leaves = on_guard == BY_SPEED and side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
     stack = work.intervals
     stack[0, 0], stack[0, 1] = SETTLED * length if on_guard > 0 else 0.0, length
     while top >= 0:
@@ -305,6 +307,17 @@ def first_change(
         shallow = smooth and not monotone and farthest <= max(rounding, tolerated)
         # If the guard's range on the piece is no wider than in its middle, halving the piece does not help.
         tells = not row[HIGH] - row[LOW] <= NO_BETTER * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
+        if not tells and not row[HIGH_MIDDLE] - row[LOW_MIDDLE] < math.inf:
+            # The guard has no value in the middle, but it may have one elsewhere.
+            tells = _has_value(
+                model, transition, path, order, clock, start, pace, low, work
+            ) or _has_value(model, transition, path, order, clock, start, pace, high, work)
+            last = model.bound(
+                model.programs, transition, path, order, clock, start, pace, middle, radius, work.registers
+            )
+            row = work.registers[last]
+            if base != 0.0 or tilt != 0.0:
+                _shifted(row, base, tilt, low, high)
         splits = low < middle < high and high - low > EPSILON * length and tells
         if splits and not (clear or monotone or shallow):
             if pieces <= MOST_PIECES:
@@ -372,9 +385,10 @@ def first_change(
                 work,
             )
             touch, depth = NOWHERE, math.inf
-            # If the transition has just fired, the step only shows to which side its guard leaves zero.
+            # If the transition has just fired and its speed is uncertain, the step only shows to which side
+            # its guard leaves zero.
             again = place <= SETTLED * length and (
-                has_just_fired(run, transition, on_guard)
+                (has_just_fired(run, transition, on_guard) and not leaves)
                 or _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work)
             )
             side = after

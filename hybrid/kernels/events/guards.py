@@ -12,6 +12,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
+# Share by which rounding may change the curvature of a guard; more is a kink.
+SMALL_CHANGE = 1e-3
 
 
 @njit(**INLINE)
@@ -137,7 +139,7 @@ def sides_at(model, run, t, work):
     """Update the sides of the mode's guards to the state of the run at the time ``t``.
 
     A guard that is zero there counts as not yet crossed: it keeps the side before the crossing. It stays
-    without a side if the next step has to show the side.
+    without a side if the next step has to show the side. A guard without a value there keeps its side.
     """
     mode = run.mode
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -147,38 +149,76 @@ def sides_at(model, run, t, work):
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
         if abs(value) > rounding_band(model, run, transition, t, run.y, work):
             run.side[transition] = 1 if value > 0.0 else -1
-        elif direction != 0 and run.side[transition] != 0:
+        elif direction != 0 and run.side[transition] != 0 and not math.isnan(value):
             run.side[transition] = -direction
 
 
 @njit(**KERNEL)
-def speed_rounding(model, run, mode, t, work):
-    """How far rounding of state and time can move the speed of the guard in ``work.gradient``."""
+def speed_rounding(model, run, transition, mode, t, x, work):
+    """How far rounding of state and time can move the speed of a guard; ``work.gradient`` is current."""
     n = model.dimension
-    model.field_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     size = abs(work.gradient[n])
     for i in range(n):
         spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
         for j in range(n):
             spread += abs(work.jacobian[i, j]) * run.scale[j]
         size += abs(work.gradient[i]) * spread
-    return ROUNDING_OF_STATE * EPSILON * size + _rounding_of_residues(model, run, mode, t, work)
+    if model.affine_guard[transition] == 0:
+        size += _turned_by_rounding(model, run, transition, t, x, work)
+    return ROUNDING_OF_STATE * EPSILON * size + _rounding_of_residues(model, run, mode, t, x, work)
+
+
+@njit(**INLINE)
+def _curvature(model, transition, t, x, factor, work):
+    """Second derivative of a guard along ``factor`` times the vector ``work.field_after``, and time."""
+    for i in range(model.dimension):
+        work.state[i] = factor * work.field_after[i]
+    model.guard_curvature(transition, t, x, model.parameters, work.state)
+    return work.state[0]
 
 
 @njit(**KERNEL)
-def _rounding_of_residues(model, run, mode, t, work):
+def _turned_by_rounding(model, run, transition, t, x, work):
+    """How much state and time, moved by their own sizes, turn a bent guard, in units of its speed.
+
+    The mixed second derivatives along the flow follow from those along sums and differences. Zero where the
+    curvature of the guard is not compiled or has no value.
+    """
+    n, vector = model.dimension, work.field_after
+    pace = 0.0
+    for i in range(n):
+        vector[i] = work.field[i]
+        pace = max(pace, abs(vector[i]))
+    pace = pace if pace > 0.0 else 1.0
+    ahead = _curvature(model, transition, t, x, 1.0, work)
+    behind = _curvature(model, transition, t, x, -1.0, work)
+    still = _curvature(model, transition, t, x, 0.0, work)
+    size = abs(0.25 * (ahead - behind) + still) * size_of_time(model, t)
+    for j in range(n):
+        vector[j] = work.field[j] + pace
+        more = _curvature(model, transition, t, x, 1.0, work)
+        vector[j] = work.field[j] - pace
+        less = _curvature(model, transition, t, x, 1.0, work)
+        vector[j] = work.field[j]
+        size += abs(more - less) / (4.0 * pace) * run.scale[j]
+    return size if size < math.inf else 0.0
+
+
+@njit(**KERNEL)
+def _rounding_of_residues(model, run, mode, t, x, work):
     """How far rounding of terms in time and parameters alone can move the speed of the guard."""
     size = 0.0
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
         slope = abs(work.gradient[model.residue_component[residue]])
         if slope > 0.0:
-            size += slope * _spread_of_terms(model, run, first + residue, t, run.y, work)
+            size += slope * _spread_of_terms(model, run, first + residue, t, x, work)
     return size
 
 
 @njit(**KERNEL)
-def acceleration_rounding(model, run, t, work):
+def acceleration_rounding(model, run, transition, t, x, work):
     """How far rounding of state and time alone can move the acceleration of the same guard.
 
     ``work.jacobian`` and ``work.field`` are current: ``guard_acceleration`` has just been called.
@@ -193,7 +233,31 @@ def acceleration_rounding(model, run, t, work):
                 spread += abs(work.jacobian[j, k]) * run.scale[k]
             bend += abs(work.jacobian[i, j]) * spread
         size += abs(work.gradient[i]) * bend
-    return 16 * EPSILON * size
+    bent = model.affine_guard[transition] == 0
+    other = _curvature_by_rounding(model, run, transition, t, x, work) if bent else 0.0
+    return ROUNDING_OF_STATE * EPSILON * size + other
+
+
+@njit(**KERNEL)
+def _curvature_by_rounding(model, run, transition, t, x, work):
+    """How far rounding of state and time can move the curvature of a guard along the flow.
+
+    The curvature is evaluated where state and time are off by their rounding, one at a time. It may jump
+    there, at a kink of the guard: that is no rounding.
+    """
+    n, share, place = model.dimension, ROUNDING_OF_STATE * EPSILON, work.new
+    for i in range(n):
+        work.field_after[i], place[i] = work.field[i], x[i]
+    here = _curvature(model, transition, t, x, 1.0, work)
+    later = t + share * size_of_time(model, t)
+    change = abs(_curvature(model, transition, later, x, 1.0, work) - here)
+    total = share * abs(here) + (change if change <= SMALL_CHANGE * abs(here) else 0.0)
+    for i in range(n):
+        place[i] = x[i] + share * run.scale[i]
+        change = abs(_curvature(model, transition, t, place, 1.0, work) - here)
+        total += change if change <= SMALL_CHANGE * abs(here) else 0.0
+        place[i] = x[i]
+    return total if total < math.inf else 0.0
 
 
 @njit(**INLINE)

@@ -1,5 +1,7 @@
 """On which side of each guard a state is, and which guards it has crossed at this instant."""
 
+import math
+
 from numba import njit
 
 from hybrid.kernels.events.guards import (
@@ -11,11 +13,13 @@ from hybrid.kernels.events.guards import (
     has_program,
     may_jump,
     rounding_band,
+    size_of_time,
     smooth_band,
     speed_rounding,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
@@ -24,6 +28,9 @@ STARTED, FLOWED, LANDED = range(3)
 SMOOTH = 4.0
 # A reset that keeps less than this share of a guard's speed holds a state that the flow pushes through it.
 KEPT = 1e-3
+# Moments beside a jump of a guard: each is so many times as long as the last, from the rounding of time on.
+LONGER = 16.0
+MOST_MOMENTS = 3
 
 
 @njit(**KERNEL)
@@ -57,10 +64,12 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     The order is 0 off the guard, 1 if the guard's speed decides, and 2 if the speed is zero up to rounding
     and the acceleration decides. It is 3 if the acceleration is zero too: then the side is unchanged if the
     guard was zero before, and otherwise the guard counts as not yet crossed. It is ``JUMPING`` if the guard
-    jumps across zero within the rounding of the state: then its derivatives are no guide. ``work.field`` is
-    current.
+    jumps across zero within the rounding of the state: then its derivatives are no guide. A guard without a
+    value keeps its side. ``work.field`` is current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
+    if math.isnan(value):
+        return before, 0
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     trend, order = value, 0
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
@@ -71,7 +80,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
         trend, order = speed, BY_SPEED
-        if abs(speed) <= speed_rounding(model, run, mode, t, work):
+        if abs(speed) <= speed_rounding(model, run, transition, mode, t, x, work):
             if may_jump(model, run, transition, t, x, work):
                 # The state is in the middle of the jump, on neither side.
                 if was_on and before != 0:
@@ -79,7 +88,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 trend, order = 0.0, BY_STEP
             else:
                 trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
-                if abs(trend) <= acceleration_rounding(model, run, t, work):
+                if abs(trend) <= acceleration_rounding(model, run, transition, t, x, work):
                     trend, order = 0.0, BY_STEP
     direction = model.direction[transition]
     if trend > 0.0:
@@ -87,6 +96,35 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     if trend < 0.0:
         return -1, order
     return before if before != 0 and (was_on or direction == 0) else -direction, order
+
+
+@njit(**KERNEL)
+def sign_at(model, transition, t, x, moment, work):
+    """Sign of a guard a moment after ``t``, or before; ``work.field`` is current."""
+    for i in range(model.dimension):
+        work.state[i] = x[i] + moment * work.field[i]
+    value = guard_value(model, transition, t + moment, work.state, work.scalar)
+    return 1 if value > 0.0 else (-1 if value < 0.0 else 0)
+
+
+@njit(**KERNEL)
+def signs_beside_jump(model, run, transition, t, x, now, work):
+    """Signs of a guard before and after a jump within rounding of ``x``, from moments beside it.
+
+    The sign at ``x`` itself may be either. Both signs are ``now`` if the guard does not jump across zero here.
+    """
+    size, pace = 0.0, 0.0
+    for i in range(model.dimension):
+        if work.field[i] != 0.0:
+            size, pace = max(size, run.scale[i]), max(pace, abs(work.field[i]))
+    moment = EPSILON * max(size / pace if pace > 0.0 else 0.0, size_of_time(model, t))
+    for _ in range(MOST_MOMENTS):
+        moment *= LONGER
+        before = sign_at(model, transition, t, x, -moment, work)
+        after = sign_at(model, transition, t, x, moment, work)
+        if before * after < 0:
+            return before, after
+    return now, now
 
 
 @njit(**KERNEL)
@@ -166,7 +204,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             own
             and was_on
             and order == BY_STEP
-            and abs(run.last_transversality) <= speed_rounding(model, run, mode, t, work)
+            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
         )
         if own and order == BY_STEP and direction != 0 and not flat:
             # Its own reset has stopped the state on the guard, as a plastic impact does.
@@ -174,7 +212,10 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         if came == STARTED:
             crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
-            crossed = order in (BY_SPEED, JUMPING) and before == -now and (direction == 0 or now == direction)
+            if order == JUMPING:
+                before, now = signs_beside_jump(model, run, transition, t, x, now, work)
+            on = order in (BY_SPEED, JUMPING)
+            crossed = on and before == -now and (direction == 0 or now == direction)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
             # A guard that fires both ways and was due already: this crossing takes the first one back.

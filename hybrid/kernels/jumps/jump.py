@@ -39,6 +39,7 @@ from hybrid.kernels.jumps.locked import (
     restore_tangents,
 )
 from hybrid.kernels.jumps.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
+from hybrid.kernels.jumps.skipped import MANY_AT_ONCE, has_come_to_rest, jumps_in_turn, way_is_free
 from hybrid.kernels.types.codes import (
     ENTERING,
     GRAZING,
@@ -350,6 +351,8 @@ def follow_impacts(task, transition, remaining):
             return False
         steep = span * size_of(work.jacobian, model.dimension)
     x_limit = work.settled
+    if not way_is_free(model, method, run, 1, span, work):
+        return False
     chatter_matrix(model, run, transition, work)
     apart = add_change_of_duration(model, method, run, target, span, work)
     if apart and steep > BRIEF:
@@ -374,17 +377,39 @@ def follow_impacts(task, transition, remaining):
 @njit(**KERNEL)
 def follow_rounds(task, remaining):
     """``finish_chatter`` for transitions that fire in turn; the tangent map of their limit is not known."""
-    _, model, method, run, record, work = task_of(task)
-    n, tangents = model.dimension, task.tangents
+    _, model, method, run, _, work = task_of(task)
     left, turn = limit_of_rounds(model, method, run, work)
-    if not 0.0 < left <= remaining:
+    if not 0.0 < left <= remaining or not way_is_free(model, method, run, turn, left, work):
         return False
+    return go_to_limit(task, turn, left)
+
+
+@njit(**KERNEL)
+def follow_to_rest(task):
+    """``finish_chatter`` for jumps without a steady ratio, once the state has come to rest at one instant."""
+    _, model, _, run, _, work = task_of(task)
+    if run.jumps_here < MANY_AT_ONCE or not has_come_to_rest(model, run, work):
+        return False
+    for i in range(model.dimension):
+        work.settled[i] = run.y[i]
+    return go_to_limit(task, jumps_in_turn(run), 0.0)
+
+
+@njit(**KERNEL)
+def go_to_limit(task, turn, left):
+    """Go to the limit ``work.settled`` of the last ``turn`` jumps, reached after the time ``left``.
+
+    Returns false, and does nothing, if a later jump of the round names the mode of the limit.
+    """
+    _, model, _, run, record, work = task_of(task)
+    n, tangents = model.dimension, task.tangents
     transition = next_in_turn(model, run, turn)
     if transition == NO_TRANSITION:
         return False
     limit_mode = model.accumulates_to[transition]
     target = run.mode if limit_mode == NO_MODE else limit_mode
-    remember_flight(run, record, n, left, work.settled)
+    if left > 0.0:
+        remember_flight(run, record, n, left, work.settled)
     for i in range(n):
         for j in range(n):
             work.saltation[i, j] = math.nan
@@ -409,9 +434,9 @@ def finish_chatter(task, transition, remaining):
 
     The limit is a jump of its own, into the mode that the transition names, if it names one.
     """
-    if follow_impacts(task, transition, remaining):
+    if follow_impacts(task, transition, remaining) or follow_rounds(task, remaining):
         return True
-    return follow_rounds(task, remaining)
+    return follow_to_rest(task)
 
 
 @njit(**KERNEL)

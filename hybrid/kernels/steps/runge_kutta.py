@@ -134,6 +134,9 @@ def find_event(task, h):
         )
         if shortened != NOT_THERE:
             return shortened, correction, fired
+        if drowns(model, method, run, fired, t, theta, h, work):
+            attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
+            return theta * h, 0.0, fired
         attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
         if is_beyond(model, run, fired, side, t + h, work):
             # Only a flight at the level of rounding lies between: the guard is as zero as it can be there.
@@ -144,6 +147,24 @@ def find_event(task, h):
         run.grazing_guard = fired
         remember_touch(model, method, run, record, t, h, work)
     return h, 0.0, NO_TRANSITION
+
+
+@njit(**KERNEL)
+def drowns(model, method, run, transition, t, theta, h, work):
+    """Whether a flight from a bent guard back to it, to the share ``theta`` of the step, is all rounding.
+
+    The slope of the guard has told where such a flight ends; the values of the guard on the way do not.
+    """
+    if model.affine_guard[transition] == 1:
+        return False
+    for part in range(3):
+        place = 0.5 * part * theta
+        state_at(work.path, method.powers.shape[0] - 1, model.dimension, place, work.state)
+        value = guard_value(model, transition, t + place * h, work.state, work.scalar)
+        model.guard_gradient(transition, t + place * h, work.state, model.parameters, work.gradient)
+        if abs(value) > rounding_band(model, run, transition, t + place * h, work.state, work):
+            return False
+    return True
 
 
 @njit(**KERNEL)

@@ -180,7 +180,8 @@ def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y,
             return length, correction
         # A guard that stays zero for a while changes its side at the end of that.
         at_rest = not smooth and value == 0.0 and speed == 0.0
-        if value * side > 0.0 or at_rest:
+        # A guard without a value has not crossed yet if the interpolant crosses farther on.
+        if value * side > 0.0 or at_rest or (math.isnan(value) and length < theta * h):
             low, before = length, True
         else:
             high, after = length, True

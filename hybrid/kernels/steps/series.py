@@ -330,7 +330,7 @@ def series_step(task, remaining):
     if clock < 0:
         h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))
         if not h < 1e100:
-            h = unhurried(series, n, run)
+            h = min(h, unhurried(series, n, run))
     else:
         h = min(h, 1e100)
     if is_forced(model, mode):

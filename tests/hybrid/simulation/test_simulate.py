@@ -38,6 +38,13 @@ class TestExactAnswers:
         np.testing.assert_allclose(arc.jumps.t, FLIGHT["t"], rtol=1e-11)
         np.testing.assert_allclose(arc.x[-1], FLIGHT["x_end"], atol=1e-10)
 
+    @pytest.mark.parametrize("end", [1e99, 1e101, 1e150, 1e300])
+    def test_to_the_end_of_time(self, end):
+        steady = HybridSystem(state=("y", "v"), modes=[Mode("run", lambda t, x, p: (x.v, 0.0))])
+        arc = simulate(steady, (0.0, 1.0), (0.0, end))
+        assert arc.status.ok
+        assert np.allclose(arc.x[-1], (end, 1.0), rtol=1e-12)
+
     def test_no_transitions_at_all(self):
         decay = HybridSystem(state=("x",), modes=[Mode("only", lambda t, x, p: (-x.x,))])
         arc = simulate(decay, (2.0,), (0.0, 3.0), tangent=True)

@@ -1,0 +1,108 @@
+"""Whether the jumps before a limit may be skipped, and whether jumps at one instant have come to a limit."""
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import crosses_towards
+from hybrid.kernels.events.crossings import NOWHERE, first_change
+from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
+    guard_speed,
+    guard_value,
+    has_program,
+    rounding_band,
+    size_of_time,
+    speed_rounding,
+)
+from hybrid.kernels.jumps.rounds import fired_before
+from hybrid.kernels.types.layout import EPSILON, KERNEL
+
+# Jumps at one instant are not examined for a limit before there are this many.
+MANY_AT_ONCE = 100
+# A state at rest may be this many times as far from its guards, and as fast, as rounding.
+AT_REST = 4.0
+
+
+@njit(**KERNEL)
+def takes_turns(model, run, transition, turn):
+    """Whether a transition's guard is that of one of the last ``turn`` jumps."""
+    for back in range(turn):
+        if model.surface[fired_before(run, back)] == model.surface[transition]:
+            return True
+    return False
+
+
+@njit(**KERNEL)
+def way_is_free(model, method, run, turn, span, work):
+    """Whether no other guard is crossed on the straight way from the state to ``work.settled (n,)``.
+
+    The last ``turn`` jumps are those that accumulate, ``span`` is the time that the way takes. If another
+    guard is crossed before the limit, the jumps do not reach that limit.
+    """
+    t, path = run.phase, work.path
+    for i in range(model.dimension):
+        path[0, i], path[1, i] = run.y[i], work.settled[i] - run.y[i]
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        other = model.outgoing[slot]
+        if takes_turns(model, run, other, turn):
+            continue
+        value = guard_value(model, other, t, run.y, work.scalar)
+        model.guard_gradient(other, t, run.y, model.parameters, work.gradient)
+        if abs(value) <= rounding_band(model, run, other, t, run.y, work):
+            continue
+        side = 1 if value > 0.0 else -1
+        if has_program(model, other):
+            place, _, _ = first_change(
+                model, method, run, other, path, 1, -1, t, span, 1.0, side, 0, True, work
+            )
+            crossed = place != NOWHERE
+        else:
+            end = guard_value(model, other, t + span, work.settled, work.scalar)
+            crossed = end * side <= 0.0 and crosses_towards(model.direction[other], -side)
+        if crossed:
+            return False
+    return True
+
+
+@njit(**KERNEL)
+def has_come_to_rest(model, run, work):
+    """Whether the state rests on the guards of the last jumps, and none of their resets moves it.
+
+    So ends a chatter whose flights shorten without a steady ratio, such as that of two balls on a floor that
+    take turns in varying order: its last jumps happen within the rounding of time.
+    """
+    n, mode, t = model.dimension, run.mode, run.phase
+    share, clock, moved = AT_REST * ROUNDING_OF_STATE * EPSILON, size_of_time(model, t), work.trial
+    model.field(mode, t, run.y, model.parameters, work.field)
+    for i in range(n):
+        moved[i] = share * (run.scale[i] + clock * abs(work.field[i]))
+    for back in range(min(run.jumps, run.recent.shape[0])):
+        transition = fired_before(run, back)
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+        height = AT_REST * rounding_band(model, run, transition, t, run.y, work)
+        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, work)
+        for i in range(n):
+            height += abs(work.gradient[i]) * moved[i]
+            for j in range(n):
+                fastest += abs(work.gradient[i] * work.jacobian[i, j]) * moved[j]
+        if not (abs(value) <= height and abs(speed) <= fastest):
+            return False
+        model.reset(transition, t, run.y, model.parameters, work.state)
+        for i in range(n):
+            if not abs(work.state[i] - run.y[i]) <= 2.0 * moved[i]:
+                return False
+    return True
+
+
+@njit(**KERNEL)
+def jumps_in_turn(run):
+    """The fewest last jumps among which are all transitions that the run remembers."""
+    seen = min(run.jumps, run.recent.shape[0])
+    turn = 1
+    for back in range(1, seen):
+        known = False
+        for later in range(back):
+            known = known or fired_before(run, later) == fired_before(run, back)
+        if not known:
+            turn = back + 1
+    return turn
