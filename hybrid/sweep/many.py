@@ -34,7 +34,6 @@ from hybrid.system.graph import HybridSystem, as_system
 if TYPE_CHECKING:
     import xarray
 
-KERNEL = "hybrid.kernels.events.many"
 # Starts that a thread takes at a time: enough of them that threads end at about the same time.
 BLOCKS_PER_THREAD = 8
 STARTS = "be states of shape (N, n), or map each component to a number or to N of them"
@@ -251,7 +250,7 @@ class _Runs:
         compiled = self.compiled = compile_system(system)
         # Before threads need the same kernels.
         plan = self.plan = plan_of(compiled, options["solver"], 0)
-        load_kernels(KERNEL)
+        load_kernels("hybrid.kernels.events.many")
         given = options["parameters"]
         self.model = compiled.at(given, plan.model) if given else plan.model
         for time in t_span:
@@ -278,7 +277,7 @@ class _Runs:
         fresh = [words.copy() for words in memory]
         places = np.zeros((len(block), 3), dtype=np.int64)
         verdicts = np.zeros(len(self.system.transitions), dtype=np.int64)
-        kernel = load_kernels(KERNEL).many_runs
+        kernel = load_kernels("hybrid.kernels.events.many").many_runs
         advance, task = load_kernels().advance, trajectory.task(trajectory.no_record())
         reached = np.zeros(1, dtype=np.int64)
         begin, resumed, told = 0, 0, []

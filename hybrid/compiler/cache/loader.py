@@ -34,6 +34,7 @@ ALL_KERNELS = (
     "hybrid.kernels.events.bounds",
     "hybrid.kernels.steps.forcing",
     "hybrid.kernels.events.sections",
+    "hybrid.kernels.events.many",
     "hybrid.kernels.steps.dense",
     "hybrid.kernels.evaluate",
     "hybrid.kernels.events.initial_mode",

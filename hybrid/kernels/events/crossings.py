@@ -12,7 +12,14 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
 from hybrid.kernels.events.guards import error_band, guard_value, has_program, rounding_band, was_left_behind
-from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, has_just_fired, is_zero, known_part, side_is_certain
+from hybrid.kernels.events.onset import (
+    BY_SPEED,
+    BY_STEP,
+    has_just_fired,
+    is_zero,
+    known_part,
+    side_is_certain,
+)
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.types.codes import (
     HIGH,
@@ -309,9 +316,9 @@ def first_change(
         tells = not row[HIGH] - row[LOW] <= NO_BETTER * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
         if not tells and not row[HIGH_MIDDLE] - row[LOW_MIDDLE] < math.inf:
             # The guard has no value in the middle, but it may have one elsewhere.
-            tells = _has_value(
-                model, transition, path, order, clock, start, pace, low, work
-            ) or _has_value(model, transition, path, order, clock, start, pace, high, work)
+            tells = _has_value(model, transition, path, order, clock, start, pace, low, work) or _has_value(
+                model, transition, path, order, clock, start, pace, high, work
+            )
             last = model.bound(
                 model.programs, transition, path, order, clock, start, pace, middle, radius, work.registers
             )

@@ -14,7 +14,8 @@ from hybrid.kernels.events.guards import (
     speed_rounding,
 )
 from hybrid.kernels.jumps.rounds import fired_before
-from hybrid.kernels.types.layout import EPSILON, KERNEL
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import KERNEL
 
 # Jumps at one instant are not examined for a limit before there are this many.
 MANY_AT_ONCE = 100

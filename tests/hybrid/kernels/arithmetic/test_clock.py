@@ -12,8 +12,8 @@ from numba import njit
 import hybrid
 import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.compiler.cache.loader import load_kernels
-from hybrid.kernels.types.layout import INDICES, VECTOR
+from hybrid.kernels.arithmetic import clock
+from hybrid.kernels.types.kinds import INDICES, VECTOR
 from hybrid.kernels.types.structure import Structure
 
 SHIFTS = [2.0**20, -(2.0**20), 2.0**30]
@@ -117,9 +117,8 @@ def test_forcing_without_a_period_is_limited_by_the_rounding_of_time():
     assert hybrid.simulate(periodic, (-70.6, 0.0), (1e9, 1e9 + 100.0)).status.ok
 
 
-KERNELS = load_kernels("hybrid.kernels.arithmetic.clock")
-_sum, _left, _forward, _set = KERNELS.sum_in_two_parts, KERNELS.time_left, KERNELS.forward, KERNELS.set_clock
-_measured = KERNELS.measured_time
+_sum, _left, _forward, _set = clock.sum_in_two_parts, clock.time_left, clock.forward, clock.set_clock
+_measured = clock.measured_time
 
 
 class Clock(Structure, counters=("cycle",), numbers=("phase", "phase_low", "since_entry", "period")):

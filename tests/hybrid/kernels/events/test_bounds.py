@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.compiler.cache.loader import load_kernels
 from hybrid.kernels.arithmetic import operations as op
+from hybrid.kernels.events import bounds
 from hybrid.kernels.types.codes import (
     HIGH,
     HIGH_MIDDLE,
@@ -22,8 +22,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.layout import Programs
 
-KERNELS = load_kernels("hybrid.kernels.events.bounds")
-_bound, _spread = KERNELS.bound_guard, KERNELS.spread_by_rounding
+_bound, _spread = bounds.bound_guard, bounds.spread_by_rounding
 
 PARAMETERS = (1.75, -0.6)
 # Time along a step: from ``START`` on, at this pace.

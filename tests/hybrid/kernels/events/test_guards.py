@@ -7,15 +7,14 @@ import pytest
 from numba import njit
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Transition
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.events import guards
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.simulation.trajectory import start
 
-KERNELS = load_kernels("hybrid.kernels.events.guards")
-_band, _smooth, _tolerated = KERNELS.rounding_band, KERNELS.smooth_band, KERNELS.error_band
-_speed, _speed_rounding = KERNELS.guard_speed, KERNELS.speed_rounding
-_acceleration, _acceleration_rounding = KERNELS.guard_acceleration, KERNELS.acceleration_rounding
-_widen, _time = KERNELS.widen_scale, KERNELS.size_of_time
+_band, _smooth, _tolerated = guards.rounding_band, guards.smooth_band, guards.error_band
+_speed, _speed_rounding = guards.guard_speed, guards.speed_rounding
+_acceleration, _acceleration_rounding = guards.guard_acceleration, guards.acceleration_rounding
+_widen, _time = guards.widen_scale, guards.size_of_time
 T, X, SCALE = 0.7, np.array([0.4, -1.2, 2.0]), np.array([3.0, 1.5, 2.5])
 
 

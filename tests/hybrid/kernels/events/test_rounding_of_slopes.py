@@ -22,7 +22,7 @@ TABLE = HybridSystem(
     parameters={"A": 3.44, "w": 1.33, "r": 0.5},
     modes=[
         Mode("fly", lambda t, x, p: (x.v, -1.0 + 0.0 * x.y, 1.0)),
-        Mode("stick", lambda t, x, p: (speed(x, p), -p.w**2 * height(x, p), 1.0)),
+        Mode("stick", lambda t, x, p: (speed(x, p), -(p.w**2) * height(x, p), 1.0)),
     ],
     transitions=[
         Transition(

@@ -8,7 +8,7 @@ from numba import njit
 from scipy.linalg import expm
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.jumps import jump
 from hybrid.simulation.trajectory import start
 from lyapunov import lyapunov_spectrum
 
@@ -266,7 +266,7 @@ def test_the_sum_rule_counts_the_divergence_with_any_number_of_vectors(solver, k
     assert spectrum.sum_rule == pytest.approx(-0.2 - np.log(2.0), abs=1e-9)
 
 
-_saltation = load_kernels("hybrid.kernels.jumps.jump").saltation
+_saltation = jump.saltation
 
 
 @njit

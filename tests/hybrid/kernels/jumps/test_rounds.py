@@ -6,11 +6,11 @@ from functools import cache
 import attrs
 import numpy as np
 import pytest
-from numba import int64, njit
+from numba import njit
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, StatusCode, Taylor, Transition, simulate
-from hybrid.compiler.cache.loader import load_kernels
-from hybrid.kernels.types.layout import INDICES, MATRIX, VECTOR
+from hybrid.kernels.jumps import rounds
+from hybrid.kernels.types.kinds import INDICES, INTEGER, MATRIX, VECTOR
 from hybrid.kernels.types.structure import Structure
 
 SOLVERS = (Taylor(), DOP853(rtol=1e-12, atol=1e-14))
@@ -238,9 +238,8 @@ def spiral():
     )
 
 
-KERNELS = load_kernels("hybrid.kernels.jumps.rounds")
-_left, _turn, _extrapolate = KERNELS.time_left_of_rounds, KERNELS.transitions_in_turn, KERNELS.extrapolate
-_by_rounds, _remember = KERNELS.extrapolate_by_rounds, KERNELS.remember_visit
+_left, _turn, _extrapolate = rounds.time_left_of_rounds, rounds.transitions_in_turn, rounds.extrapolate
+_by_rounds, _remember = rounds.extrapolate_by_rounds, rounds.remember_visit
 SLOTS = 64
 
 
@@ -249,7 +248,7 @@ class Past(Structure, counters=("jumps", "chattering", "cycle"), numbers=("phase
 
     counters: INDICES
     numbers: VECTOR
-    dimension: int64
+    dimension: INTEGER
     recent: INDICES
     visits: MATRIX
     y: VECTOR

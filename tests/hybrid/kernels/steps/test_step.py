@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from numba import njit
 
 from hybrid import DOP853, HybridSystem, Mode, Tsit5
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.kernels.steps import step
 from hybrid.simulation.trajectory import start
 
-KERNELS = load_kernels("hybrid.kernels.steps.step")
-_starting, _ratio, _estimate = KERNELS.starting_step, KERNELS.error_ratio, KERNELS.estimate_error
-_path, _again = KERNELS.interpolant_path, KERNELS.interpolation_stages
+_starting, _ratio, _estimate = step.starting_step, step.error_ratio, step.estimate_error
+_path, _again = step.interpolant_path, step.interpolation_stages
 
 
 @njit
