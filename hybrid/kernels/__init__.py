@@ -1,1 +1,1 @@
-"""Compiled inner loops: numba only, one arrow inwards, nothing of the model types."""
+"""Compiled inner loops: they know NumPy, the compiler and each other, nothing of the model types."""

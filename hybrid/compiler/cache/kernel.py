@@ -11,6 +11,7 @@ from typing import Any
 
 from hybrid.compiler.llvm.engine import load
 from hybrid.kernels.types.kinds import (
+    BY_WORDS,
     INTEGER,
     NOTHING,
     REAL,
@@ -23,8 +24,6 @@ from hybrid.kernels.types.kinds import (
     words_of,
 )
 
-# Behind the name of a kernel: its function that takes a table of words, see ``hybrid.kernels.types.export``.
-BY_WORDS = "_by_words"
 CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_char_p)
 # What a word is as a result.
 RESULTS = {
@@ -35,20 +34,32 @@ RESULTS = {
 }
 
 
+class Code:
+    """The machine code of a module, which is loaded when the first of its functions is needed."""
+
+    def __init__(self, content: bytes, names: list[str]) -> None:
+        self._content, self._names = content, names
+
+    @cached_property
+    def functions(self) -> dict[str, Any]:
+        """The functions by name, each with its ``address``."""
+        return load(self._content, self._names)
+
+
 class Kernel:
-    """A compiled kernel. Its machine code is loaded when it is first needed; calls release the GIL.
+    """A compiled kernel; calls release the GIL.
 
     Parameters
     ----------
     name
         Name of the kernel in its module.
     code
-        The contents of its object file.
+        The machine code of the module.
     result, arguments
         The kinds of its signature, as text.
     """
 
-    def __init__(self, name: str, code: bytes, result: str, arguments: list[str]) -> None:
+    def __init__(self, name: str, code: Code, result: str, arguments: list[str]) -> None:
         self.name, self._code, self._result = name, code, result
         kinds = [kind_named(each) for each in arguments]
         # How each argument is converted: an address has None, and numbers are left to the table.
@@ -70,37 +81,30 @@ class Kernel:
                 words += converter(value)
         return self._read(self._call(self._table.pack(*words)))
 
-    @property
+    @cached_property
     def address(self) -> int:
         """Address of the function that other kernels call."""
-        address: int = self._loaded[self.name].address
+        address: int = self._code.functions[self.name].address
         return address
 
     @cached_property
-    def _loaded(self) -> dict[str, Any]:
-        names = [self.name, self.name + BY_WORDS] if self._result in RESULTS else [self.name]
-        return load(self._code, names)
-
-    @cached_property
     def _call(self) -> Any:
-        return CALL(self._loaded[self.name + BY_WORDS].address)
+        return CALL(self._code.functions[self.name + BY_WORDS].address)
 
     @cached_property
     def _read(self) -> Any:
         return RESULTS[self._result]
 
 
-def file_of(codes: Mapping[str, tuple[bytes, str, list[str]]]) -> bytes:
-    """The contents of a file with kernels: for each name the code, the result and the arguments."""
-    index = [[name, len(code), result, arguments] for name, (code, result, arguments) in codes.items()]
-    return json.dumps(index).encode() + b"\n" + b"".join(code for code, _, _ in codes.values())
+def file_of(signatures: Mapping[str, list[str]], code: bytes) -> bytes:
+    """The contents of a file with kernels: the result and the arguments of each, and their code."""
+    return json.dumps(signatures).encode() + b"\n" + code
 
 
 def kernels_in(content: bytes) -> dict[str, Kernel]:
     """The kernels of a file, by name."""
-    index, _, codes = content.partition(b"\n")
-    kernels, place = {}, 0
-    for name, length, result, arguments in json.loads(index):
-        kernels[name] = Kernel(name, codes[place : place + length], result, arguments)
-        place += length
-    return kernels
+    index, _, code = content.partition(b"\n")
+    signatures = json.loads(index)
+    by_words = [name + BY_WORDS for name, (result, *_) in signatures.items() if result in RESULTS]
+    shared = Code(code, [*signatures, *by_words])
+    return {name: Kernel(name, shared, result, kinds) for name, (result, *kinds) in signatures.items()}

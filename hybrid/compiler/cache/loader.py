@@ -79,12 +79,12 @@ def compiled(module: str) -> bytes:
     from hybrid.kernels.types.export import exports_of, object_code
 
     with between_passes():
-        return file_of(
-            {
-                name: (object_code(name, *export), text_of(export.result), [*map(text_of, export.arguments)])
-                for name, export in exports_of(importlib.import_module(module)).items()
-            }
-        )
+        exports = exports_of(importlib.import_module(module))
+        signatures = {
+            name: [text_of(export.result), *map(text_of, export.arguments)]
+            for name, export in exports.items()
+        }
+        return file_of(signatures, object_code(exports))
 
 
 @cache

@@ -1,6 +1,6 @@
 """Machine code of the kernels that Python calls or hands to other kernels.
 
-The code of a kernel is an object file with two functions. Other kernels call the first one, which takes the
+In an object file, a kernel is two functions. Other kernels call the first one, which takes the
 arguments as the compiler passes them. Python calls the second one, which takes the address of a table with
 the words of all arguments and returns a word. Neither function needs the compiler's run-time library, so a
 process that finds the file on disk never imports the compiler.
@@ -13,13 +13,11 @@ from numba.core import types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 
-from hybrid.kernels.types.kinds import Pair, width_of
+from hybrid.kernels.types.kinds import BY_WORDS, Pair, width_of
 from hybrid.kernels.types.numba_types import array_in, numba_type, signature_of, word_in
 from hybrid.kernels.types.options import optimise
 
 WORD = ir.IntType(64)
-# Behind the name of a kernel: the function that takes a table of words.
-BY_WORDS = "_by_words"
 
 
 class _ExportLibrary(JITCodeLibrary):
@@ -54,19 +52,24 @@ def exports_of(module):
 
 
 @global_compiler_lock
-def object_code(name, kernel, result, arguments):
-    """Compile a kernel; the contents of an object file."""
-    signature = signature_of(result, *arguments)
-    kernel.compile(signature)
-    compiled = kernel.overloads[signature.args]
-    context = compiled.target_context
-    library = _ExportLibrary(context.codegen(), name)
-    library.add_linking_library(compiled.library)
-    module = context.create_module(name)
-    function = _write_typed(context, module, name, compiled.fndesc)
-    if not isinstance(result, Pair):
-        _write_by_words(context, module, function, result, arguments)
-    library.add_ir_module(module)
+def object_code(exports):
+    """Compile kernels that were exported together; the contents of one object file.
+
+    Functions that several of them call are compiled once.
+    """
+    library = None
+    for name, (kernel, result, arguments) in exports.items():
+        signature = signature_of(result, *arguments)
+        kernel.compile(signature)
+        compiled = kernel.overloads[signature.args]
+        context = compiled.target_context
+        library = library or _ExportLibrary(context.codegen(), name)
+        library.add_linking_library(compiled.library)
+        module = context.create_module(name)
+        function = _write_typed(context, module, name, compiled.fndesc)
+        if not isinstance(result, Pair):
+            _write_by_words(context, module, function, result, arguments)
+        library.add_ir_module(module)
     library.finalize()
     return library.machine_code()
 

@@ -40,6 +40,8 @@ class Function(NamedTuple):
 INTEGER, REAL, TRUTH = Number("int64"), Number("float64"), Number("bool")
 VECTOR, MATRIX, CUBE = (Array("float64", ndim) for ndim in (1, 2, 3))
 INDICES, INDEX_MATRIX = (Array("int64", ndim) for ndim in (1, 2))
+# Behind the name of a kernel: its function that takes a table of words (``export``).
+BY_WORDS = "_by_words"
 # Kinds without a name of their own, as text.
 NOTHING, TWO_NUMBERS, ADDRESS = "nothing", "two numbers", "address"
 

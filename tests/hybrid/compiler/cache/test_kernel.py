@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from hybrid.compiler.cache.kernel import Kernel, file_of, kernels_in
-from hybrid.kernels.types.export import object_code
+from hybrid.compiler.cache.kernel import file_of, kernels_in
+from hybrid.kernels.types.export import exports_of, object_code
 from hybrid.kernels.types.kinds import (
     CUBE,
     INDEX_MATRIX,
@@ -65,16 +65,14 @@ def difference(a, b):
     return a - b
 
 
-def code_of(kernel):
-    result, arguments = kernel.exported
-    code = object_code(kernel.__name__, kernel, result, arguments)
-    return code, text_of(result), [text_of(each) for each in arguments]
-
-
 @pytest.fixture(scope="module")
 def content():
-    kernels = (double, both_signs, everything, is_less, count, difference)
-    return file_of({kernel.__name__: code_of(kernel) for kernel in kernels})
+    exports = exports_of(sys.modules[__name__])
+    assert set(exports) == {"double", "both_signs", "everything", "is_less", "count", "difference"}
+    signatures = {
+        name: [text_of(export.result), *map(text_of, export.arguments)] for name, export in exports.items()
+    }
+    return file_of(signatures, object_code(exports))
 
 
 @pytest.fixture(scope="module")
@@ -135,8 +133,8 @@ def test_a_missing_argument(kernels):
 
 
 def test_the_code_is_loaded_when_it_is_needed():
-    kernel = Kernel("damaged", b"no machine code", "int64", ["int64"])
-    assert kernel.name == "damaged"
+    content = file_of({"f": ["int64", "int64"]}, b"no machine code")
+    assert kernels_in(content)["f"].name == "f"
 
 
 def test_the_file_needs_no_compiler(content, tmp_path):
