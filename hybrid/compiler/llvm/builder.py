@@ -12,8 +12,6 @@ from typing import Any
 
 from llvmlite import ir
 
-_texts: dict[int, tuple[Any, str]] = {}
-
 
 class Line:
     """The text of an instruction; the object also represents the value of the instruction."""
@@ -32,12 +30,11 @@ class Line:
 
 
 def _text(kind: Any) -> str:
-    """A type as LLVM's text."""
-    found = _texts.get(id(kind))
+    """A type as LLVM's text, kept with the type: each model has types of its own."""
+    found: str | None = getattr(kind, "text_of_line", None)
     if found is None:
-        # The reference to the type keeps it alive, so that no other object gets its id.
-        found = _texts[id(kind)] = kind, str(kind)
-    return found[1]
+        found = kind.text_of_line = str(kind)
+    return found
 
 
 def _reference(value: Any) -> str:

@@ -1,0 +1,28 @@
+"""Writing instructions keeps nothing of a module that nobody holds any more."""
+
+import gc
+
+from llvmlite import ir
+
+from hybrid import HybridSystem, Mode, simulate
+from hybrid.compiler.llvm import functions
+
+
+def types_alive():
+    gc.collect()
+    return sum(isinstance(each, ir.Type) for each in gc.get_objects())
+
+
+def test_types_of_dropped_modules_are_freed(monkeypatch):
+    # Nothing comes from an earlier process.
+    monkeypatch.setattr(functions, "kept", lambda path: None)
+
+    def run(rates):
+        for rate in rates:
+            decay = HybridSystem(state=("q",), modes=[Mode("a", lambda t, x, p, r=rate: (-r * x.q**3,))])
+            simulate(decay, (1.0,), (0.0, 0.1))
+
+    run([0.7253, 0.7254])
+    before = types_alive()
+    run([0.7255, 0.7256, 0.7257, 0.7258])
+    assert types_alive() == before
