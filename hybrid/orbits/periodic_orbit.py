@@ -259,9 +259,7 @@ class _Shooting:
             tangent=np.eye(self.system.dimension),
         )
 
-    def newton(
-        self, point: Point, free_period: bool, tolerance: float, max_iterations: int
-    ) -> PeriodicOrbit:
+    def newton(self, point: Point, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from ``point``; the period may be unknown too."""
         shot, iterations = self.shoot(point), 0
         newton = Newton.begin(shot, self.solver.atol, free_period)

@@ -406,6 +406,8 @@ def test_steps_and_jumps_are_counted_per_interval():
 )
 def test_the_default_interval_does_not_depend_on_the_units_of_the_states(field, x0, expected, small):
     """The speed is measured in units that are smaller by a factor."""
-    system = hybrid.HybridSystem(state=("q", "v"), modes=[hybrid.Mode("free", lambda t, x, p: field(x, small))])
+    system = hybrid.HybridSystem(
+        state=("q", "v"), modes=[hybrid.Mode("free", lambda t, x, p: field(x, small))]
+    )
     spectrum = lyapunov.lyapunov_spectrum(system, x0, intervals=2, transient=0)
     assert spectrum.interval == pytest.approx(expected, rel=1e-12)

@@ -280,7 +280,8 @@ class TestNoOrbit:
     def test_a_spiral_is_none_however_slow(self, force, unit):
         """Newton's method creeps to the equilibrium; on its way the ends agree ever better."""
         system = HybridSystem(
-            state=("q", "v"), modes=[Mode("on", lambda t, x, p: (x.v, -x.q - force(x.q / unit, x.v / unit) * unit))]
+            state=("q", "v"),
+            modes=[Mode("on", lambda t, x, p: (x.v, -x.q - force(x.q / unit, x.v / unit) * unit))],
         )
         orbit = periodic_orbit(system, (unit, 0.0), period=6.0)
         assert orbit.status.code == StatusCode.NOT_CONVERGED
