@@ -1,4 +1,4 @@
-"""Newton's method for a solution that ends where it begins: one integration, and the step that follows."""
+"""Newton's method for a solution that ends where it begins: one integration, and the step after it."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ class Shot:
 
     @property
     def gap(self) -> np.ndarray:
+        """Distance ``(n,)`` from the start to the end."""
         return self.end - self.point.x
 
     @property

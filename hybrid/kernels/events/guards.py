@@ -122,16 +122,35 @@ def _spread_of_terms(model, run, program, t, x, work):
 def widen_scale(model, run, work):
     """Make rounding bands alike at the start and the end of a run, whatever steps lead there.
 
-    The scale of each component is at least its change while what moves of the state changes by its own size;
-    ``work.field`` is current. Then a run that ends on a guard and a run that starts there agree that the
-    guard is zero.
+    The scale of each component is at least its change while its rate changes by its own size, or while the
+    fastest feedback between two components acts, if that is shorter. A rate that changes by no more than
+    rounding tells nothing. Then a run that ends on a guard and a run that starts there agree that the guard
+    is zero, in any units. ``work.field`` is current.
     """
-    size, pace = 0.0, 0.0
-    for i in range(model.dimension):
-        if work.field[i] != 0.0:
-            size, pace = max(size, abs(run.y[i])), max(pace, abs(work.field[i]))
-    for i in range(model.dimension if pace > 0.0 else 0):
-        run.scale[i] = max(run.scale[i], abs(work.field[i]) * (size / pace))
+    n, mode, t = model.dimension, run.mode, run.phase
+    model.field_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    rounding, feedback = work.state, 0.0
+    for i in range(n):
+        size = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
+        for j in range(n):
+            size += abs(work.jacobian[i, j] * run.y[j])
+            feedback = max(feedback, abs(work.jacobian[i, j] * work.jacobian[j, i]))
+        rounding[i] = ROUNDING_OF_STATE * EPSILON * size
+    first = model.target.shape[0] + model.first_forcing[-1]
+    for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
+        spread = _spread_of_terms(model, run, first + residue, t, run.y, work)
+        rounding[model.residue_component[residue]] += spread
+    for i in range(n):
+        change, noise = work.jacobian[i, n], 0.0
+        for j in range(n):
+            change += work.jacobian[i, j] * work.field[j]
+            noise += abs(work.jacobian[i, j]) * rounding[j]
+        rate = abs(work.field[i])
+        moment = rate / abs(change) if abs(change) > noise else math.inf
+        if feedback > 0.0:
+            moment = min(moment, 1.0 / math.sqrt(feedback))
+        if moment < math.inf:
+            run.scale[i] = max(run.scale[i], rate * moment)
 
 
 @njit(**KERNEL)

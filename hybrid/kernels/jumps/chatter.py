@@ -19,9 +19,9 @@ FEWEST_JUMPS = 16
 # The limit is taken earlier if a flight is no higher than this many times rounding: the rounding error of its
 # duration grows like the reciprocal of its speed and would spoil the limit.
 SHALLOW = 1e6
-# Longest remaining time, in units of the field's own time, over which a varying Jacobian may count as
-# constant.
+# Change of the Jacobian over the remaining time that counts as none: what it adds to a state, as a share.
 SHORT = 1e-5
+# Longest remaining time, in units of the field's own time, over which the drift is an exponential.
 LONG = 1.0
 # The same where the drift is that of the mean field, which is followed to second order.
 BRIEF = 1e-4
@@ -242,10 +242,12 @@ def chatter_matrix(model, run, transition, work):
         coupling += slope[i] * carried[i]
     for i in range(n):
         for j in range(n):
-            removed = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
-            entry = (1.0 if i == j else 0.0) - removed
+            kept = 1.0 if i == j else 0.0
+            taken = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
+            terms = abs(slope[j]) + abs(coupling * work.gradient[j])
+            terms = kept + abs(impulse[i]) * terms + abs(carried[i] * work.gradient[j])
             # The projection is exact in this entry: its rounding error would look like a direction.
-            work.saltation[i, j] = entry if abs(entry) > 1e-13 * (1.0 + abs(removed)) else 0.0
+            work.saltation[i, j] = kept - taken if abs(kept - taken) > 1e-13 * terms else 0.0
 
 
 @njit(**KERNEL)
@@ -339,6 +341,19 @@ def size_of(matrix, n):
 
 
 @njit(**KERNEL)
+def feedback(matrix, n):
+    """Upper bound of how fast components act back on themselves, over at most two others, in any units."""
+    most = 0.0
+    for i in range(n):
+        for j in range(n):
+            there = abs(matrix[i, j])
+            most = max(most, math.sqrt(there * abs(matrix[j, i])))
+            for k in range(n if there > 0.0 else 0):
+                most = max(most, (there * abs(matrix[j, k]) * abs(matrix[k, i])) ** (1.0 / 3.0))
+    return n * most
+
+
+@njit(**KERNEL)
 def drift_is_known(model, run, target, span, work):
     """Whether the tangents' drift in what is left is an exponential of the resting mode's Jacobian.
 
@@ -348,11 +363,13 @@ def drift_is_known(model, run, target, span, work):
     n, t = model.dimension, run.phase
     model.field_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
     model.field_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
-    constant = True
     for i in range(n):
+        change = 0.0
         for j in range(n):
-            constant = constant and work.jacobian[i, j] == work.reset_jacobian[i, j]
-    return size_of(work.jacobian, n) * span <= (LONG if constant else SHORT)
+            change += abs(work.jacobian[i, j] - work.reset_jacobian[i, j]) * run.scale[j]
+        if change * span > SHORT * run.scale[i]:
+            return False
+    return feedback(work.jacobian, n) * span <= LONG
 
 
 @njit(**KERNEL)

@@ -108,7 +108,11 @@ def solve_stages(model, method, mode, t, h, y, work):
         combine(y, h, method.a[s], work.stages, s + 1, n, work.new)
         square = 0.0
         for i in range(n):
-            scale = method.atol + method.rtol * max(abs(y[i]), abs(work.new[i]))
+            size = max(abs(y[i]), abs(work.new[i]))
+            for stage in range(1, s + 1):
+                # A component may begin and end at zero, as that of a flight from a guard back to it.
+                size = max(size, abs(h * work.stages[stage, i]))
+            scale = method.atol + method.rtol * size
             for stage in range(1, s + 1):
                 shift = 0.0
                 for j in range(1, s + 1):
@@ -195,6 +199,9 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
     predict(method, mode, h, y, n, work)
     if not solve_stages(model, method, mode, t, h, y, work):
         work.systems[work.systems.shape[0] - 1, LAST_MODE] = -1.0
+        # Whoever repeats a step up to an event does not ask for its error: what is left here is no step.
+        for i in range(length):
+            work.new[i] = math.nan
         return NOT_SOLVED
     remember(method, mode, h, y, n, work)
     if tangents > 0 and not solve_tangents(model, method, mode, t, h, y, tangents, work):

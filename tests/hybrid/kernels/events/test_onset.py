@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -149,3 +150,22 @@ def test_a_state_that_rides_on_its_guard_does_not_fire_it(solver, r, c, s):
     )
     assert arc.status.ok
     assert arc.x[-1, 2] == 0
+
+
+@pytest.mark.parametrize("solver", [*SOLVERS, RadauIIA(rtol=1e-8)], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("length", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("speed", [1e-9, 1.0, 1e9])
+def test_a_rate_that_is_only_rounding_does_not_put_the_start_on_a_guard(length, speed, solver):
+    """At the start the force is ``cos(pi / 2)``: it does not tell on what scale the speed changes."""
+    system = HybridSystem(
+        state=("q", "v"),
+        parameters={"length": 1.0, "speed": 1.0},
+        modes=[Mode("m", lambda t, x, p: (x.v / p.speed * p.length, np.cos(t) * p.speed))],
+        transitions=[Transition("m", "m", Guard(lambda t, x, p: x.q / p.length, -1), name="cross")],
+    )
+    values = {"length": length, "speed": speed}
+    solver = attrs.evolve(solver, atol=1e-14 * min(length, speed))
+    span = (np.pi / 2, 2.5)
+    arc = simulate(system, (0.5 * length, -speed), span, mode="m", parameters=values, solver=solver)
+    # The root of 0.5 - cos t - 2 (t - pi / 2), by Newton's method.
+    assert arc.jumps.t == pytest.approx([2.05239432969], abs=1e-7)

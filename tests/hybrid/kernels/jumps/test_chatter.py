@@ -1,5 +1,6 @@
 """Jumps that accumulate: their limit, the run after it, and the tangent map through it."""
 
+import itertools
 import math
 from functools import cache
 
@@ -7,7 +8,18 @@ import attrs
 import numpy as np
 import pytest
 
-from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    StatusCode,
+    Taylor,
+    Transition,
+    simulate,
+)
 from lyapunov import lyapunov_spectrum
 from models import bouncing_ball
 
@@ -428,3 +440,49 @@ def test_the_matrix_of_the_limit_does_not_depend_on_who_looks():
         arc = simulate(system, (1.0, 0.0, 1.0), (0.0, 10.0), mode="flight", tangent=tangent)
         assert arc.jumps[-1].kind == "limit"
         np.testing.assert_allclose(arc.jumps[-1].saltation, [[0, 0, 0], [0, 0, 0], [-1, 0, 1]], atol=1e-12)
+
+
+@cache
+def counting_ball():
+    """The resting ball in any units, with a state that adds up its impact speeds."""
+    return HybridSystem(
+        state=("q", "v", "s"),
+        parameters={"length": 1.0, "speed": 1.0, "time": 1.0, "sum": 1.0},
+        modes=[
+            Mode("flight", lambda t, x, p: (x.v / p.speed * p.length / p.time, -2.0 * p.speed / p.time, 0.0)),
+            Mode("rest", lambda t, x, p: (0.0, 0.0, 0.0)),
+        ],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, direction=-1),
+                Reset(lambda t, x, p: (0.0, -0.8 * x.v, x.s - x.v / p.speed * p.sum)),
+                name="bounce",
+                accumulates_to="rest",
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize("solver", [Taylor, DOP853, RadauIIA])
+@pytest.mark.parametrize("units", list(itertools.product((2.0**-50, 2.0**50), repeat=4)))
+def test_chatter_in_any_units(units, solver):
+    """From height 1 with g = 2, the impact speeds add up to 10 times the root of the height."""
+    length, speed, time, total = units
+    values = dict(zip(("length", "speed", "time", "sum"), units, strict=True))
+    arc = simulate(
+        counting_ball(),
+        (length, 0.0, 0.0),
+        (0.0, 10.0 * time),
+        mode="flight",
+        parameters=values,
+        tangent=True,
+        solver=solver(rtol=1e-9, atol=1e-12 * min(length, speed, total)),
+    )
+    assert arc.status.ok
+    assert len(arc.jumps) == 18
+    assert arc.jumps[-1].t == pytest.approx(9.0 * time, rel=1e-9)
+    scale = np.array([length, speed, total])
+    found = arc.fundamental / scale[:, None] * scale
+    np.testing.assert_allclose(found, [[0, 0, 0], [0, 0, 0], [5, 0, 1]], rtol=1e-7, atol=1e-7)
