@@ -73,5 +73,5 @@ def test_steps():
 
 
 def test_long_expressions_are_not_expanded():
-    long = sum(sympy.sin(k * Q) for k in range(MOST_EXPANDED))
+    long = sympy.Add(*(V**k for k in range(2, MOST_EXPANDED)))
     assert sign_of(long, [long]) == 0
