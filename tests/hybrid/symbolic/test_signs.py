@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import sympy
 
-from hybrid.symbolic.expressions import Less, LessEqual, Select
+from hybrid.symbolic.expressions import Less, LessEqual, Select, Step
+from hybrid.symbolic.nodes import MOST_EXPANDED
 from hybrid.symbolic.signs import sign_of, simplified
 from hybrid.symbolic.tracing import model_symbols, trace
 
@@ -62,3 +63,15 @@ def test_signs_are_those_of_equal_expressions():
     assert sign_of(-(Q + 1) * V, [Q, Q * V + V]) == -1
     assert sign_of(Q, [Q * V + V]) == 0
     assert sign_of(2 * Q, [Q]) == 0
+
+
+def test_steps():
+    assert simplified(Step(V - Q), [V - Q]) == 1
+    assert simplified(Step(V - Q), [Q - V]) == 0
+    assert simplified(3 * Step(V - Q) * Q, [V - Q]) == 3 * Q
+    assert simplified(Step(V - Q), [Q]) == Step(V - Q)
+
+
+def test_long_expressions_are_not_expanded():
+    long = sympy.Add(*(V**k for k in range(2, MOST_EXPANDED)))
+    assert sign_of(long, [long]) == 0
