@@ -11,16 +11,22 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
-from hybrid.kernels.events.guards import error_band, guard_value, has_program, rounding_band, was_left_behind
+from hybrid.kernels.events.guards import (
+    error_band,
+    has_program,
+    size_of_time,
+    was_left_behind,
+)
 from hybrid.kernels.events.onset import (
     BY_SPEED,
-    BY_STEP,
+    JUMPING,
     has_just_fired,
     is_zero,
     known_part,
     side_is_certain,
 )
-from hybrid.kernels.events.path import state_at, time_at
+from hybrid.kernels.events.path import rounding_of_start, state_at, time_at
+from hybrid.kernels.events.sampled import NOWHERE, SETTLED, sample, sampled_change
 from hybrid.kernels.types.codes import (
     HIGH,
     HIGH_MIDDLE,
@@ -32,8 +38,6 @@ from hybrid.kernels.types.codes import (
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Returned instead of a place on the step if there is none.
-NOWHERE = -1.0
 # After this many pieces the step is cut to its proved part, if that is more than a small share of the step.
 # Otherwise the signs at the ends of the pieces decide, and the run counts them as unproved.
 MOST_PIECES = 3000
@@ -50,12 +54,6 @@ NO_BETTER = 1.01
 MOST_ROOT_STEPS = 200
 # Share of a bracket that tells a guard that stays zero from one with a flat root.
 BESIDE = 1e-3
-# A guard that is zero at the start of the step is searched from this share of the step on.
-SETTLED = 64.0 * EPSILON
-# Number of parts of a step; a guard that could not be traced is evaluated at their ends.
-SAMPLES = 32
-# Number of places at which a guard is evaluated whose speed and acceleration are zero too.
-PLACES_AT_REST = 8
 
 
 @njit(**INLINE)
@@ -85,14 +83,6 @@ def _row_at(model, transition, path, order, clock, start, pace, place, base, til
 
 
 @njit(**KERNEL)
-def _sample(model, transition, path, order, clock, start, pace, place, work):
-    """Value of a guard at a place of the step, from the compiled function."""
-    state_at(path, order, model.dimension, place, work.state)
-    t = time_at(path, order, clock, start, pace, place)
-    return guard_value(model, transition, t, work.state, work.scalar)
-
-
-@njit(**KERNEL)
 def _value_at(model, transition, path, order, clock, start, pace, place, row, base, tilt, work):
     """Value of a guard at one place, where ``row`` has its bounds.
 
@@ -101,7 +91,7 @@ def _value_at(model, transition, path, order, clock, start, pace, place, row, ba
     """
     unbounded = not (row[MOST_SLOPE] < math.inf and row[LEAST_SLOPE] > -math.inf)
     if unbounded and row[LOW_MIDDLE] <= 0.0 <= row[HIGH_MIDDLE]:
-        return _sample(model, transition, path, order, clock, start, pace, place, work) - base - tilt * place
+        return sample(model, transition, path, order, clock, start, pace, place, work) - base - tilt * place
     return 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
 
 
@@ -280,6 +270,10 @@ def first_change(
         leaves = on_guard == BY_SPEED and side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
     stack = work.intervals
     stack[0, 0], stack[0, 1] = SETTLED * length if on_guard > 0 else 0.0, length
+    if on_guard == JUMPING:
+        # By rounding the state may still be before the jump.
+        beyond = rounding_of_start(path, model.dimension, run.scale, clock, size_of_time(model, start), pace)
+        stack[0, 0] = max(stack[0, 0], min(beyond, 0.5 * length))
     while top >= 0:
         low, high = stack[top, 0], stack[top, 1]
         middle = 0.5 * (low + high)
@@ -409,57 +403,6 @@ def first_change(
     if touch != NOWHERE:
         _note_touch(run, transition, touch, depth * side, length)
     return NOWHERE, side, length
-
-
-@njit(**KERNEL)
-def sampled_change(model, run, transition, path, order, clock, start, pace, length, side, on_guard, work):
-    """As ``first_change``, for a guard that could not be traced: it is evaluated at some places only."""
-    run.unproved += 1
-    direction, low = model.direction[transition], 0.0
-    for i in range(1, SAMPLES + 1):
-        high = length * i / SAMPLES
-        value = _sample(model, transition, path, order, clock, start, pace, high, work)
-        if value * side < 0.0:
-            left, right = low, high
-            if low == 0.0 and not is_zero(on_guard):
-                first = _sample(model, transition, path, order, clock, start, pace, 0.0, work)
-                right = 0.0 if first * side <= 0.0 else high
-            elif low == 0.0 and on_guard == BY_STEP:
-                right = 0.0
-            while right - left > 2.0 * EPSILON * right:
-                middle = 0.5 * (left + right)
-                if not left < middle < right:
-                    break
-                if _sample(model, transition, path, order, clock, start, pace, middle, work) * side > 0.0:
-                    left = middle
-                else:
-                    right = middle
-            side = -side
-            again = right <= SETTLED * length and has_just_fired(run, transition, on_guard)
-            if crosses_towards(direction, side) and not again:
-                return right, side, length
-        elif side == 0 and value != 0.0:
-            side = 1 if value > 0.0 else -1
-        low = high
-    return NOWHERE, side, length
-
-
-@njit(**KERNEL)
-def rests(model, run, transition, path, order, clock, start, pace, length, work):
-    """Whether the state rests on a guard: it started there without speed, and the guard stays zero.
-
-    A guard that is zero at the end of the step may have left zero and come back, so more places are checked.
-    """
-    if run.on_guard[transition] != BY_STEP:
-        return False
-    for i in range(1, PLACES_AT_REST + 1):
-        place = length * i / PLACES_AT_REST
-        value = _sample(model, transition, path, order, clock, start, pace, place, work)
-        t = time_at(path, order, clock, start, pace, place)
-        model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
-        if abs(value) > rounding_band(model, run, transition, t, work.state, work):
-            return False
-    return True
 
 
 @njit(**KERNEL)

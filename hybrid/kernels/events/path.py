@@ -2,7 +2,11 @@
 
 from numba import njit
 
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
+
+# Rounding error of a state or a time, as a multiple of EPSILON times its size.
+ROUNDING = 16.0
 
 
 @njit(**INLINE)
@@ -27,3 +31,20 @@ def time_at(path, order, clock, start, pace, s):
     if clock < 0:
         return start + pace * s
     return start + value_at(path, clock, order, s)
+
+
+@njit(**KERNEL)
+def rounding_of_start(path, n, scale, clock, time_scale, pace):
+    """How far along a step its start may lie by the rounding of its state and time.
+
+    ``scale (n,)`` and ``time_scale`` are the sizes of state and time.
+    """
+    size, speed = 0.0, 0.0
+    for i in range(n):
+        if path[1, i] != 0.0:
+            size, speed = max(size, scale[i]), max(speed, abs(path[1, i]))
+    place = size / speed if speed > 0.0 else 0.0
+    rate = path[1, clock] if clock >= 0 else pace
+    if rate > 0.0:
+        place = max(place, time_scale / rate)
+    return ROUNDING * EPSILON * place

@@ -111,7 +111,7 @@ def sign_at(model, transition, t, x, moment, work):
 def signs_beside_jump(model, run, transition, t, x, now, work):
     """Signs of a guard before and after a jump within rounding of ``x``, from moments beside it.
 
-    The sign at ``x`` itself may be either. Both signs are ``now`` if the guard does not jump across zero here.
+    The sign at ``x`` itself may be either. Both are ``now`` if the guard does not jump across zero here.
     """
     size, pace = 0.0, 0.0
     for i in range(model.dimension):

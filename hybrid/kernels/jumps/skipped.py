@@ -3,7 +3,7 @@
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
-from hybrid.kernels.events.crossings import NOWHERE, first_change
+from hybrid.kernels.events.crossings import first_change
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     guard_speed,
@@ -13,6 +13,7 @@ from hybrid.kernels.events.guards import (
     size_of_time,
     speed_rounding,
 )
+from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.jumps.rounds import fired_before
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
@@ -26,7 +27,7 @@ AT_REST = 4.0
 @njit(**KERNEL)
 def takes_turns(model, run, transition, turn):
     """Whether a transition's guard is that of one of the last ``turn`` jumps."""
-    for back in range(turn):
+    for back in range(turn):  # noqa: SIM110 (no generators in kernels)
         if model.surface[fired_before(run, back)] == model.surface[transition]:
             return True
     return False

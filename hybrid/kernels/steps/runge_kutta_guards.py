@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
-from hybrid.kernels.events.crossings import crossing_on_path, rests
+from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
@@ -15,6 +15,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
+from hybrid.kernels.events.sampled import rests
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON

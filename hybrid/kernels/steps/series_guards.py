@@ -14,10 +14,11 @@ from hybrid.kernels.arithmetic.bernstein import (
     stays,
 )
 from hybrid.kernels.arithmetic.lanes import four_times, load, store
-from hybrid.kernels.events.crossings import crossing_on_path, rests
+from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import error_band, note_grazing, rounding_band
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.path import value_at
+from hybrid.kernels.events.sampled import rests
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,

@@ -52,7 +52,7 @@ def flight(restitution, turns, solver, start):
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 @pytest.mark.parametrize("restitution", [0.0, 1e-14, 1e-13, 1e-12, 1e-10, 1e-8, 1e-6])
 def test_no_ball_falls_through_its_table(restitution, solver):
-    """Speeds that are lost in the rounding of the slope leave the ball at rest, early and after many turns."""
+    """A speed that is lost in the rounding of the slope leaves the ball at rest, after many turns too."""
     for start in (0.3, 0.9, 1.4):
         lifts, gap = flight(0.0, 0, Taylor(), start)
         assert lifts

@@ -1,0 +1,84 @@
+"""Guards that jump or have gaps, each watched in both directions: every change of side fires once."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, Tsit5, simulate
+
+SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5(), "RadauIIA": RadauIIA()}
+W, END = 1.3, 8.0
+JUMPING = {
+    "floor": lambda t, x, p: np.floor(p.a * x.q + p.b) + 0.5,
+    "floor of a product": lambda t, x, p: np.floor(p.a * x.q * x.v + p.b) - 0.5,
+    "sawtooth": lambda t, x, p: np.floor(p.a * t) - p.a * t + 0.5 + 0.4 * x.q,
+    "sign": lambda t, x, p: np.sign(x.q - p.b) * (x.v - 0.2),
+    "two signs": lambda t, x, p: np.sign(np.sin(p.a * t)) + 0.5 * np.sign(x.q),
+    "remainder": lambda t, x, p: np.mod(p.a * t, 1.0) - 0.5 + 0.3 * x.q,
+    "two steps": lambda t, x, p: np.heaviside(x.q - p.b, 0.5) - np.heaviside(x.v, 0.5) - 0.5,
+    "choice": lambda t, x, p: np.where(x.q > p.b, x.v, np.where(x.v > 0, -1.0, x.q + 0.1)),
+}
+GAPS = {
+    "root": lambda t, x, p: np.sqrt(x.q + 0.4) - 0.5 - 0.2 * p.b,
+    "root of a product": lambda t, x, p: np.sqrt(x.q * x.v + 0.2) - 0.3,
+    "logarithm": lambda t, x, p: np.log(x.q + 0.3) - p.b,
+    "logarithm and speed": lambda t, x, p: np.log(x.q - 0.2) + x.v - p.b,
+}
+
+
+def both_ways(guard, *reset):
+    """An oscillator with a counter, and the guard in both directions."""
+    return HybridSystem(
+        state=("q", "v", "n"),
+        parameters={"a": 1.0, "b": 0.0},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -(W**2) * x.q, 0.0))],
+        transitions=[
+            Transition("swing", "swing", Guard(guard, direction), *reset, name=name)
+            for name, direction in (("up", +1), ("down", -1))
+        ],
+    )
+
+
+def changes(guard, a, b, start):
+    """Times at which the guard rises and falls through zero, from samples; None where these do not tell."""
+    t = np.linspace(0.0, END, 80_001)
+    q = start[0] * np.cos(W * t) + start[1] / W * np.sin(W * t)
+    v = start[1] * np.cos(W * t) - W * start[0] * np.sin(W * t)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = guard(t, SimpleNamespace(q=q, v=v), SimpleNamespace(a=a, b=b)) + 0.0 * t
+    known = np.flatnonzero(np.isfinite(value) & (value != 0.0))
+    sign = np.sign(value[known])
+    at = np.flatnonzero(sign[1:] != sign[:-1])
+    left, right = known[at], known[at + 1]
+    when = 0.5 * (t[left] + t[right])
+    small = np.abs(value) < 1e-3
+    turns = t[1:-1][small[1:-1] & (np.diff(np.sign(np.diff(value))) != 0)]
+    near_turn = any(np.min(np.abs(when - turn), initial=1.0) > 1e-3 for turn in turns)
+    close = np.min(np.diff(when, prepend=0.0, append=END)) < 1e-2
+    if not np.isfinite(value[0]) or near_turn or close or np.any(right - left > 3):
+        return None
+    return when[sign[at + 1] > 0], when[sign[at + 1] < 0]
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("guard", [*JUMPING.values(), *GAPS.values()], ids=[*JUMPING, *GAPS])
+def test_each_change_of_side_fires_once(guard, solver):
+    rng = np.random.default_rng(4)
+    systems = both_ways(guard), both_ways(guard, Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0)))
+    compared = 0
+    for _ in range(12):
+        a, b = float(rng.uniform(0.5, 3.0)), float(rng.uniform(-0.8, 0.8))
+        start = tuple(map(float, rng.uniform(-1.2, 1.2, 2)))
+        wanted = changes(guard, a, b, start)
+        if wanted is None:
+            continue
+        compared += 1
+        for system in systems:
+            arc = simulate(system, (*start, 0.0), (0.0, END), parameters={"a": a, "b": b}, solver=solver)
+            assert arc.status.ok
+            for name, times in zip(("up", "down"), wanted, strict=True):
+                found = [jump.t for jump in arc.jumps if jump.transition == name]
+                assert len(found) == len(times), (name, a, b, start)
+                assert np.allclose(found, times, rtol=0, atol=2e-4), (name, a, b, start)
+    assert compared > 0
