@@ -112,8 +112,7 @@ def test_every_public_call_is_listed():
             if (
                 inspect.ismodule(each)
                 or name in made
-                or (isinstance(each, type)
-                and issubclass(each, Exception))
+                or (isinstance(each, type) and issubclass(each, Exception))
             ):
                 continue
             if defaults(each) and not name.endswith("Orbit"):
