@@ -1,7 +1,8 @@
 """``python -m benchmarks.mutants hybrid/status.py`` plants faults one at a time and runs the nearest tests.
 
-A fault is one changed operator, comparison, constant or condition. It is noticed if a test fails or if the
-tests do not end. The changed copy is in a temporary folder.
+A fault is one changed operator, comparison, constant or condition. It is noticed if a test fails. Tests that
+do not end within the limit of processor time are counted by themselves: the fault may make them endless, or
+the limit may be too low. The changed copy is in a temporary folder.
 
 With ``--coverage FILE`` the nearest tests are those that run the changed line and little else. The file comes
 from ``python -m pytest -n auto --cov=hybrid --cov=lyapunov --cov-context=test`` (package pytest-cov). Machine
@@ -311,32 +312,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return own + others if own or others else nearest_tests(fault.path)
 
     heading("Faults planted one at a time, and the number that the nearest tests notice.")
-    rows, planted, noticed, failing = [], 0, 0, set[str]()
+    rows, planted, noticed, endless, failing = [], 0, 0, 0, set[str]()
     with ProcessPoolExecutor(given.processes) as pool:
         for path in given.files:
             found = list(faults(path))
             if not found or not tests_of(found[0]):
-                rows.append([str(path), str(len(found)), "no tests" if found else "", ""])
+                rows.append([str(path), str(len(found)), "no tests" if found else "", "", ""])
                 continue
             drawn = random.Random(f"{given.seed} {path}").sample(found, min(given.each, len(found)))
             runs = [pool.submit(first_failure, each, tests_of(each), given.seconds) for each in drawn]
             results = [run.result() for run in runs]
             for fault, test in zip(drawn, results, strict=True):
-                seen = f"noticed by {test}" if test else "not noticed"
+                seen = test if test == ENDLESS else f"noticed by {test}" if test else "not noticed"
                 print(f"{seen}: {path}:{fault.line}: {fault.change}", flush=True)
             failing.update(test.split("[")[0] for test in results if test and "::" in test)
-            planted, count = planted + len(drawn), sum(map(bool, results))
-            noticed += count
-            rows.append([str(path), str(len(found)), str(len(drawn)), str(count)])
+            long = results.count(ENDLESS)
+            count = sum(map(bool, results)) - long
+            planted, noticed, endless = planted + len(drawn), noticed + count, endless + long
+            rows.append([str(path), str(len(found)), str(len(drawn)), str(count), str(long)])
         broken = set[str]()
         while test := pool.submit(first_failure, None, sorted(failing - broken), 3600).result():
             broken.add(test.split("[")[0])
             print(f"fails without a fault too: {test}", flush=True)
             if test == ENDLESS or test.split("[")[0] not in failing:
                 break
-    rows.append(["all", "", str(planted), str(noticed)])
+    rows.append(["all", "", str(planted), str(noticed), str(endless)])
     print()
-    table(["file", "possible faults", "planted", "noticed"], rows)
+    table(["file", "possible faults", "planted", "noticed", ENDLESS], rows)
 
 
 if __name__ == "__main__":
