@@ -54,7 +54,14 @@ class Solver:
     max_steps: int = attrs.field(default=1_000_000_000, kw_only=True)
 
     def tightened(self, factor: float) -> Self:
-        """The same solver with tolerances smaller by a factor, or as small as rounding lets them count."""
+        """The same solver with tolerances smaller by a factor, or as small as rounding lets them count.
+
+        Raises
+        ------
+        ArgumentError
+            If ``factor`` is not a positive number.
+        """
+        factor = arguments.positive("factor", factor)
         rtol = min(self.rtol, max(self.rtol / factor, LEAST_RTOL))
         return attrs.evolve(self, rtol=rtol, atol=self.atol * rtol / self.rtol)
 

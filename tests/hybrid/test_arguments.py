@@ -670,6 +670,7 @@ def table(made):
         (call(contact.Hertz.duration, contact.Hertz(1e8), 90.0, 0.4), {"mass": POSITIVE, "speed": POSITIVE}),
         (call(hybrid.HybridArc.__call__, arc, 0.5), {"t": [*NUMBERS, math.nan, -1.0, 2.0, [0.5, math.nan]]}),
         (call(hybrid.PeriodicOrbit.arc, made["orbit"]), {"solver": SOLVER}),
+        (call(hybrid.Solver.tightened, hybrid.DOP853(), 10.0), {"factor": POSITIVE}),
         (call(HybridSystem.mode_index, BALL, "flight"), {"name": [None, *NAME]}),
         (call(HybridSystem.parts_of, BALL, "flight"), {"name": [None, *NAME]}),
         (call(HybridSystem.copies_of, BALL, "bounce"), {"name": [None, *NAME]}),

@@ -12,8 +12,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
-# Share by which rounding may change the curvature of a guard; more is a kink.
-SMALL_CHANGE = 1e-3
+# Share of the rounding of a state by which a kink of a guard is told from a bend.
+NEARER = 0.0625
 
 
 @njit(**INLINE)
@@ -173,8 +173,11 @@ def sides_at(model, run, t, work):
 
 
 @njit(**KERNEL)
-def speed_rounding(model, run, transition, mode, t, x, work):
-    """How far rounding of state and time can move the speed of a guard; ``work.gradient`` is current."""
+def speed_rounding(model, run, transition, mode, t, x, bends, work):
+    """How far rounding of state and time can move the speed of a guard; ``work.gradient`` is current.
+
+    With ``bends``, rounding may also turn the gradient of a guard that is not affine.
+    """
     n = model.dimension
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     size = abs(work.gradient[n])
@@ -183,7 +186,7 @@ def speed_rounding(model, run, transition, mode, t, x, work):
         for j in range(n):
             spread += abs(work.jacobian[i, j]) * run.scale[j]
         size += abs(work.gradient[i]) * spread
-    if model.affine_guard[transition] == 0:
+    if bends and model.affine_guard[transition] == 0:
         size += _turned_by_rounding(model, run, transition, t, x, work)
     return ROUNDING_OF_STATE * EPSILON * size + _rounding_of_residues(model, run, mode, t, x, work)
 
@@ -261,20 +264,25 @@ def acceleration_rounding(model, run, transition, t, x, work):
 def _curvature_by_rounding(model, run, transition, t, x, work):
     """How far rounding of state and time can move the curvature of a guard along the flow.
 
-    The curvature is evaluated where state and time are off by their rounding, one at a time. It may jump
-    there, at a kink of the guard: that is no rounding.
+    The curvature is evaluated where state and time are off by their rounding, one at a time, and by a small
+    share of that. At a kink of the guard the curvature jumps: the small share changes it as much, and that is
+    no rounding.
     """
     n, share, place = model.dimension, ROUNDING_OF_STATE * EPSILON, work.new
     for i in range(n):
         work.field_after[i], place[i] = work.field[i], x[i]
     here = _curvature(model, transition, t, x, 1.0, work)
-    later = t + share * size_of_time(model, t)
-    change = abs(_curvature(model, transition, later, x, 1.0, work) - here)
-    total = share * abs(here) + (change if change <= SMALL_CHANGE * abs(here) else 0.0)
+    moved = share * size_of_time(model, t)
+    far = abs(_curvature(model, transition, t + moved, x, 1.0, work) - here)
+    near = abs(_curvature(model, transition, t + NEARER * moved, x, 1.0, work) - here)
+    total = share * abs(here) + (far if near <= 0.5 * far else 0.0)
     for i in range(n):
-        place[i] = x[i] + share * run.scale[i]
-        change = abs(_curvature(model, transition, t, place, 1.0, work) - here)
-        total += change if change <= SMALL_CHANGE * abs(here) else 0.0
+        moved = share * run.scale[i]
+        place[i] = x[i] + moved
+        far = abs(_curvature(model, transition, t, place, 1.0, work) - here)
+        place[i] = x[i] + NEARER * moved
+        near = abs(_curvature(model, transition, t, place, 1.0, work) - here)
+        total += far if near <= 0.5 * far else 0.0
         place[i] = x[i]
     return total if total < math.inf else 0.0
 

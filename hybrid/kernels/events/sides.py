@@ -80,7 +80,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
         trend, order = speed, BY_SPEED
-        if abs(speed) <= speed_rounding(model, run, transition, mode, t, x, work):
+        if abs(speed) <= speed_rounding(model, run, transition, mode, t, x, True, work):
             if may_jump(model, run, transition, t, x, work):
                 # The state is in the middle of the jump, on neither side.
                 if was_on and before != 0:
@@ -90,6 +90,9 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
                 if abs(trend) <= acceleration_rounding(model, run, transition, t, x, work):
                     trend, order = 0.0, BY_STEP
+                    if abs(speed) > speed_rounding(model, run, transition, mode, t, x, False, work):
+                        # Rounding may turn the gradient, but it reverses nothing at a flat root.
+                        trend, order = speed, BY_SPEED
     direction = model.direction[transition]
     if trend > 0.0:
         return 1, order
@@ -204,7 +207,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             own
             and was_on
             and order == BY_STEP
-            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
+            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, True, work)
         )
         if own and order == BY_STEP and direction != 0 and not flat:
             # Its own reset has stopped the state on the guard, as a plastic impact does.
@@ -213,7 +216,9 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
             if order == JUMPING:
-                before, now = signs_beside_jump(model, run, transition, t, x, now, work)
+                first, now = signs_beside_jump(model, run, transition, t, x, now, work)
+                # The guard may have jumped and fired already, within the rounding of this place.
+                before = first if before == 0 else before
             on = order in (BY_SPEED, JUMPING)
             crossed = on and before == -now and (direction == 0 or now == direction)
         else:

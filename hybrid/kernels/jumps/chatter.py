@@ -20,7 +20,7 @@ FEWEST_JUMPS = 16
 # duration grows like the reciprocal of its speed and would spoil the limit.
 SHALLOW = 1e6
 # Change of the Jacobian over the remaining time that counts as none: what it adds to a state, as a share.
-SHORT = 1e-5
+SHORT = 1e-10
 # Longest remaining time, in units of the field's own time, over which the drift is an exponential.
 LONG = 1.0
 # The same where the drift is that of the mean field, which is followed to second order.

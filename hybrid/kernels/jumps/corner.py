@@ -110,7 +110,7 @@ def turns_back(model, run, transition, before, work):
     mode, t = run.mode, run.phase
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
+    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, True, work):
         return speed * before > 0.0
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
     return acceleration * before > acceleration_rounding(model, run, transition, t, run.y, work)

@@ -82,7 +82,7 @@ def has_come_to_rest(model, run, work):
         value = guard_value(model, transition, t, run.y, work.scalar)
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
         height = AT_REST * rounding_band(model, run, transition, t, run.y, work)
-        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, work)
+        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, True, work)
         for i in range(n):
             height += abs(work.gradient[i]) * moved[i]
             for j in range(n):

@@ -392,7 +392,7 @@ class TestBadArguments:
             ({"x0": "fast"}, "x0 must hold 2 numbers; got 'fast'"),
             ({"t_span": (1.0, 0.0)}, r"t_span must not run backwards; got \(1.0, 0.0\)"),
             ({"t_span": (0.0, math.inf)}, "t_span must be finite"),
-            ({"t_span": 3.0}, r"t_span must be a pair \(t0, t1\); got 3.0"),
+            ({"t_span": 3.0}, r"t_span must be a pair \(t0, t1\) of numbers; got 3.0"),
             ({"mode": "fligth"}, "Mode 'fligth' does not exist. Modes: flight. Did you mean 'flight'?"),
             ({"parameters": {"h": 1.0}}, "Parameter 'h' does not exist. Parameters: g, e"),
             ({"parameters": {"g": math.inf}}, "Parameter 'g' must be finite"),

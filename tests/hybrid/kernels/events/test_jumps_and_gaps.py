@@ -82,3 +82,24 @@ def test_each_change_of_side_fires_once(guard, solver):
                 assert len(found) == len(times), (name, a, b, start)
                 assert np.allclose(found, times, rtol=0, atol=2e-4), (name, a, b, start)
     assert compared > 0
+
+
+@pytest.mark.parametrize("solver", ["Taylor", "DOP853"])
+@pytest.mark.parametrize("flat_first", [True, False])
+@pytest.mark.parametrize("power", [3, 5, 7])
+def test_a_flat_root_and_a_jump_at_one_place_fire_once_each(power, flat_first, solver):
+    """The crossing of the spike ends a step close to their place, where rounding hides which comes first."""
+    flat = Transition("swing", "swing", Guard(lambda t, x, p: x.q**power), name="flat")
+    spike = Transition("swing", "swing", Guard(lambda t, x, p: np.exp(-p.k * x.q**2) - 0.5), name="spike")
+    switch = Transition("swing", "swing", Guard(lambda t, x, p: np.sign(x.q), +1), name="switch")
+    system = HybridSystem(
+        state=("q", "v"),
+        parameters={"k": 1e4},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[spike, *((flat, switch) if flat_first else (switch, flat))],
+    )
+    for size in (0.7, 1.0, 1.5, 3.3):
+        for k in (1e4, 1e2):
+            arc = simulate(system, (size, 0.0), (0.0, 10.0), parameters={"k": k}, solver=SOLVERS[solver])
+            fired = list(arc.jumps.transition)
+            assert [fired.count(name) for name in ("spike", "flat", "switch")] == [6, 3, 1]
