@@ -12,6 +12,8 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import LoweringPass, register_pass
 from numba.core.typed_passes import NativeLowering
 
+import hybrid.kernels.types.numba_types  # noqa: F401 (so that kernels may take structures)
+
 # What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out a few
 # parts in a hundred faster.
 THOROUGHLY = (
