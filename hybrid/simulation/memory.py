@@ -62,6 +62,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "settled": (n,),
         "saltation": (n, n),
         "sizes": (n, n),
+        "rounding": (4, n),
         "path": (degree + 1, n),
         "polynomial": (width,),
         "stack": (ISOLATION_DEPTH, width),

@@ -12,8 +12,6 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
-# Share of the rounding of a state by which a kink of a guard is told from a bend.
-NEARER = 0.0625
 
 
 @njit(**INLINE)
@@ -104,11 +102,11 @@ def smooth_band(model, run, transition, t, x, work):
     for i in range(n):
         size += abs(work.gradient[i]) * run.scale[i]
     program = transition + model.target.shape[0] + model.first_forcing[-1] + model.first_residue[-1]
-    return ROUNDING_OF_STATE * EPSILON * size + _spread_of_terms(model, run, program, t, x, work)
+    return ROUNDING_OF_STATE * EPSILON * size + spread_of_terms(model, run, program, t, x, work)
 
 
 @njit(**KERNEL)
-def _spread_of_terms(model, run, program, t, x, work):
+def spread_of_terms(model, run, program, t, x, work):
     """How far rounding can move terms from their value; 0 if they have no program or may jump."""
     if not has_program(model, program):
         return 0.0
@@ -138,7 +136,7 @@ def widen_scale(model, run, work):
         rounding[i] = ROUNDING_OF_STATE * EPSILON * size
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
-        spread = _spread_of_terms(model, run, first + residue, t, run.y, work)
+        spread = spread_of_terms(model, run, first + residue, t, run.y, work)
         rounding[model.residue_component[residue]] += spread
     for i in range(n):
         change, noise = work.jacobian[i, n], 0.0
@@ -170,121 +168,6 @@ def sides_at(model, run, t, work):
             run.side[transition] = 1 if value > 0.0 else -1
         elif direction != 0 and run.side[transition] != 0 and not math.isnan(value):
             run.side[transition] = -direction
-
-
-@njit(**KERNEL)
-def speed_rounding(model, run, transition, mode, t, x, bends, work):
-    """How far rounding of state and time can move the speed of a guard; ``work.gradient`` is current.
-
-    With ``bends``, rounding may also turn the gradient of a guard that is not affine.
-    """
-    n = model.dimension
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
-    size = abs(work.gradient[n])
-    for i in range(n):
-        spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
-        for j in range(n):
-            spread += abs(work.jacobian[i, j]) * run.scale[j]
-        size += abs(work.gradient[i]) * spread
-    if bends and model.affine_guard[transition] == 0:
-        size += _turned_by_rounding(model, run, transition, t, x, work)
-    return ROUNDING_OF_STATE * EPSILON * size + _rounding_of_residues(model, run, mode, t, x, work)
-
-
-@njit(**INLINE)
-def _curvature(model, transition, t, x, factor, work):
-    """Second derivative of a guard along ``factor`` times the vector ``work.field_after``, and time."""
-    for i in range(model.dimension):
-        work.state[i] = factor * work.field_after[i]
-    model.guard_curvature(transition, t, x, model.parameters, work.state)
-    return work.state[0]
-
-
-@njit(**KERNEL)
-def _turned_by_rounding(model, run, transition, t, x, work):
-    """How much state and time, moved by their own sizes, turn a bent guard, in units of its speed.
-
-    The mixed second derivatives along the flow follow from those along sums and differences. Zero where the
-    curvature of the guard is not compiled or has no value.
-    """
-    n, vector = model.dimension, work.field_after
-    pace = 0.0
-    for i in range(n):
-        vector[i] = work.field[i]
-        pace = max(pace, abs(vector[i]))
-    pace = pace if pace > 0.0 else 1.0
-    ahead = _curvature(model, transition, t, x, 1.0, work)
-    behind = _curvature(model, transition, t, x, -1.0, work)
-    still = _curvature(model, transition, t, x, 0.0, work)
-    size = abs(0.25 * (ahead - behind) + still) * size_of_time(model, t)
-    for j in range(n):
-        vector[j] = work.field[j] + pace
-        more = _curvature(model, transition, t, x, 1.0, work)
-        vector[j] = work.field[j] - pace
-        less = _curvature(model, transition, t, x, 1.0, work)
-        vector[j] = work.field[j]
-        size += abs(more - less) / (4.0 * pace) * run.scale[j]
-    return size if size < math.inf else 0.0
-
-
-@njit(**KERNEL)
-def _rounding_of_residues(model, run, mode, t, x, work):
-    """How far rounding of terms in time and parameters alone can move the speed of the guard."""
-    size = 0.0
-    first = model.target.shape[0] + model.first_forcing[-1]
-    for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
-        slope = abs(work.gradient[model.residue_component[residue]])
-        if slope > 0.0:
-            size += slope * _spread_of_terms(model, run, first + residue, t, x, work)
-    return size
-
-
-@njit(**KERNEL)
-def acceleration_rounding(model, run, transition, t, x, work):
-    """How far rounding of state and time alone can move the acceleration of the same guard.
-
-    ``work.jacobian`` and ``work.field`` are current: ``guard_acceleration`` has just been called.
-    """
-    n = model.dimension
-    size = 0.0
-    for i in range(n):
-        bend = abs(work.jacobian[i, n])
-        for j in range(n):
-            spread = abs(work.field[j]) + abs(work.jacobian[j, n]) * size_of_time(model, t)
-            for k in range(n):
-                spread += abs(work.jacobian[j, k]) * run.scale[k]
-            bend += abs(work.jacobian[i, j]) * spread
-        size += abs(work.gradient[i]) * bend
-    bent = model.affine_guard[transition] == 0
-    other = _curvature_by_rounding(model, run, transition, t, x, work) if bent else 0.0
-    return ROUNDING_OF_STATE * EPSILON * size + other
-
-
-@njit(**KERNEL)
-def _curvature_by_rounding(model, run, transition, t, x, work):
-    """How far rounding of state and time can move the curvature of a guard along the flow.
-
-    The curvature is evaluated where state and time are off by their rounding, one at a time, and by a small
-    share of that. At a kink of the guard the curvature jumps: the small share changes it as much, and that is
-    no rounding.
-    """
-    n, share, place = model.dimension, ROUNDING_OF_STATE * EPSILON, work.new
-    for i in range(n):
-        work.field_after[i], place[i] = work.field[i], x[i]
-    here = _curvature(model, transition, t, x, 1.0, work)
-    moved = share * size_of_time(model, t)
-    far = abs(_curvature(model, transition, t + moved, x, 1.0, work) - here)
-    near = abs(_curvature(model, transition, t + NEARER * moved, x, 1.0, work) - here)
-    total = share * abs(here) + (far if near <= 0.5 * far else 0.0)
-    for i in range(n):
-        moved = share * run.scale[i]
-        place[i] = x[i] + moved
-        far = abs(_curvature(model, transition, t, place, 1.0, work) - here)
-        place[i] = x[i] + NEARER * moved
-        near = abs(_curvature(model, transition, t, place, 1.0, work) - here)
-        total += far if near <= 0.5 * far else 0.0
-        place[i] = x[i]
-    return total if total < math.inf else 0.0
 
 
 @njit(**INLINE)

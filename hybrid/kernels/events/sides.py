@@ -4,22 +4,23 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.events.derivatives import (
+    acceleration_sign,
+    moment_of_rounding,
+    speed_rounding,
+    speed_sign,
+)
 from hybrid.kernels.events.guards import (
-    acceleration_rounding,
     allowed,
-    guard_acceleration,
     guard_speed,
     guard_value,
     has_program,
     may_jump,
     rounding_band,
-    size_of_time,
     smooth_band,
-    speed_rounding,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
-from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
@@ -61,11 +62,11 @@ def inherit(model, left, transition, side, due, zero):
 def side_of(model, run, mode, transition, t, x, before, was_on, work):
     """Side of a guard, 0 if the next step has to show it, and the order of the derivative that decides.
 
-    The order is 0 off the guard, 1 if the guard's speed decides, and 2 if the speed is zero up to rounding
-    and the acceleration decides. It is 3 if the acceleration is zero too: then the side is unchanged if the
-    guard was zero before, and otherwise the guard counts as not yet crossed. It is ``JUMPING`` if the guard
-    jumps across zero within the rounding of the state: then its derivatives are no guide. A guard without a
-    value keeps its side. ``work.field`` is current.
+    The order is 0 off the guard, 1 if the guard's speed decides, and 2 if rounding may hide or reverse the
+    speed and the acceleration decides. It is 3 if the same holds for the acceleration: then the side is
+    unchanged if the guard was zero before, and otherwise the guard counts as not yet crossed. It is
+    ``JUMPING`` if the guard jumps across zero within the rounding of the state: then its derivatives are no
+    guide. A guard without a value keeps its side. ``work.field`` is current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
     if math.isnan(value):
@@ -79,20 +80,17 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
             if was_on and before != 0:
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
-        trend, order = speed, BY_SPEED
-        if abs(speed) <= speed_rounding(model, run, transition, mode, t, x, True, work):
+        trend, order = speed_sign(model, run, transition, mode, t, x, speed, work), BY_SPEED
+        if trend == 0.0:
             if may_jump(model, run, transition, t, x, work):
                 # The state is in the middle of the jump, on neither side.
                 if was_on and before != 0:
                     return before, JUMPING
-                trend, order = 0.0, BY_STEP
+                order = BY_STEP
             else:
-                trend, order = guard_acceleration(model, run, transition, mode, t, x, work), BY_ACCELERATION
-                if abs(trend) <= acceleration_rounding(model, run, transition, t, x, work):
-                    trend, order = 0.0, BY_STEP
-                    if abs(speed) > speed_rounding(model, run, transition, mode, t, x, False, work):
-                        # Rounding may turn the gradient, but it reverses nothing at a flat root.
-                        trend, order = speed, BY_SPEED
+                trend, order = acceleration_sign(model, run, transition, mode, t, x, work), BY_ACCELERATION
+                if trend == 0.0:
+                    order = BY_STEP
     direction = model.direction[transition]
     if trend > 0.0:
         return 1, order
@@ -116,11 +114,7 @@ def signs_beside_jump(model, run, transition, t, x, now, work):
 
     The sign at ``x`` itself may be either. Both are ``now`` if the guard does not jump across zero here.
     """
-    size, pace = 0.0, 0.0
-    for i in range(model.dimension):
-        if work.field[i] != 0.0:
-            size, pace = max(size, run.scale[i]), max(pace, abs(work.field[i]))
-    moment = EPSILON * max(size / pace if pace > 0.0 else 0.0, size_of_time(model, t))
+    moment = moment_of_rounding(model, run, t, work)
     for _ in range(MOST_MOMENTS):
         moment *= LONGER
         before = sign_at(model, transition, t, x, -moment, work)
@@ -207,7 +201,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             own
             and was_on
             and order == BY_STEP
-            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, True, work)
+            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
         )
         if own and order == BY_STEP and direction != 0 and not flat:
             # Its own reset has stopped the state on the guard, as a plastic impact does.

@@ -2,15 +2,14 @@
 
 from numba import njit
 
+from hybrid.kernels.events.derivatives import acceleration_rounding, speed_rounding
 from hybrid.kernels.events.guards import (
-    acceleration_rounding,
     allowed,
     guard_acceleration,
     guard_speed,
     guard_value,
     has_program,
     keep_grazing,
-    speed_rounding,
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_SPEED, JUMPING
@@ -110,10 +109,10 @@ def turns_back(model, run, transition, before, work):
     mode, t = run.mode, run.phase
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, True, work):
+    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
         return speed * before > 0.0
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
-    return acceleration * before > acceleration_rounding(model, run, transition, t, run.y, work)
+    return acceleration * before > acceleration_rounding(model, run, mode, t, run.y, work)
 
 
 @exported(INTEGER, Task, INTEGER)
@@ -126,13 +125,14 @@ def first_in_order(task, fired):
     was refused.
     """
     _, model, _, run, record, work = task_of(task)
-    mode, t, before = run.mode, run.phase, run.side[fired]
+    mode, t = run.mode, run.phase
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
         if run.rehearsal[3, other] != 0:
             # It crosses here or later on the step; it may have changed sides before.
             run.side[other] = run.rehearsal[3, other]
             run.rehearsal[3, other] = 0
+    before = run.side[fired]
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
     direction = model.direction[fired]
     # For a guard that is not affine, the change of sign is proved.

@@ -4,6 +4,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.events.crossings import first_change
+from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     guard_speed,
@@ -11,7 +12,6 @@ from hybrid.kernels.events.guards import (
     has_program,
     rounding_band,
     size_of_time,
-    speed_rounding,
 )
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.jumps.rounds import fired_before
@@ -82,7 +82,7 @@ def has_come_to_rest(model, run, work):
         value = guard_value(model, transition, t, run.y, work.scalar)
         speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
         height = AT_REST * rounding_band(model, run, transition, t, run.y, work)
-        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, True, work)
+        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, work)
         for i in range(n):
             height += abs(work.gradient[i]) * moved[i]
             for j in range(n):

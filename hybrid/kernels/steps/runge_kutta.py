@@ -126,8 +126,7 @@ def find_event(task, h):
             return proved * h, 0.0, NO_TRANSITION
         if fired == NO_TRANSITION:
             break
-        direction = model.direction[fired]
-        side = run.side[fired] if direction == 0 else -direction
+        side = run.rehearsal[3, fired]
         rounding = measured_time(model, run, mode)
         shortened, correction = land(
             attempts, model, method, fired, side, mode, t, rounding, h, theta, run.y, tangents, work

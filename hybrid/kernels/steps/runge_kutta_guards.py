@@ -81,7 +81,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
     Returns ``(theta, transition, proved)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses before the
     share ``proved`` of the step, to which the step is to be cut. The sides of guards without a crossing are
     brought up to date, to the end of the step, and guards that were left are no longer held to be zero at its
-    start. For a guard with a crossing, ``run.rehearsal[3]`` holds its side before that, or 0 if unknown.
+    start. For a guard with a crossing, ``run.rehearsal[3]`` holds its side before that.
     ``work.path`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode, degree_of_path = run.mode, method.powers.shape[0] - 1
@@ -139,7 +139,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
         if theta == NO_ROOT:
             run.side[transition] = side
             continue
-        run.rehearsal[3, transition] = -model.direction[transition]
+        run.rehearsal[3, transition] = -side
         if theta < earliest:
             earliest, fired = theta, transition
     return earliest, fired, proved

@@ -333,7 +333,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             if theta == NO_ROOT:
                 run.side[transition] = side
                 continue
-            run.rehearsal[3, transition] = -model.direction[transition]
+            run.rehearsal[3, transition] = -side
             if theta < earliest:
                 earliest, fired = theta, transition
             continue
@@ -367,7 +367,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
-            run.rehearsal[3, transition] = -model.direction[transition]
+            run.rehearsal[3, transition] = side
             if theta < earliest:
                 earliest, fired = theta, transition
             continue
@@ -386,7 +386,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if theta == NO_ROOT:
             run.side[transition] = side
             continue
-        run.rehearsal[3, transition] = -model.direction[transition]
+        run.rehearsal[3, transition] = -side
         if theta < earliest:
             earliest, fired = theta, transition
     return earliest, fired, proved

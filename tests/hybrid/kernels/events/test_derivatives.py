@@ -1,0 +1,108 @@
+"""Which side of a guard a state on it goes to, where rounding hides or reverses speed and acceleration."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numba import njit
+
+from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
+from hybrid.kernels.events import sides
+from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
+from hybrid.simulation.trajectory import start
+
+_side_of = sides.side_of
+EPS = np.finfo(float).eps
+# Guards of ``q`` on the ramp ``q' = r``, the sign each takes for ``r > 0`` and for ``r < 0``, and the order
+# of the derivative that tells, where ``q`` is within rounding of zero.
+SHAPES = {
+    "cube": (lambda z: z**3, (1, -1), {BY_SPEED}),
+    "fifth power": (lambda z: -(z**5), (-1, 1), {BY_SPEED}),
+    "signed square": (lambda z: z * abs(z), (1, -1), {BY_SPEED, BY_STEP}),
+    "square": (lambda z: z * z, (1, 1), {BY_ACCELERATION}),
+    "bowl": (lambda z: -np.cosh(z) + 1.0, (-1, -1), {BY_ACCELERATION}),
+    "two slopes": (lambda z: np.where(z > 0.0, 3.0 * z, z), (1, -1), {BY_SPEED}),
+}
+SIZE = 0.7
+
+
+@cache
+def ramp(shape):
+    return HybridSystem(
+        state=("q", "w"),
+        parameters={"r": 1.0},
+        modes=[Mode("run", lambda t, x, p: (p.r, 0.0))],
+        transitions=[Transition("run", "run", Guard(lambda t, x, p: SHAPES[shape][0](x.q - x.w)))],
+    )
+
+
+@njit
+def side(model, run, t, x, work):
+    model.field(0, t, x, model.parameters, work.field)
+    return _side_of(model, run, 0, 0, t, x, 0, True, work)
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0, 1e-6, -3e5])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_flat_guard_goes_where_every_state_within_rounding_goes(shape, rate):
+    _, expected, orders = SHAPES[shape]
+    for roundings in (-6.0, -1.0, 0.0, 1.0, 6.0):
+        x = np.array([SIZE + roundings * EPS * SIZE, SIZE])
+        run = start(ramp(shape), x, 0.0, mode="run", parameters={"r": rate}, solver=DOP853())
+        found, order = side(run.model, run.run, 0.0, x, run.work)
+        assert order in orders or (roundings == 0.0 and order == BY_STEP)
+        # The next step shows what the point does not.
+        assert order == BY_STEP or found == expected[0 if rate > 0.0 else 1]
+
+
+POWERS = {"cube": lambda z: z**3, "signed square": lambda z: z * np.abs(z), "fifth power": lambda z: z**5}
+SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
+END, DRAWS = 10.0, 250
+
+
+def swinging(t, a, b, s):
+    return (b + s * t) * np.cos(t) - a
+
+
+@cache
+def swings(power, counts):
+    """Crosses zero at flat roots; the rate is steady, so that one step may cross several times."""
+    return HybridSystem(
+        state=("q", "n"),
+        parameters={"a": 0.3, "s": 0.2},
+        modes=[Mode("run", lambda t, x, p: (p.s, 0.0))],
+        transitions=[
+            Transition(
+                "run",
+                "run",
+                Guard(lambda t, x, p: POWERS[power](x.q * np.cos(t) - p.a)),
+                Reset(lambda t, x, p: (x.q, x.n + 1)) if counts else None,
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("counts", [False, True])
+@pytest.mark.parametrize("power", POWERS)
+def test_a_flat_root_fires_once_however_its_rounding_falls(power, counts, solver):
+    rng = np.random.default_rng(7)
+    a, b, s = rng.uniform(0.0, 0.9, DRAWS), rng.uniform(-2.0, -0.5, DRAWS), rng.uniform(0.1, 0.4, DRAWS)
+    t = np.linspace(0.0, END, 2001)
+    values = swinging(t[:, None], a, b, s)
+    # A turn close to zero may be a touch.
+    plain = np.abs(values).min(axis=0) > 1e-6
+    turns = (np.diff(values, axis=0)[1:] * np.diff(values, axis=0)[:-1] < 0) & (np.abs(values[1:-1]) < 1e-2)
+    plain &= ~turns.any(axis=0)
+    assert plain.sum() > 0.8 * DRAWS
+    for k in np.flatnonzero(plain):
+        places = np.flatnonzero(values[:-1, k] * values[1:, k] < 0)
+        low, high = t[places], t[places + 1]
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            before = swinging(middle, a[k], b[k], s[k]) * values[places, k] > 0
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        arc = simulate(
+            swings(power, counts), (b[k], 0.0), (0.0, END), parameters={"a": a[k], "s": s[k]}, solver=solver
+        )
+        np.testing.assert_allclose(arc.jumps.t, low, rtol=0, atol=1e-9, err_msg=f"{a[k]!r} {b[k]!r} {s[k]!r}")
