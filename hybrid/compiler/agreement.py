@@ -226,14 +226,14 @@ def rounding_band(
     """
     rng = np.random.default_rng(1)
     try:
-        shaken = [_shaken_operations(system, function, t, x, values, rng) for _ in range(SHAKES)]
+        shaken = _shaken_operations(system, function, t, x, values, rng)
         traced = True
     except Exception:
         traced = False
         points = ([_shake(each, rng) for each in (t, x, values)] for _ in range(SHAKES))
         moved = (evaluate(system.variables, function, *point) for point in points)
-        shaken = [sample for sample in moved if sample is not None]
-    spread = np.ptp(np.array(shaken), axis=0) if shaken else np.inf
+        shaken = np.array([sample for sample in moved if sample is not None])
+    spread = np.ptp(shaken, axis=0) if len(shaken) else np.inf
     # Differences of large terms inside a function whose operations cannot be seen.
     hidden = 0.0 if traced else HIDDEN * np.abs(x).max()
     return np.asarray(ROUNDED[traced] * np.abs(value) + 4.0 * spread + hidden)
@@ -251,14 +251,15 @@ def _shaken_operations(
     values: np.ndarray,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    symbols = _shake(t, rng), _shake(x, rng), _shake(values, rng)
+    """Values ``(SHAKES, rows)`` of a function, each time with other roundings of its operations."""
+    symbols = [_shake(np.broadcast_to(each, (SHAKES, *np.shape(each))), rng).T for each in (t, x, values)]
     with np.errstate(all="ignore"):
-        found = values_of(function, system.state, tuple(system.parameters), _Shaken(rng), symbols)
-    return np.array(found, dtype=float)
+        found = values_of(function, system.state, tuple(system.parameters), _Shaken(rng), tuple(symbols))
+    return np.array([np.broadcast_to(each, SHAKES) for each in found], dtype=float).T
 
 
 class _Shaken:
-    """Traced numbers as floats, with a random rounding after every operation."""
+    """Traced numbers as vectors ``(SHAKES,)`` of floats, with random roundings after every operation."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
@@ -270,7 +271,7 @@ class _Shaken:
     def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
         """The value of the function with random last digits."""
         value = np.where(*contents)[()] if name == WHERE else getattr(np, name)(*contents)
-        return _shake(value, self.rng) if isinstance(value, np.floating) else value
+        return _shake(value, self.rng) if value.dtype.kind == "f" else value
 
     def expression(self, content: Any) -> Any:
         """There is none."""
