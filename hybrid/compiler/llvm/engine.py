@@ -11,8 +11,8 @@ from llvmlite import binding
 
 from hybrid.compiler.interrupts import between_passes
 
-# LLVM's highest optimisation level.
-SPEED = 3
+# LLVM's highest level of optimisation, and the lowest one that keeps numbers in registers.
+SPEED, HASTE = 3, 1
 
 
 @attrs.frozen(eq=False)
@@ -23,14 +23,14 @@ class Compiled:
     needs: Any = attrs.field(repr=False)
 
 
-def _new_target() -> Any:
-    """LLVM's description of the processor of this machine."""
+def _new_target(level: int = SPEED) -> Any:
+    """LLVM's description of the processor of this machine, and how much it optimises for it."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.Target.from_default_triple().create_target_machine(
         cpu=binding.get_host_cpu_name(),
         features=binding.get_host_cpu_features().flatten(),
-        opt=SPEED,
+        opt=level,
         reloc="default",
         codemodel="jitdefault",
         jit=True,

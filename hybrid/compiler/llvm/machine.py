@@ -9,8 +9,12 @@ from typing import Any
 from llvmlite import binding, ir
 
 from hybrid.compiler.interrupts import between_passes
-from hybrid.compiler.llvm.engine import SPEED, target
+from hybrid.compiler.llvm.engine import HASTE, SPEED, target
 from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, OwnFunction, Signature, lower
+
+# Functions with more instructions than this, as written, are emitted in haste: LLVM's time grows faster than
+# their length, and they run no slower.
+LONG = 15000
 
 
 def _optimise(module: Any) -> None:
@@ -47,5 +51,6 @@ def machine_code(
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
     _optimise(parsed)
-    code: bytes = target().emit_object(parsed)
+    longest = max(sum(len(block.instructions) for block in each.blocks) for each in module.functions)
+    code: bytes = target(HASTE if longest > LONG else SPEED).emit_object(parsed)
     return code

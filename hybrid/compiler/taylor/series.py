@@ -100,6 +100,9 @@ class Recurrences:
         self.first: list[str] = []
         self.higher: list[str] = []
         self.pairs: dict[tuple[str, sympy.Expr], str] = {}
+        # The place of each pair, and that of the first pair with each first factor.
+        self.places: dict[tuple[str, sympy.Expr], int] = {}
+        self.lefts: dict[str, int] = {}
         self.blocks: dict[str, list[sympy.Expr]] = {}
         self.variables: dict[sympy.Expr, str] = {}
         self.slopes: dict[sympy.Expr, str] = {}
@@ -205,7 +208,8 @@ class Recurrences:
             block, place = list(self.blocks).index(left), rights.index(right)
             return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {NARROW * place}"
         self.pairs.setdefault((left, right), "")
-        place = list(self.pairs).index((left, right))
+        place = self.places.setdefault((left, right), len(self.places))
+        self.lefts.setdefault(left, place)
         column = f"{self.prefix}b + {place}"
         # The second factor often depends on the first and is known later, so its term is added last.
         inner = f"{self.prefix}s{place} + {self._left_before(left)}*out[1, {column}]"
@@ -213,7 +217,7 @@ class Recurrences:
 
     def _left_before(self, left: str) -> str:
         """Name of the coefficient of a first factor in the order before."""
-        return f"{self.prefix}q{[each for each, _ in self.pairs].index(left)}"
+        return f"{self.prefix}q{self.lefts[left]}"
 
     def before(self) -> dict[str, str]:
         """Names of all factors' coefficients in the order before, with their values at the end of an order.
