@@ -54,9 +54,9 @@ if TYPE_CHECKING:
     from hybrid.system.elements import Transition
     from hybrid.system.graph import HybridSystem
 
-# A cell of a matrix in the statements for a derivative.
+# A cell of a matrix in the statements for a derivative, and how the statement for a cell that is zero ends.
 _CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
-_ZERO_CELL = re.compile(r"out\[\d+, \d+\] = 0\.0")
+ZERO_CELL = "] = 0.0"
 # So many zeros are written by a loop.
 MANY_ZEROS = 50
 Result = TypeVar("Result")
@@ -244,7 +244,7 @@ class _Writer:
         try:
             expressions = self.traced(function.value)
             jacobian = jacobian_of(expressions, self.symbols.variables)
-            _check_printable(entry for row in jacobian for entry in row)
+            _check_printable(entry for row in jacobian for entry in row if entry is not ZERO)
         except ModelError as error:
             return self._write_opaque(function, targets, error)
         if function.derivative is None:
@@ -450,10 +450,9 @@ def _written_condition(writer: _Writer, transition: Transition) -> _Written:
 
 def _zeros_first(statements: list[str], n: int) -> list[str]:
     """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
-    zeros = [each for each in statements if _ZERO_CELL.fullmatch(each)]
-    if len(zeros) < MANY_ZEROS:
+    others = [each for each in statements if not each.endswith(ZERO_CELL)]
+    if len(statements) - len(others) < MANY_ZEROS:
         return statements
-    others = [each for each in statements if not _ZERO_CELL.fullmatch(each)]
     loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
     return [*loop, *others]
 

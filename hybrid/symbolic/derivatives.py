@@ -52,7 +52,10 @@ def jacobian_of(
     """
     with distribute(False):  # 3*(a - b) must not become 3*a - 3*b, which rounds where a - b is exact
         rows = partial_derivatives(expressions, list(variables))
-        return [[close_gates(defined_at_origin(entry)) for entry in row] for row in rows]
+        return [
+            [entry if entry is ZERO else close_gates(defined_at_origin(entry)) for entry in row]
+            for row in rows
+        ]
 
 
 def partial_derivatives(
@@ -61,7 +64,7 @@ def partial_derivatives(
     """Rows of the partial derivatives of ``expressions`` with respect to ``variables``."""
     wanted = frozenset(variables)
     rows = (_partials(expression, wanted, global_parameters.distribute) for expression in expressions)
-    return [[interned(row.get(variable, ZERO)) for variable in variables] for row in rows]
+    return [[interned(row[each]) if each in row else ZERO for each in variables] for row in rows]
 
 
 def divergence(field: Sequence[sympy.Expr], variables: Sequence[sympy.Symbol]) -> sympy.Expr:

@@ -80,21 +80,25 @@ def assignments(
     ``targets`` may therefore overlap with variables that the expressions read. Without ``thorough``, only
     whole expressions are shared, not parts of sums and products.
     """
-    uses = _uses(expressions)
-    if not thorough or len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in expressions):
-        reduced, printer = expressions, _Printer(node for node, count in uses.items() if count > 1)
+    # Most entries of a large matrix are zero.
+    varying = [each for each in expressions if not each.is_Number]
+    uses = _uses(varying)
+    if not thorough or len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in varying):
+        reduced, printer = varying, _Printer(node for node, count in uses.items() if count > 1)
     else:
-        shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("c", real=True), list=True)
+        shared, reduced = sympy.cse(varying, symbols=sympy.numbered_symbols("c", real=True), list=True)
         printer = _Printer()
         for symbol, expression in shared:
             printer.assign(symbol.name, expression)
-    stores = []
-    for k, (target, expression) in enumerate(zip(targets, reduced, strict=True)):
+    stores, rest = [], iter(reduced)
+    for k, (target, expression) in enumerate(zip(targets, expressions, strict=True)):
         value = f"y{k}"
-        if expression.is_Number:
+        if expression is sym.ZERO:
+            value = "0.0"
+        elif expression.is_Number:
             value = printer.text(expression)
         else:
-            printer.assign(value, expression)
+            printer.assign(value, next(rest))
         stores.append(f"{target} = {value}")
     return printer.lines + stores
 
