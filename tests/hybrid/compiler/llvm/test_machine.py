@@ -1,0 +1,26 @@
+"""Long functions are emitted in haste, and compute the same."""
+
+import numpy as np
+import pytest
+
+from hybrid.compiler.llvm import machine
+from hybrid.compiler.llvm.engine import HASTE, SPEED, target
+from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from tests.hybrid.text import both
+
+
+@pytest.mark.parametrize("longest", [100, 10**9])
+def test_long_functions_are_emitted_in_haste_and_compute_the_same(monkeypatch, longest):
+    levels = []
+    monkeypatch.setattr(machine, "LONG", longest)
+    monkeypatch.setattr(machine, "target", lambda level=SPEED: levels.append(level) or target(level))
+    size = 60
+    lines = [f"y{i} = x[{i}]*x[{(7 * i + 3) % size}]/(1.0 + x[{i}]*x[{i}])" for i in range(size)]
+    lines += [f"out[{i}] = y{i} - y{(11 * i + 5) % size}*sin(x[{i}])" for i in range(size)]
+    found = []
+    for run in both(lines, VECTOR_SIGNATURE):
+        out = np.zeros(size)
+        run(0, 0.25, np.linspace(0.2, 1.5, size), np.array([0.3]), out)
+        found.append(out)
+    np.testing.assert_array_equal(*found)
+    assert (HASTE in levels) == (longest == 100)
