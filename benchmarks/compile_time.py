@@ -45,6 +45,39 @@ def dense(n):
         linear, bent = ([sum(m[i, j] * x[j] for j in range(n)) for i in range(n)] for m in (a, b))
         return [linear[i] - p.d * x[i] + np.sin(bent[i]) for i in range(n)]
     return HybridSystem(state=n, parameters={"d": 1.0}, modes=[Mode("flow", field)])
+
+def reactions(n, count, events):
+    '''Random reactions among n species, as models of cells have them; doses at levels and at times.'''
+    rng = np.random.default_rng(3)
+    kinds, *places = rng.integers(4, size=count), *rng.integers(n, size=(3, count))
+    network = [*zip(map(int, kinds), *(map(int, place) for place in places))]
+
+    def field(t, x, p):
+        rates = [0.0 * x[0]] * n
+        for k, (kind, a, b, c) in enumerate(network):
+            laws = (x[a], x[a] * x[b], x[a] / (0.5 + x[a]), x[a] ** 2 / (1.0 + x[a] ** 2 + x[b]))
+            flow = p[k] * laws[kind]
+            rates[a], rates[c] = rates[a] - flow, rates[c] + flow
+        return rates
+
+    def dose(number):
+        watched, given, level = *map(int, rng.integers(n, size=2)), rng.uniform(0.2, 1.5)
+        if number % 3 == 0:
+            guard = Guard(lambda t, x, p: t - 0.25 * (number + 1), +1)
+        else:
+            guard = Guard(lambda t, x, p: x[watched] - level)
+
+        def reset(t, x, p):
+            x = list(x)
+            x[given] = x[given] + 0.1
+            return x
+
+        return Transition("mix", "mix", guard, Reset(reset), name=f"dose {number}")
+
+    values = {f"k{k}": float(value) for k, value in enumerate(rng.uniform(0.05, 1.0, count))}
+    return HybridSystem(
+        state=n, parameters=values, modes=[Mode("mix", field)], transitions=[dose(i) for i in range(events)]
+    )
 """
 MODELS = {
     "ball": "models.bouncing_ball()",
@@ -53,6 +86,12 @@ MODELS = {
     "stick-slip (filippov)": "models.stick_slip()",
     "Chua": "models.chua_circuit()",
     "20 states, dense": "dense(20)",
+}
+# Number of species, of reactions and of events, and whether with tangent vectors.
+NETWORKS = {
+    "22 species, 40 reactions, 30 events": ("reactions(22, 40, 30)", True),
+    "52 species, 90 reactions, 60 events": ("reactions(52, 90, 60)", True),
+    "371 species, 600 reactions, 20 events, state alone": ("reactions(371, 600, 20)", False),
 }
 RUNS = {"with tangent vectors": True, "state alone": False}
 # Numbers of masses in the chain.
@@ -257,7 +296,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         table(["plain equations, split", "seconds", "modes visited", "made", "jumps"], split)
         if given.split:
             return
-        table(["model", "seconds"], [[name, f"{wait(model, folder):.2f}"] for name, model in MODELS.items()])
+        models = {name: (model, True) for name, model in MODELS.items()} | NETWORKS
+        rows = [[name, f"{wait(model, folder, tangent):.2f}"] for name, (model, tangent) in models.items()]
+        table(["model", "seconds"], rows)
         waits = {
             f"hybrid, {name}": [wait(f"chain({n})", folder, tangent) for n in CHAINS]
             for name, tangent in RUNS.items()
