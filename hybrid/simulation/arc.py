@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # In the order of the kernel's codes.
 KINDS = ("transverse", "grazing", "limit")
+# Dense output is evaluated at so many times per call of a kernel.
+TIMES_AT_ONCE = 100_000
 
 
 @attrs.frozen(eq=False)
@@ -246,7 +248,11 @@ class Pieces:
         states = np.empty((len(times), self.coefficients.shape[2] - 1))
         index = np.empty(len(times), dtype=np.int64)
         kernel = load_kernels("hybrid.kernels.steps.dense").states_at
-        kernel(np.ascontiguousarray(times), self.t, self.low, self.h, self.coefficients, states, index)
+        times = np.ascontiguousarray(times)
+        # Between two calls Ctrl-C is heard.
+        for first in range(0, len(times), TIMES_AT_ONCE):
+            part = slice(first, first + TIMES_AT_ONCE)
+            kernel(times[part], self.t, self.low, self.h, self.coefficients, states[part], index[part])
         return states, index
 
 
