@@ -25,39 +25,60 @@ SHARE = ROUNDING_OF_STATE * EPSILON
 SPREADS, BENDS, SPREADS_OF_BENDS, PLACE = range(4)
 
 
-@njit(**KERNEL)
-def spread_rates(model, run, mode, t, x, work):
-    """How far state and time, moved by their own sizes, move each rate, into a row of ``work.rounding``.
+@njit(**INLINE)
+def _spread(model, run, t, i, work):
+    """How far state and time, moved by their own sizes, move the rate of one component."""
+    n = model.dimension
+    spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
+    for j in range(n):
+        spread += abs(work.jacobian[i, j]) * run.scale[j]
+    return spread
 
-    ``work.field`` is current; ``work.jacobian`` is on return.
+
+@njit(**INLINE)
+def _matters(model, transition, i, work):
+    """Whether a derivative of a guard depends on the rate of a component; if the guard bends, it may."""
+    return model.affine_guard[transition] == 0 or work.gradient[i] != 0.0
+
+
+@njit(**KERNEL)
+def spread_rates(model, run, transition, mode, t, x, work):
+    """How far rounding moves each rate that matters to a guard, into a row of ``work.rounding``.
+
+    ``work.field`` and ``work.gradient`` are current; ``work.jacobian`` is on return.
     """
     n, spreads = model.dimension, work.rounding[SPREADS]
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     for i in range(n):
-        spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
-        for j in range(n):
-            spread += abs(work.jacobian[i, j]) * run.scale[j]
-        spreads[i] = spread
+        spreads[i] = _spread(model, run, t, i, work) if _matters(model, transition, i, work) else 0.0
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
-        # Terms in time and parameters alone that may cancel.
-        spread = spread_of_terms(model, run, first + residue, t, x, work)
-        spreads[model.residue_component[residue]] += spread / SHARE
+        component = model.residue_component[residue]
+        if _matters(model, transition, component, work):
+            # Terms in time and parameters alone that may cancel.
+            spreads[component] += spread_of_terms(model, run, first + residue, t, x, work) / SHARE
 
 
 @njit(**KERNEL)
-def _bend_rates(model, work):
-    """Time derivatives of the rates along the flow, and how far these move, into ``work.rounding``.
+def _bend_rates(model, run, transition, t, work):
+    """Time derivatives of these rates along the flow, and how far they move, into ``work.rounding``.
 
-    ``work.field`` and ``work.jacobian`` are current, and ``spread_rates`` has just been called.
+    ``work.field``, ``work.gradient`` and ``work.jacobian`` are current.
     """
     n, spreads = model.dimension, work.rounding[SPREADS]
+    bent = model.affine_guard[transition] == 0
+    for i in range(n if bent else 0):
+        spreads[i] = _spread(model, run, t, i, work)
     for i in range(n):
-        bend = work.jacobian[i, n]
-        spread = abs(bend)
-        for j in range(n):
-            bend += work.jacobian[i, j] * work.field[j]
-            spread += abs(work.jacobian[i, j]) * spreads[j]
+        bend, spread = 0.0, 0.0
+        if _matters(model, transition, i, work):
+            bend = work.jacobian[i, n]
+            spread = abs(bend)
+            for j in range(n):
+                slope = work.jacobian[i, j]
+                if slope != 0.0:
+                    bend += slope * work.field[j]
+                    spread += abs(slope) * (spreads[j] if bent else _spread(model, run, t, j, work))
         work.rounding[BENDS, i], work.rounding[SPREADS_OF_BENDS, i] = bend, spread
 
 
@@ -74,16 +95,19 @@ def _size(gradient, spreads, n):
 def speed_rounding(model, run, transition, mode, t, x, work):
     """How far rounding of state and time can move the speed of a guard; ``work.gradient`` is current."""
     n = model.dimension
-    spread_rates(model, run, mode, t, x, work)
+    spread_rates(model, run, transition, mode, t, x, work)
     size = abs(work.gradient[n]) + _size(work.gradient, work.rounding[SPREADS], n)
     return SHARE * size + _turned_by_rounding(model, run, transition, t, x, work)
 
 
 @njit(**KERNEL)
-def acceleration_rounding(model, run, mode, t, x, work):
-    """How far rounding can move the acceleration of a guard that is affine; ``work.gradient`` is current."""
-    spread_rates(model, run, mode, t, x, work)
-    _bend_rates(model, work)
+def acceleration_rounding(model, run, transition, mode, t, x, work):
+    """How far rounding can move the acceleration of a guard that is affine.
+
+    ``work.field`` and ``work.gradient`` are current.
+    """
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    _bend_rates(model, run, transition, t, work)
     return SHARE * _size(work.gradient, work.rounding[SPREADS_OF_BENDS], model.dimension)
 
 
@@ -191,7 +215,7 @@ def speed_sign(model, run, transition, mode, t, x, speed, work):
     speed is zero itself: then it has the sign of a moment later.
     """
     n = model.dimension
-    spread_rates(model, run, mode, t, x, work)
+    spread_rates(model, run, transition, mode, t, x, work)
     size = abs(work.gradient[n]) + _size(work.gradient, work.rounding[SPREADS], n)
     sign = _certain(speed, SHARE * size)
     if model.affine_guard[transition] == 1:
@@ -215,8 +239,8 @@ def acceleration_sign(model, run, transition, mode, t, x, work):
     ``work.field`` and ``work.gradient`` are current. The curvature of a guard that could not be traced counts
     as exact.
     """
-    spread_rates(model, run, mode, t, x, work)
-    _bend_rates(model, work)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    _bend_rates(model, run, transition, t, work)
     acceleration, rounding = _derivative(model, transition, t, x, True, work)
     if math.isnan(acceleration):
         acceleration = guard_acceleration(model, run, transition, mode, t, x, work)

@@ -202,10 +202,11 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     total = 0.0
     for i in range(n):
-        bend = work.jacobian[i, n]
-        for j in range(n):
-            bend += work.jacobian[i, j] * work.field[j]
-        total += work.gradient[i] * bend
+        if work.gradient[i] != 0.0:
+            bend = work.jacobian[i, n]
+            for j in range(n):
+                bend += work.jacobian[i, j] * work.field[j]
+            total += work.gradient[i] * bend
     if model.affine_guard[transition] == 1:
         return total
     for i in range(n):

@@ -112,7 +112,7 @@ def turns_back(model, run, transition, before, work):
     if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
         return speed * before > 0.0
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
-    return acceleration * before > acceleration_rounding(model, run, mode, t, run.y, work)
+    return acceleration * before > acceleration_rounding(model, run, transition, mode, t, run.y, work)
 
 
 @exported(INTEGER, Task, INTEGER)

@@ -27,7 +27,7 @@ def judged(model, method, run, transition, t, x, work, out):
     out[3] = _tolerated(method, run, work.gradient, model.dimension)
     out[4] = _speed_rounding(model, run, transition, 0, t, x, work)
     out[5] = _acceleration(model, run, transition, 0, t, x, work)
-    out[6] = _acceleration_rounding(model, run, 0, t, x, work)
+    out[6] = _acceleration_rounding(model, run, transition, 0, t, x, work)
 
 
 @njit
