@@ -239,12 +239,12 @@ def _companion(
         companion = start(*place, parameters=parameters, solver=solver)
     except ArgumentError:
         companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
-        # The companion takes the sides of the guards from the reference, as if it had crossed any guard
-        # between the two orbits.
-        companion.run.side[:] = reference.run.side
-        companion.run.previous_mode = companion.run.mode
-    companion.run.cycle = reference.run.cycle
-    companion.run.phase, companion.run.phase_low = reference.run.phase, reference.run.phase_low
+    if companion.mode == reference.mode:
+        # It is as if the companion had come from the reference, and had crossed any guard between the two.
+        companion.goes_on_from(reference)
+    else:
+        companion.run.cycle = reference.run.cycle
+        companion.run.phase, companion.run.phase_low = reference.run.phase, reference.run.phase_low
     return companion
 
 

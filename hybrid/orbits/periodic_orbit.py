@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.labelled import labelled_orbit
 from hybrid.orbits.newton import Newton, Point, Shot
@@ -19,6 +20,7 @@ from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.periods import split_time
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
@@ -120,7 +122,7 @@ class PeriodicOrbit:
         return labelled_orbit(self)
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
-        """The orbit over one period."""
+        """The orbit over one period, with the jumps at both ends if it jumps at its point."""
         span = (self.t0, self.t0 + self.period)
         return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
 
@@ -231,7 +233,7 @@ class _Shooting:
     def shoot(self, point: Point) -> Shot:
         trajectory = self._trajectory(point, self.mode)
         mode, field = trajectory.mode, trajectory.field()
-        code = trajectory.advance(point.t + point.period, trajectory.no_record())
+        code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
         return Shot(
@@ -404,7 +406,11 @@ class _Shooting:
 
     def _signature(self, shot: Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)
-        return (shot.mode, *(jump.target for jump in arc.jumps if jump.target is not None))
+        jumps, forcing = list(arc.jumps), self.system.forcing_period(self.parameters) or 0.0
+        if jumps and jumps[0].t == shot.point.t:
+            end = shot.point.t + shot.point.period
+            jumps = [jump for jump in jumps if not same_time(jump.t, end, forcing)]
+        return (shot.mode, *(jump.target for jump in jumps if jump.target is not None))
 
     def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""
