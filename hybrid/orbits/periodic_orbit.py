@@ -152,7 +152,8 @@ def periodic_orbit(
     system, parameters
         As for :func:`hybrid.simulate`.
     x0, mode
-        Guess of a point of the orbit ``(n,)``, and the mode there.
+        Guess of a point of the orbit ``(n,)``, and the mode there. If the orbit of a forced system jumps at
+        ``t0``, its point is the state before the jump.
     t0, periods
         Time at the guess, and number of forcing periods (forced systems).
     period

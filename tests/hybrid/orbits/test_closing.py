@@ -81,7 +81,7 @@ def kicks_and_decays(start, a, periods):
 
 
 def test_rows_that_go_on_from_others_make_each_kick_once():
-    """Each row goes on from the state before the kick after its transient of 4 periods, and ends after one."""
+    """A row goes on from the state before the kick at the end of the last row's transient of 4 periods."""
     a, intervals, transient = 2.5, 3, 4
     chart = lyapunov.chart(
         kicked(),
