@@ -96,8 +96,12 @@ class LyapunovSpectrum:
 
     @property
     def sum_defect(self) -> float:
-        """Sum of the exponents minus the sum rule; it does not detect most errors of the tangents."""
-        return float(self.exponents.sum() - self.sum_rule)
+        """Sum of the exponents minus the sum rule; it does not detect most errors of the tangents.
+
+        It is zero if both are minus infinity.
+        """
+        total = float(self.exponents.sum())
+        return 0.0 if total == self.sum_rule else total - self.sum_rule
 
     def to_xarray(self) -> xarray.Dataset:
         """The spectrum with the names of a chart; with a history also ``growths`` over the axis ``time``."""

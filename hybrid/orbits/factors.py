@@ -88,7 +88,8 @@ class _Products:
         return Factors([*self.matrices, vectors], self.singular, units, code)
 
     def _measure(self, vectors: np.ndarray) -> None:
-        self.sizes += np.abs(vectors @ self.basis.T)
+        if np.all(np.isfinite(vectors)):
+            self.sizes += np.abs(vectors @ self.basis.T)
 
 
 def fundamental_eigenvalues(start: Callable[[], Trajectory], t: float) -> ProductEigenvalues:

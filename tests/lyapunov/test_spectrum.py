@@ -106,6 +106,8 @@ def test_a_collapsed_direction_is_minus_infinity():
     assert result.exponents[0] == pytest.approx(0.0, abs=1e-4)
     assert result.exponents[1] == -np.inf
     assert result.standard_error[1] == 0.0
+    assert result.sum_rule == -np.inf
+    assert result.sum_defect == 0.0
 
 
 def test_without_history_memory_does_not_grow():
