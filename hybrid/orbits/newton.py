@@ -63,7 +63,7 @@ class Shot:
         return np.asarray(share + np.abs(self.fundamental) @ share)
 
     def growth(self, scale: np.ndarray) -> float:
-        """The largest modulus of an eigenvalue of the fundamental matrix: errors of the start grow by that."""
+        """The largest modulus of a multiplier: errors of the start grow by that."""
         return float(np.abs(np.linalg.eigvals(self.fundamental / scale[:, None] * scale)).max())
 
     def size(self, scale: np.ndarray) -> float:

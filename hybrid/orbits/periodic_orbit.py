@@ -435,8 +435,8 @@ class _Shooting:
         return Status(
             StatusCode.NOT_CONVERGED,
             f"Newton's method did not converge: {reason}.",
-            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states are "
-            "small, give a solver= with a lower atol.",
+            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states "
+            "are small, give a solver= with a lower atol.",
         )
 
     def _objection(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> str | None:
