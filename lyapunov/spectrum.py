@@ -288,6 +288,8 @@ class Estimate:
         if transient:
             _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
             self._replace_annihilated()
+            # A vector of which only rounding was left is by now a new direction, like those at the start.
+            trajectory.run.indistinct = 0
         mean, batches = TaperedMean(k + 1), new_batches(k + 1)
         jumps, steps = trajectory.jumps, int(trajectory.run.steps)
         self.grazed_growth = trajectory.run.ill_conditioned_growth
