@@ -84,7 +84,9 @@ class _Products:
             # SciPy's linear algebra takes long to import.
             from scipy.linalg import matrix_balance
 
-            [units, _] = matrix_balance(own, permute=False, separate=True)[1]
+            # SciPy makes whole numbers of the units too, as if they were a permutation.
+            with np.errstate(invalid="ignore"):
+                [units, _] = matrix_balance(own, permute=False, separate=True)[1]
         return Factors([*self.matrices, vectors], self.singular, units, code)
 
     def _measure(self, vectors: np.ndarray) -> None:
