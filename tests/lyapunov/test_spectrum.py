@@ -417,7 +417,7 @@ def test_the_default_interval_does_not_depend_on_the_units_of_the_states(field, 
 
 @pytest.mark.parametrize("unit", [2.0**-40, 1.0, 2.0**40])
 def test_speeds_in_units_far_from_those_of_places(unit):
-    """Vectors that differ in all components alike are parallel but for their places, until they have turned."""
+    """The first vectors, alike in all components, are parallel to rounding until they have turned."""
 
     def fields(t, x, p):
         q1, q2, v1, v2 = x[0] / p.unit, x[1] / p.unit, x[2] * p.unit, x[3] * p.unit
