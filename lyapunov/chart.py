@@ -16,6 +16,7 @@ from hybrid import HybridSystem, arguments, sweep
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import silent
 from hybrid.errors import HybridError
+from hybrid.orbits.closing import advance_to_close
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.sweep.rows import At, Place, Rows, rows_of
@@ -177,8 +178,12 @@ class Exponents:
         span = self.transient * self._length(trajectory)
         period, clock = trajectory.model.period, trajectory.run
         cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
-        phase = clock.phase + (0.0 if period else span)
-        code = trajectory.advance_to(int(clock.cycle) + cycles, float(phase), trajectory.no_record())
+        end = int(clock.cycle) + cycles, float(clock.phase) + (0.0 if period else span)
+        if period:
+            # The next row starts at the phase of this one, and makes the jumps there itself.
+            code = advance_to_close(trajectory, *end)
+        else:
+            code = trajectory.advance_to(*end, trajectory.no_record())
         return rows.end_of(trajectory, code)
 
     def prepare(self) -> None:
@@ -228,7 +233,9 @@ class Exponents:
             # The system with the surface goes on from here; with a period the phase is all of the time.
             place, now = (spectrum.x, spectrum.mode), float(trajectory.run.phase)
             try:
-                trajectory = rows.go_on(point, place, None, rows.marked, now)
+                marked = rows.go_on(point, place, None, rows.marked, now)
             except HybridError:
                 return np.full((self.points, rows.system.dimension), np.nan)
+            marked.goes_on_from(trajectory)
+            trajectory = marked
         return rows.section(trajectory, self.points)[0]

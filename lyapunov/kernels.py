@@ -70,10 +70,14 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
 @njit(**KERNEL)
 def distance(run, other, n):
     """Euclidean distance of the states of two runs; the phase of the forcing is the same in both."""
-    total = 0.0
+    largest, total = 0.0, 0.0
     for i in range(n):
-        total += (run.y[i] - other.y[i]) ** 2
-    return math.sqrt(total)
+        largest = max(largest, abs(run.y[i] - other.y[i]))
+    for i in range(n if largest > 0.0 else 0):
+        # Squares of the differences themselves may leave the range of floats.
+        share = (run.y[i] - other.y[i]) / largest
+        total += share * share
+    return largest * math.sqrt(total)
 
 
 @njit(**KERNEL)

@@ -241,8 +241,8 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
         )
     # The first estimates are far off, so the limits fit the later nine tenths.
     low, high = (values - errors)[shown], (values + errors)[shown]
-    late = spectrum.history[len(spectrum.growths) // 10 :, shown]
-    bottom, top = min(*low, late.min(), 0.0), max(*high, late.max(), 0.0)
+    late = spectrum.history[len(spectrum.growths) // 10 :, shown].ravel()
+    bottom, top = min(*low, *late, 0.0, 0.0), max(*high, *late, 0.0, 0.0)
     margin = 0.1 * (top - bottom) or 1.0
     ax.set_ylim(bottom - margin, top + margin)
     return ax

@@ -96,8 +96,12 @@ class LyapunovSpectrum:
 
     @property
     def sum_defect(self) -> float:
-        """Sum of the exponents minus the sum rule; it does not detect most errors of the tangents."""
-        return float(self.exponents.sum() - self.sum_rule)
+        """Sum of the exponents minus the sum rule; it does not detect most errors of the tangents.
+
+        It is zero if both are minus infinity.
+        """
+        total = float(self.exponents.sum())
+        return 0.0 if total == self.sum_rule else total - self.sum_rule
 
     def to_xarray(self) -> xarray.Dataset:
         """The spectrum with the names of a chart; with a history also ``growths`` over the axis ``time``."""
@@ -284,6 +288,8 @@ class Estimate:
         if transient:
             _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
             self._replace_annihilated()
+            # A vector of which only rounding was left is by now a new direction, like those at the start.
+            trajectory.run.indistinct = 0
         mean, batches = TaperedMean(k + 1), new_batches(k + 1)
         jumps, steps = trajectory.jumps, int(trajectory.run.steps)
         self.grazed_growth = trajectory.run.ill_conditioned_growth

@@ -80,20 +80,19 @@ class TwoOrbitExponents:
     @property
     def single_piece(self) -> np.ndarray:
         """Formula (7), ``(M,)``; minus infinity where the orbits coincide."""
-        return _log(self.distances / self.separation) / self._elapsed
+        return _log_ratio(self.distances, self.separation) / self._elapsed
 
     @property
     def telescoped(self) -> np.ndarray:
         """Formula (8), ``(M,)``, summed term by term; minus infinity from the first coincidence on."""
         before = np.concatenate([[self.separation], self.distances[:-1]])
-        ratios = np.divide(self.distances, before, out=np.zeros_like(before), where=before > 0)
         # The distance may leave zero again by rounding, but the sum stays minus infinity.
-        return np.cumsum(_log(ratios)) / self._elapsed
+        return np.cumsum(_log_ratio(self.distances, before)) / self._elapsed
 
     @property
     def undivided(self) -> np.ndarray:
         """Formula (9), ``(M,)``; minus infinity from the first coincidence on."""
-        return np.cumsum(_log(self.distances / self.separation)) / self._elapsed
+        return np.cumsum(_log_ratio(self.distances, self.separation)) / self._elapsed
 
     @property
     def renormalised(self) -> np.ndarray:
@@ -196,13 +195,16 @@ def two_orbit_exponents(
         companions = [_companion(reference, offset, parameters, solver) for _ in range(2)]
         distances, status = _follow(reference, companions, separation, length, intervals, bar)
     free, renormalised = distances.T
-    growths = _log(renormalised / separation) / length
+    growths = _log_ratio(renormalised, separation) / length
     return TwoOrbitExponents(free.copy(), growths, separation, length, status)
 
 
-def _log(ratios: np.ndarray) -> np.ndarray:
+def _log_ratio(distances: np.ndarray, before: np.ndarray | float) -> np.ndarray:
+    """Logarithms of quotients, which may leave the range of numbers; minus infinity where either is zero."""
+    known = (distances > 0) & (np.asarray(before) > 0)
     with np.errstate(divide="ignore"):
-        return np.log(ratios)
+        logs = np.log(distances)
+        return np.subtract(logs, np.log(before), out=np.full_like(logs, -np.inf), where=known)
 
 
 def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarray:
@@ -210,12 +212,14 @@ def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarra
     if direction is None:
         return np.full(n, 1.0 / math.sqrt(n))
     vector = arguments.numbers("direction", direction, f"be a finite vector of shape ({n},), not zero")
-    norm = np.linalg.norm(vector)
-    if vector.shape != (n,) or not (np.isfinite(norm) and norm > 0):
+    largest = np.abs(vector).max(initial=0.0)
+    if vector.shape != (n,) or not 0.0 < largest < math.inf:
         raise ArgumentError(
             f"direction must be a finite vector of shape ({n},), not zero; got {arguments.shown(direction)}."
         )
-    return vector / norm
+    # The squares of its components may leave the range of numbers.
+    shares = vector / largest
+    return shares / np.linalg.norm(shares)
 
 
 def _skip(trajectory: Trajectory, intervals: int, interval: float) -> int:
@@ -239,12 +243,12 @@ def _companion(
         companion = start(*place, parameters=parameters, solver=solver)
     except ArgumentError:
         companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
-        # The companion takes the sides of the guards from the reference, as if it had crossed any guard
-        # between the two orbits.
-        companion.run.side[:] = reference.run.side
-        companion.run.previous_mode = companion.run.mode
-    companion.run.cycle = reference.run.cycle
-    companion.run.phase, companion.run.phase_low = reference.run.phase, reference.run.phase_low
+    if companion.mode == reference.mode:
+        # It is as if the companion had come from the reference, and had crossed any guard between the two.
+        companion.goes_on_from(reference)
+    else:
+        companion.run.cycle = reference.run.cycle
+        companion.run.phase, companion.run.phase_low = reference.run.phase, reference.run.phase_low
     return companion
 
 

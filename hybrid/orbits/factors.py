@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from hybrid.kernels.types import codes
+from hybrid.orbits.closing import jumps_at_once, same_time
 from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues, rowwise_qr
 from hybrid.simulation.periods import split_time
 from hybrid.simulation.trajectory import Trajectory
@@ -83,11 +84,14 @@ class _Products:
             # SciPy's linear algebra takes long to import.
             from scipy.linalg import matrix_balance
 
-            [units, _] = matrix_balance(own, permute=False, separate=True)[1]
+            # SciPy makes whole numbers of the units too, as if they were a permutation.
+            with np.errstate(invalid="ignore"):
+                [units, _] = matrix_balance(own, permute=False, separate=True)[1]
         return Factors([*self.matrices, vectors], self.singular, units, code)
 
     def _measure(self, vectors: np.ndarray) -> None:
-        self.sizes += np.abs(vectors @ self.basis.T)
+        if np.all(np.isfinite(vectors)):
+            self.sizes += np.abs(vectors @ self.basis.T)
 
 
 def fundamental_eigenvalues(start: Callable[[], Trajectory], t: float) -> ProductEigenvalues:
@@ -110,7 +114,7 @@ def fundamental_eigenvalues(start: Callable[[], Trajectory], t: float) -> Produc
 
 
 def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> Factors:
-    """Advance to ``t``; returns the fundamental matrix as factors.
+    """Advance one period, to ``t``; returns the fundamental matrix as factors.
 
     The trajectory carries ``n`` tangent vectors. The factors are the upper triangles of ``A_j Q_{j-1} = Q_j
     R_j``, and the last ``Q`` with what follows, all in ``units (n,)`` of the states. The jumps of one instant
@@ -118,6 +122,7 @@ def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> 
     """
     run = trajectory.run
     place, record = split_time(t, trajectory.model.period), trajectory.no_record()
+    repeats = jumps_at_once(trajectory)
     implicit = bool(trajectory.method.implicit)
     products = _Products(trajectory, units)
     strained = False
@@ -143,6 +148,8 @@ def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> 
             if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
                 products.orthonormalise()
                 strained = False
+        if code == codes.MAX_JUMPS and repeats and same_time(trajectory.t, t, trajectory.model.period):
+            return products.ended(codes.DONE)
         if code == codes.MAX_JUMPS:
             if strained:
                 products.orthonormalise()

@@ -7,6 +7,17 @@ import numpy as np
 
 from hybrid.status import Status
 
+EPSILON = float(np.finfo(float).eps)
+# Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
+# when Newton's method makes no more progress.
+ROUNDING_OF_GAP = 100
+
+
+def length(vector: np.ndarray) -> float:
+    """Euclidean length of a vector; the squares of its components may leave the range of numbers."""
+    largest = float(np.abs(vector).max())
+    return largest * float(np.linalg.norm(vector / largest)) if 0.0 < largest < np.inf else largest
+
 
 @attrs.frozen(eq=False)
 class Point:
@@ -45,9 +56,19 @@ class Shot:
         """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
         return self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
 
+    @property
+    def rounding(self) -> np.ndarray:
+        """The gap ``(n,)`` that rounding of the start and of the end may make."""
+        share = ROUNDING_OF_GAP * EPSILON * self.magnitude
+        return np.asarray(share + np.abs(self.fundamental) @ share)
+
+    def growth(self, scale: np.ndarray) -> float:
+        """The largest modulus of a multiplier: errors of the start grow by that."""
+        return float(np.abs(np.linalg.eigvals(self.fundamental / scale[:, None] * scale)).max())
+
     def size(self, scale: np.ndarray) -> float:
         """The residual in units of ``scale (n,)``, infinite where there is none."""
-        return float(np.linalg.norm(self.gap / scale)) if self.whole else np.inf
+        return length(self.gap / scale) if self.whole else np.inf
 
     def closes(self, tolerance: float, rounding: np.ndarray) -> bool:
         """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component."""
@@ -59,8 +80,8 @@ class Newton:
     """Newton's step in units of ``scale (n,)``, so that the units of the states do not matter.
 
     ``first (n,)`` is the scale of the first shot, ``moved (n,)`` is how far the last step went; where the
-    period is unknown too the state stays in the plane ``plane (n,)`` through ``anchor (n,)``, across the
-    field there.
+    period is unknown too the state stays in the plane ``plane (n,)``, in units of ``first``, through
+    ``anchor (n,)``, across the field there.
     """
 
     scale: np.ndarray
@@ -74,7 +95,7 @@ class Newton:
     def begin(cls, shot: Shot, atol: float, free_period: bool) -> Newton:
         """From the first shot; sizes below the solver's absolute tolerance count as that."""
         scale = np.maximum(shot.magnitude, max(atol, np.finfo(float).tiny))
-        return cls(scale, scale, np.zeros_like(scale), free_period, shot.point.x, shot.field / scale**2)
+        return cls(scale, scale, np.zeros_like(scale), free_period, shot.point.x, shot.field / scale)
 
     def advanced(self, shot: Shot, better: Shot) -> Newton:
         """After the step from a shot to a better one."""
@@ -121,5 +142,5 @@ class Newton:
 
     def _across(self) -> np.ndarray:
         """The unit normal ``(n,)`` of the plane."""
-        row = self.plane * self.scale
+        row = self.plane * (self.scale / self.first)
         return np.asarray(row / max(float(np.linalg.norm(row)), np.finfo(float).tiny))

@@ -12,13 +12,15 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
+from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.labelled import labelled_orbit
-from hybrid.orbits.newton import Newton, Point, Shot
+from hybrid.orbits.newton import EPSILON, ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.periods import split_time
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
@@ -38,10 +40,8 @@ SHORTEST_PERIOD = 1e-3
 MOST_JUMPS_LOOKED_AT = 10_000
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
-EPSILON = float(np.finfo(float).eps)
-# Rounding of the end of an orbit, in units in the last place of its largest states: the smallest gap that
-# Newton's method can reach, and the largest gap accepted when the method makes no more progress.
-FINEST_GAP, ROUNDING_OF_GAP = 4, 100
+# The smallest gap that Newton's method can reach, in units in the last place of the largest states.
+FINEST_GAP = 4
 # An autonomous orbit moves by more than this many times the accepted rounding.
 LEAST_MOTION = 1e3
 # Share of its states by which a point that hardly moves may still be wrong.
@@ -120,7 +120,7 @@ class PeriodicOrbit:
         return labelled_orbit(self)
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
-        """The orbit over one period."""
+        """The orbit over one period, with the jumps at both ends if it jumps at its point."""
         span = (self.t0, self.t0 + self.period)
         return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
 
@@ -150,7 +150,8 @@ def periodic_orbit(
     system, parameters
         As for :func:`hybrid.simulate`.
     x0, mode
-        Guess of a point of the orbit ``(n,)``, and the mode there.
+        Guess of a point of the orbit ``(n,)``, and the mode there. If the orbit of a forced system jumps at
+        ``t0``, its point is the state before the jump.
     t0, periods
         Time at the guess, and number of forcing periods (forced systems).
     period
@@ -193,7 +194,9 @@ def periodic_orbit(
     max_iterations = arguments.count("max_iterations", max_iterations, 0)
     guess = system.variables.state_values("x0", x0)
     t0 = arguments.number("t0", t0)
-    tolerance = arguments.positive("tolerance", tolerance)
+    tolerance = arguments.positive("tolerance", tolerance, "be above 0 and below 1")
+    if not tolerance < 1.0:
+        raise arguments.refusal("tolerance", "be above 0 and below 1", tolerance)
     method = DOP853(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     shooting = _Shooting(system, mode, parameters, method)
     forcing = system.forcing_period(parameters)
@@ -231,7 +234,7 @@ class _Shooting:
     def shoot(self, point: Point) -> Shot:
         trajectory = self._trajectory(point, self.mode)
         mode, field = trajectory.mode, trajectory.field()
-        code = trajectory.advance(point.t + point.period, trajectory.no_record())
+        code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
         return Shot(
@@ -374,7 +377,7 @@ class _Shooting:
             multipliers=eigenvalues.values,
             log_moduli=eigenvalues.log_moduli,
             fundamental=shot.fundamental,
-            residual=float(np.linalg.norm(shot.gap)),
+            residual=length(shot.gap),
             iterations=iterations,
             signature=self._signature(shot),
             status=status,
@@ -390,7 +393,7 @@ class _Shooting:
             lambda: self._trajectory(shot.point, shot.mode), shot.point.t + shot.point.period
         )
 
-    def _drifts(self, shot: Shot, newton: Newton, tolerance: float, rounding: np.ndarray) -> bool:
+    def _drifts(self, shot: Shot, newton: Newton, tolerance: float) -> bool:
         """Whether the part of the gap that no step removes is more than the error of the solver.
 
         A solution that drifts does so at any tolerance.
@@ -399,12 +402,16 @@ class _Shooting:
         if not finer.whole:
             return True
         rough, drift = (newton.drift(shot, each, np.sqrt(tolerance)) for each in (shot, finer))
-        noise = np.maximum(np.abs(rough - drift) / TIGHTER, rounding[:, None])
+        noise = np.maximum(np.abs(rough - drift) / TIGHTER, shot.rounding[:, None])
         return bool(np.any(np.abs(drift) > noise))
 
     def _signature(self, shot: Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)
-        return (shot.mode, *(jump.target for jump in arc.jumps if jump.target is not None))
+        jumps, forcing = list(arc.jumps), self.system.forcing_period(self.parameters) or 0.0
+        if jumps and jumps[0].t == shot.point.t:
+            end = shot.point.t + shot.point.period
+            jumps = [jump for jump in jumps if not same_time(jump.t, end, forcing)]
+        return (shot.mode, *(jump.target for jump in jumps if jump.target is not None))
 
     def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""
@@ -428,7 +435,8 @@ class _Shooting:
         return Status(
             StatusCode.NOT_CONVERGED,
             f"Newton's method did not converge: {reason}.",
-            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations.",
+            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states "
+            "are small, give a solver= with a lower atol.",
         )
 
     def _objection(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> str | None:
@@ -441,11 +449,22 @@ class _Shooting:
         """
         if shot.end_mode != shot.mode:
             return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
-        rounding = ROUNDING_OF_GAP * EPSILON * (shot.magnitude + np.abs(shot.fundamental) @ shot.magnitude)
+        if not shot.whole:
+            return "the tangent vectors left the range of numbers"
+        growth = shot.growth(newton.scale)
+        if not growth * EPSILON < 1.0:
+            return (
+                f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
+            )
+        largest = np.abs([newton.anchor, shot.point.x, shot.end]).max()
+        if 0.0 < largest <= self.solver.atol:
+            return (
+                f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
+            )
         # A component that is below the solver's absolute tolerance throughout counts as zero.
         nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
-        if not shot.closes(tolerance, np.maximum(rounding, nothing)):
-            return f"the residual is {np.linalg.norm(shot.gap):.3g} after {iterations} iterations"
+        if not shot.closes(tolerance, np.maximum(shot.rounding, nothing)):
+            return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
         noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
         if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
             return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
@@ -456,9 +475,9 @@ class _Shooting:
         near = np.all((shot.extent <= FARTHEST * newton.first) & (np.abs(shot.gap) <= DRIFT * shot.extent))
         sizes = np.where(shot.extent > noise, shot.extent, shot.magnitude)
         settled = np.all(np.abs(newton.moved) <= np.maximum(SETTLED * sizes, noise))
-        if near and settled and not self._drifts(shot, newton, tolerance, rounding):
+        if near and settled and not self._drifts(shot, newton, tolerance):
             return None
         return (
-            f"the ends agree to {np.linalg.norm(shot.gap):.3g}, but the next step would move the start by "
-            f"{np.linalg.norm(step):.3g}: the solution drifts, or no orbit is near"
+            f"the ends agree to {length(shot.gap):.3g}, but the next step would move the start by "
+            f"{length(step):.3g}: the solution drifts, or no orbit is near"
         )

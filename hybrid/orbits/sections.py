@@ -289,7 +289,7 @@ def crossings(
         record.used[:] = 0
         limit = min(trajectory.max_steps, steps_at_point + STEPS_BETWEEN_POINTS)
         # Not more jumps than are wanted, so that the run does not go on beyond the last one.
-        most = int(run.jumps) + points - found
+        most = min(int(run.jumps) + points - found, UNLIMITED)
         code = trajectory.advance_to(
             UNLIMITED if model.period else 0, np.inf, record, max_steps=limit, max_jumps=most
         )

@@ -136,6 +136,17 @@ class Trajectory:
         if self.run.stage == codes.READY:
             self.run.stage = codes.STALE
 
+    def goes_on_from(self, other: Trajectory) -> None:
+        """Take the time of another run in the same mode, and the sides of guards: what has fired is over.
+
+        The system may be that of the other run with markers, which come first.
+        """
+        run, before = self.run, other.run
+        run.cycle, run.phase, run.phase_low = before.cycle, before.phase, before.phase_low
+        markers = len(run.side) - len(before.side)
+        run.side[markers:], run.on_guard[markers:], run.due[:] = before.side, before.on_guard, 0
+        run.previous_mode = run.mode
+
     def jacobian(self) -> np.ndarray:
         """``D_x f`` of the current mode at the current point, ``(n, n)``."""
         run, n = self.run, self.model.dimension

@@ -249,7 +249,7 @@ def table(made):
                 "t0": [*NUMBER, *BIG_TIMES],
                 "periods": [0, *COUNT],
                 "period": OPTIONAL_NUMBER,
-                "tolerance": POSITIVE,
+                "tolerance": [*POSITIVE, 1.0, 10],
                 "max_iterations": COUNT,
             },
         ),

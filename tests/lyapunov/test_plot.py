@@ -134,6 +134,31 @@ def test_noise_is_white_and_a_few_large_values_leave_colours_to_the_rest():
     assert ax.figure.axes[1].get_ylabel() == "$\\lambda_{1}$ (1/s)"
 
 
+@pytest.mark.parametrize(("lost", "shown"), [((0.0, 0.0), 0), ((0.0, 1.0), 1), ((1.0, 1.0), 2)])
+def test_a_spectrum_without_finite_exponents_is_drawn_too(lost, shown):
+    """Each period a reset takes all of a state, or nothing."""
+    system = hybrid.HybridSystem(
+        state=("q", "v"),
+        parameters={"q": 1.0, "v": 1.0},
+        modes=[hybrid.Mode("on", lambda t, x, p: (-x.q, -2 * x.v))],
+        transitions=[
+            hybrid.Transition(
+                "on",
+                "on",
+                hybrid.Guard(lambda t, x, p: np.sin(2 * np.pi * (t - 0.5)), +1),
+                hybrid.Reset(lambda t, x, p: (p.q * x.q, p.v * x.v)),
+            )
+        ],
+        period=1.0,
+    )
+    values = dict(zip("qv", lost, strict=True))
+    spectrum = lyapunov.lyapunov_spectrum(system, (0.1, 0.2), parameters=values, intervals=10)
+    assert np.isfinite(spectrum.exponents).sum() == shown
+    ax = hybrid.plot.plot(spectrum)
+    bottom, top = ax.get_ylim()
+    assert -10 < bottom < top < 10
+
+
 def test_the_kind_needs_no_forcing():
     """Van der Pol's oscillator comes to rest, or to its limit cycle."""
     cycle = hybrid.HybridSystem(

@@ -106,6 +106,8 @@ def test_a_collapsed_direction_is_minus_infinity():
     assert result.exponents[0] == pytest.approx(0.0, abs=1e-4)
     assert result.exponents[1] == -np.inf
     assert result.standard_error[1] == 0.0
+    assert result.sum_rule == -np.inf
+    assert result.sum_defect == 0.0
 
 
 def test_without_history_memory_does_not_grow():
@@ -411,3 +413,22 @@ def test_the_default_interval_does_not_depend_on_the_units_of_the_states(field, 
     )
     spectrum = lyapunov.lyapunov_spectrum(system, x0, intervals=2, transient=0)
     assert spectrum.interval == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", [2.0**-40, 1.0, 2.0**40])
+def test_speeds_in_units_far_from_those_of_places(unit):
+    """The first vectors, alike in all components, are parallel to rounding until they have turned."""
+
+    def fields(t, x, p):
+        q1, q2, v1, v2 = x[0] / p.unit, x[1] / p.unit, x[2] * p.unit, x[3] * p.unit
+        forces = -0.4 * v1 - 0.03 * q1, -0.6 * v2 - 0.08 * q2
+        return v1 * p.unit, v2 * p.unit, forces[0] / p.unit, forces[1] / p.unit
+
+    system = hybrid.HybridSystem(
+        state=4, parameters={"unit": 1.0}, modes=[hybrid.Mode("on", fields)], period=1.0
+    )
+    spectrum = lyapunov.lyapunov_spectrum(
+        system, np.zeros(4), parameters={"unit": unit}, intervals=3000, transient=300
+    )
+    assert spectrum.status.ok
+    np.testing.assert_allclose(spectrum.exponents, [-0.1, -0.2, -0.3, -0.4], atol=1e-6)

@@ -224,3 +224,20 @@ def test_a_renormalised_companion_is_put_into_the_mode_of_the_orbit():
     expected = [np.log(np.hypot(0.1, 1.0) / 0.1) / 0.2, 0.0, 0.0]
     np.testing.assert_allclose(result.renormalised_growths, expected, atol=1e-9)
     np.testing.assert_allclose(result.distances, [np.hypot(0.1, 1.0), 0.1, 0.1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rate", "separation"), [(-400.0, 1e-8), (-1.0, 1e-200), (600.0, 1e-250), (1.0, 1e180)]
+)
+def test_distances_whose_squares_or_quotients_no_number_holds(rate, separation):
+    """At rest at zero nothing rounds a distance off."""
+    system = hybrid.HybridSystem(
+        state=("x", "y"), modes=[hybrid.Mode("only", lambda t, x, p: (rate * x.x, rate * x.y))], period=1.0
+    )
+    result = lyapunov.two_orbit_exponents(
+        system, (0.0, 0.0), intervals=1, separation=separation, direction=(3e-200, 4e-200)
+    )
+    np.testing.assert_allclose(result.renormalised_growths, rate, rtol=1e-9)
+    np.testing.assert_allclose(result.single_piece, rate, rtol=1e-9)
+    np.testing.assert_allclose(result.undivided, rate, rtol=1e-9)
+    np.testing.assert_allclose(result.telescoped, rate, rtol=1e-9)

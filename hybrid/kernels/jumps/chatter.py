@@ -251,21 +251,33 @@ def chatter_matrix(model, run, transition, work):
 
 
 @njit(**KERNEL)
-def along_mean(model, run, transition, t, x, direction, out, work):
-    """Derivative of the mean field at ``x (n,)`` in a direction, into ``out (n,)``, by a difference."""
-    n, place, below = model.dimension, work.reset_jacobian[0], work.new
-    size, length = 1e-3, 0.0
+def along_mean(model, run, transition, t, x, direction, span, out, work):
+    """Derivative of the mean field at ``x (n,)`` in a direction, into ``out (n,)``.
+
+    That of the guard's acceleration is a central difference. It moves no component by more than a share of
+    the component's size, or of the way that the component goes in the time ``span``.
+    """
+    n, place, mean = model.dimension, work.reset_jacobian[0], work.new
+    mean_field(model, run, transition, t, x, mean, work)
+    step = math.inf
     for i in range(n):
-        size, length = max(size, abs(x[i])), max(length, abs(direction[i]))
-    step = 6e-6 * size / length if length > 0.0 else 1.0
+        size = max(abs(x[i]), run.scale[i], span * abs(mean[i]))
+        if size > 0.0 and direction[i] != 0.0:
+            step = min(step, 6e-6 * size / abs(direction[i]))
+    step = step if step < math.inf else 1.0
+    model.field_jacobian(run.mode, t, x, model.parameters, work.jacobian)
+    for i in range(n):
+        out[i] = 0.0
+        for j in range(n):
+            out[i] += work.jacobian[i, j] * direction[j]
     for i in range(n):
         place[i] = x[i] + step * direction[i]
-    mean_field(model, run, transition, t, place, out, work)
+    change = mean_field(model, run, transition, t, place, mean, work)
     for i in range(n):
         place[i] = x[i] - step * direction[i]
-    mean_field(model, run, transition, t, place, below, work)
+    change -= mean_field(model, run, transition, t, place, mean, work)
     for i in range(n):
-        out[i] = (out[i] - below[i]) / (2.0 * step)
+        out[i] -= change / (2.0 * step) * run.trail[IMPULSE, i]
 
 
 @njit(**KERNEL)
@@ -279,7 +291,7 @@ def drift_with_mean(model, run, transition, span, work):
         for i in range(n):
             column[i] = work.saltation[i, j]
         for order in range(1, 3):
-            along_mean(model, run, transition, t, middle, column, image, work)
+            along_mean(model, run, transition, t, middle, column, span, image, work)
             for i in range(n):
                 column[i] = image[i] * span / order
                 work.saltation[i, j] += column[i]
@@ -326,18 +338,6 @@ def add_change_of_duration(model, method, run, target, span, work):
             for j in range(n):
                 work.saltation[i, j] += excess[i] * run.instant[j]
     return apart
-
-
-@njit(**KERNEL)
-def size_of(matrix, n):
-    """Largest row sum of the first ``n`` columns."""
-    largest = 0.0
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total += abs(matrix[i, j])
-        largest = max(largest, total)
-    return largest
 
 
 @njit(**KERNEL)

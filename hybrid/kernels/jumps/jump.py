@@ -25,8 +25,8 @@ from hybrid.kernels.jumps.chatter import (
     chatter_matrix,
     drift,
     drift_is_known,
+    feedback,
     remember_impulse,
-    size_of,
 )
 from hybrid.kernels.jumps.locked import (
     begin_at_start,
@@ -349,7 +349,7 @@ def follow_impacts(task, transition, remaining):
     if tangents > 0:
         if not drift_is_known(model, run, target, span, work):
             return False
-        steep = span * size_of(work.jacobian, model.dimension)
+        steep = span * feedback(work.jacobian, model.dimension)
     x_limit = work.settled
     if not way_is_free(model, method, run, 1, span, work):
         return False

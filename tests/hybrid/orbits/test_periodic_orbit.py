@@ -286,6 +286,50 @@ class TestNoOrbit:
         orbit = periodic_orbit(system, (unit, 0.0), period=6.0)
         assert orbit.status.code == StatusCode.NOT_CONVERGED
 
+    @pytest.mark.parametrize("unit", [1e-16, 1e-20, 1e-30])
+    def test_states_that_the_solver_does_not_control_are_none(self, unit):
+        """They are below its absolute tolerance; with a lower one the orbit is found."""
+        system = HybridSystem(
+            state=("q", "v"),
+            parameters={"unit": unit},
+            modes=[
+                Mode(
+                    "on",
+                    lambda t, x, p: (x.v, -x.q - x.v - (x.q / p.unit) ** 3 * p.unit + p.unit * np.cos(t)),
+                )
+            ],
+            period=2 * np.pi,
+        )
+        guess = np.array([-0.3, 0.5])
+        orbit = periodic_orbit(system, guess * unit)
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+        assert "below the atol of the solver" in orbit.status.message
+        assert "lower atol" in orbit.status.remedy
+        found = periodic_orbit(system, guess * unit, solver=hybrid.DOP853(rtol=1e-12, atol=1e-14 * unit))
+        wanted = periodic_orbit(system, guess, parameters={"unit": 1.0})
+        assert found.status.ok
+        np.testing.assert_allclose(found.x0 / unit, wanted.x0, rtol=1e-9)
+        np.testing.assert_allclose(found.multipliers, wanted.multipliers, rtol=1e-9)
+
+    @pytest.mark.parametrize("rate", [40.0, 300.0])
+    def test_an_orbit_whose_errors_outgrow_it_is_none(self, rate):
+        """The orbit is known to rounding, and after one period its error is larger than all else."""
+        system = HybridSystem(
+            state=("q",),
+            modes=[Mode("on", lambda t, x, p: (rate * x.q + np.cos(2 * np.pi * t),))],
+            period=1.0,
+        )
+        orbit = periodic_orbit(system, (-1 / rate,))
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+        assert "errors of the start grow by a factor of" in orbit.status.message
+
+    @pytest.mark.parametrize("size", [1e20, 1e160, 1e200, 1e308])
+    @pytest.mark.parametrize("period", [None, 3.0])
+    def test_a_guess_out_of_all_proportion_is_none(self, size, period):
+        ball = {"system": bouncing_ball(), "period": period} if period else {"system": OSCILLATOR}
+        orbit = periodic_orbit(x0=(-size, size) if period is None else (size, 0.0), **ball)
+        assert not orbit.status.ok
+
     def test_a_drift_that_the_forcing_hides_is_none(self):
         system = HybridSystem(
             state=("q",),
@@ -311,7 +355,7 @@ class TestNoOrbit:
                 "period is for autonomous systems; this one has the forcing period",
             ),
             (OSCILLATOR, {"periods": 0}, "periods must be a whole number of at least 1; got 0"),
-            (OSCILLATOR, {"tolerance": 0.0}, "tolerance must be positive; got 0.0"),
+            (OSCILLATOR, {"tolerance": 0.0}, "tolerance must be above 0 and below 1; got 0.0"),
             (OSCILLATOR, {"max_iterations": -1}, "max_iterations must be a whole number of at least 0"),
             (OSCILLATOR, {"t0": math.inf}, "t0 must be finite"),
             (OSCILLATOR, {"x0": (0.0,)}, r"x0 has shape \(1,\)"),

@@ -145,6 +145,15 @@ class TestPoincare:
         for field in ("t", "x", "jumps"):
             np.testing.assert_array_equal(getattr(late, field), getattr(whole, field)[7:])
 
+    def test_counts_as_large_as_numbers_get(self):
+        most = 2**63 - 1
+        apex = hybrid.Guard(lambda t, x, p: x.v, -1)
+        few = hybrid.DOP853(max_steps=100)
+        section = poincare_section(
+            impact_oscillator(), (0.0, 0.0), apex, points=most, transient=most, solver=few
+        )
+        assert section.status.code == hybrid.StatusCode.MAX_STEPS
+
     def test_accumulation_ends_it(self):
         section = poincare_section(BALL, (1.0, 0.0), Guard(lambda t, x, p: x.q - 0.5, -1), points=9)
         assert len(section) == 2

@@ -109,3 +109,17 @@ def test_how_near_to_a_surface_a_start_slides_does_not_depend_on_units(unit):
     on = hybrid.simulate(sliding, (0.1, 1e3 * unit), (0.0, 1.0))
     assert on.mode[0] == "sliding"
     assert not len(on.jumps)
+
+
+@pytest.mark.parametrize("far", [1e15, 1e25, 1e40])
+def test_multipliers_of_states_in_units_far_apart(far):
+    """A shear in units far apart: ``q' = far v - q``, ``v' = -2 v``, both forced to zero."""
+    system = HybridSystem(
+        state=("q", "v"),
+        parameters={"far": 1.0},
+        modes=[Mode("on", lambda t, x, p: (p.far * x.v - x.q, -2.0 * x.v))],
+        period=1.0,
+    )
+    orbit = hybrid.periodic_orbit(system, (0.0, 0.0), parameters={"far": far})
+    assert orbit.status.ok
+    np.testing.assert_allclose(orbit.multipliers, np.exp([-1.0, -2.0]), rtol=1e-9)
