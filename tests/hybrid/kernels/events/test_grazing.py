@@ -110,6 +110,17 @@ class TestTouches:
         touch = run(0.0, guard)
         assert len(touch.grazings) == 1 or [jump.kind for jump in touch.jumps] == ["grazing", "grazing"]
 
+    @pytest.mark.parametrize("guard", GUARDS)
+    @pytest.mark.parametrize("direction", [-1, 0, +1])
+    @pytest.mark.parametrize("share", [3 / 8, 1 / 2, 3 / 4])
+    def test_a_touch_between_two_pieces_of_its_step_is_kept(self, share, direction, guard):
+        """The flight is one step, which is halved until the guard turns at an end of its pieces."""
+        arc = run(0.0, guard, direction, end=1.0 / share)
+        assert (arc.steps, len(arc.jumps)) == (1, 0)
+        [grazing] = arc.grazings
+        assert grazing.t == pytest.approx(1.0, abs=1e-7)
+        assert grazing.value == pytest.approx(0.0, abs=1e-15)
+
     @pytest.mark.parametrize("c", [1e-3, 1e-6, 1e-8])
     def test_a_clear_miss_is_not(self, c):
         assert run(c).grazings == ()
