@@ -63,6 +63,7 @@ def system(period=0.0):
                 Guard(hidden, +1, gradient=lambda t, x, p: (x.b, x.a, 0.6 * x.c, -0.5 + 0.0 * t)),
                 name="hidden",
             ),
+            Transition("m", "m", Guard(lambda t, x, p: x.a * np.cos(2.0 * t) - x.b, +1), name="turning"),
         ],
     )  # fmt: skip
 
@@ -81,17 +82,34 @@ def jacobian(t, x):
     )
 
 
-def gradient(name, x):
-    return np.array([0.5, -2.0, 0.25, -3.0]) if name == "affine" else np.array([x[1], x[0], 0.6 * x[2], -0.5])
+def gradient(name, t, x):
+    if name == "affine":
+        return np.array([0.5, -2.0, 0.25, -3.0])
+    if name == "turning":
+        return np.array([np.cos(2 * t), -1.0, 0.0, -2 * x[0] * np.sin(2 * t)])
+    return np.array([x[1], x[0], 0.6 * x[2], -0.5])
 
 
-@pytest.mark.parametrize("name", ["affine", "bent", "hidden"])
+def turning(name, t, x, f):
+    """Derivatives of the speed along given rates, by the states and by time."""
+    if name == "affine":
+        return np.zeros(4)
+    if name == "turning":
+        slope = 2 * np.sin(2 * t)
+        return np.array([-slope, 0.0, 0.0, -slope * f[0] - 4 * x[0] * np.cos(2 * t)])
+    return np.array([f[1], f[0], 0.6 * f[2], 0.0])
+
+
+NAMES = ["affine", "bent", "hidden", "turning"]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_values_speeds_and_accelerations_with_their_rounding(name):
     trajectory = start(system(), X, T, mode="m", solver=DOP853(rtol=1e-5, atol=1e-4))
     trajectory.run.scale[:] = SCALE
-    out, transition = np.zeros(7), ["affine", "bent", "hidden"].index(name)
+    out, transition = np.zeros(7), NAMES.index(name)
     judged(trajectory.model, trajectory.method, trajectory.run, transition, T, X, trajectory.work, out)
-    f, J, g = field(T, X), jacobian(T, X), gradient(name, X)
+    f, J, g = field(T, X), jacobian(T, X), gradient(name, T, X)
     share = 16 * EPSILON
     speed = g[3] + g[:3] @ f
     assert out[0] == pytest.approx(speed, rel=1e-14)
@@ -101,13 +119,13 @@ def test_values_speeds_and_accelerations_with_their_rounding(name):
     assert out[3] == pytest.approx(np.abs(g[:3]) @ (1e-4 + 1e-5 * SCALE), rel=1e-12)
     # The field may be off by its own rounding and by that of its arguments.
     spread = np.abs(f) + np.abs(J[:, 3]) * T + np.abs(J[:, :3]) @ SCALE
-    # The state turns the gradient of a bent guard.
-    turned = np.abs([f[1], f[0], 0.6 * f[2]]) @ SCALE if name != "affine" else 0.0
+    # State and time turn the gradient of a guard that is not affine.
+    bends = turning(name, T, X, f)
+    turned = np.abs(bends) @ [*SCALE, T]
     assert out[4] == pytest.approx(
         share * (abs(g[3]) + np.abs(g[:3]) @ spread + turned), rel=0.1 if turned else 1e-12
     )
-    curvature = 0.0 if name == "affine" else 2 * f[0] * f[1] + 0.6 * f[2] ** 2
-    acceleration = curvature + g[:3] @ (J[:, 3] + J[:, :3] @ f)
+    acceleration = bends[:3] @ f + bends[3] + g[:3] @ (J[:, 3] + J[:, :3] @ f)
     assert out[5] == pytest.approx(acceleration, rel=1e-12 if name != "hidden" else 1e-6)
     bend = np.abs(J[:, 3]) + np.abs(J[:, :3]) @ spread
     assert out[6] == pytest.approx(share * (np.abs(g[:3]) @ bend), rel=1e-12)
