@@ -157,10 +157,13 @@ def pushed():
         modes=[
             Mode("first", lambda t, x, p: (np.sin(t) + x.v, np.cos(3.0 * t) - x.x)),
             Mode("second", lambda t, x, p: (x.v, 1e6 * np.cos(t) - p.f - x.x)),
+            Mode("third", lambda t, x, p: (x.v, np.exp(-(((t - 3.0) / 0.01) ** 2)) - x.x)),
         ],
         transitions=[
             Transition("first", "second", Guard(lambda t, x, p: 1e6 * np.cos(t) - p.f - x.x, +1)),
             Transition("second", "first", Guard(lambda t, x, p: x.v, +1)),
+            Transition("second", "third", Guard(lambda t, x, p: x.v - 5.0, +1)),
+            Transition("third", "first", Guard(lambda t, x, p: x.v, -1)),
         ],
     )
 
@@ -184,3 +187,8 @@ def test_terms_that_cancel_leave_their_own_rounding():
     assert 1e-11 < out[0, 0] < 1e-8
     assert 1e-11 < out[1, 1] < 1e-8
     assert out[1, 0] == 0.0
+    # Beside a large state that rounding is nothing: no other terms are added.
+    trajectory.run.scale[:] = 1e9
+    bands_of_residues(trajectory.model, trajectory.run, t, x, trajectory.work, out)
+    assert out[0, 0] == pytest.approx(16 * EPSILON * 1e9, rel=1e-2, abs=0.0)
+    assert out[1, 0] == pytest.approx(16 * EPSILON * 1e9, rel=1e-2, abs=0.0)
