@@ -101,3 +101,17 @@ def test_the_paper_s_method_is_among_the_candidates(short):
     defaults, tight = rows["(e) ode23s, 1e-03, 1e-06"], rows["(e) ode23s, 1e-06, 1e-08"]
     assert float(defaults["7.4"]) < -0.15
     assert float(tight["7.4"]) == pytest.approx(-0.066, abs=0.01)
+
+
+def test_its_defaults_are_those_of_the_study(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "forcing periods to average over (default: 10000)",
+        "forcing periods to discard at the start (default: 1000)",
+        "method (default: Taylor)",
+        "relative tolerance per step (default: 1e-09)",
+        "absolute tolerance per step (default: 1e-11)",
+    ):
+        assert words in told

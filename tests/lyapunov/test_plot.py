@@ -172,7 +172,8 @@ def test_the_kind_needs_no_forcing():
 
 
 def test_a_figure_of_each_kind(line, grid):
-    assert len(plot_chart(line).axes) == 2
+    above, below = plot_chart(line).axes
+    assert above.get_shared_x_axes().joined(above, below)
     # The map and its colour bar.
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)

@@ -19,10 +19,13 @@ def test_states_times_and_exponents_are_compared_absolutely():
     assert errors_of(found, truth) == {"state": 0.5, "times": 0.125, "exponents": 0.25}
 
 
-def test_matrices_are_compared_as_shares_of_their_largest_entry():
-    exact = np.array([[4.0, 0.0], [0.0, 1.0]])
+@pytest.mark.parametrize("size", [1.0, 2.0**-10])
+def test_matrices_are_compared_as_shares_of_their_largest_entry(size):
+    exact = size * np.array([[4.0, 0.0], [0.0, 1.0]])
     truth = answer(saltation=np.array([exact, 0.0 * exact]), fundamental=exact)
-    found = answer(saltation=np.array([exact + 0.5, 0.0 * exact + 0.25]), fundamental=exact - 1.0)
+    found = answer(
+        saltation=np.array([exact + 0.5 * size, 0.0 * exact + 0.25]), fundamental=exact - 1.0 * size
+    )
     assert errors_of(found, truth) == {"state": 0.0, "saltation": 0.25, "fundamental": 0.25}
 
 

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 import models
 from hybrid import DOP853, StatusCode, Tsit5, global_error
-from hybrid.accuracy.global_error import SAFETY, _agreement, _bound, _compare
+from hybrid.accuracy.global_error import SAFETY, _agreement, _bound, _compare, _starts_alike
 from hybrid.status import SUCCESS
 from tests.cases import systems
 from tests.reference.impacts import ImpactOscillator
@@ -233,3 +233,13 @@ def test_jumps_are_compared_as_far_as_all_three_runs_agree():
     assert _compare(run, run, run).status is SUCCESS
     longer = run_with([1.0, 2.0, 3.0, 4.0, 5.0], [0, 0, 0, 0, 0], [1.0, -3.0], mode="n")
     assert np.isinf(_compare(run, longer, other).x).all()
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_first_jumps_are_alike_within_a_millionth_of_the_run(unit):
+    def run(first, transition=0):
+        return SimpleNamespace(t=[0.0, 10.0 * unit], jumps=run_with([first * unit], [transition], []).jumps)
+
+    assert _starts_alike(run(2.0), run(2.000009))
+    assert not _starts_alike(run(2.0), run(2.000011))
+    assert not _starts_alike(run(2.0), run(2.0, transition=1))

@@ -3,7 +3,7 @@
 import sympy
 
 import hybrid
-from hybrid.compiler.surfaces import surfaces
+from hybrid.compiler.surfaces import is_paired, surfaces
 
 q, v, e = sympy.symbols("q v e", real=True)
 
@@ -41,3 +41,22 @@ def test_a_transition_back_across_the_same_surface_is_paired():
     emitted = hybrid.compile_system(system).emitted
     assert emitted.surface == (0, 0)
     assert emitted.orientation[0] == -emitted.orientation[1]
+
+
+def test_pairs_are_two_directions_across_one_surface_of_one_mode():
+    def transition(name, source, guard, direction):
+        return hybrid.Transition(source, "b", hybrid.Guard(guard, direction), name=name)
+
+    system = hybrid.HybridSystem(
+        state=("q",),
+        modes=[hybrid.Mode("a", lambda t, x, p: (1.0,)), hybrid.Mode("b", lambda t, x, p: (-1.0,))],
+        transitions=[
+            transition("up", "a", lambda t, x, p: x.q - 1, +1),
+            transition("down", "a", lambda t, x, p: 3 - 3 * x.q, +1),
+            transition("once", "a", lambda t, x, p: x.q - 5, +1),
+            transition("again", "a", lambda t, x, p: 2 * x.q - 10, +1),
+            transition("elsewhere", "b", lambda t, x, p: x.q - 5, -1),
+        ],
+    )
+    emitted = hybrid.compile_system(system).emitted
+    assert [is_paired(system, emitted, i) for i in range(5)] == [True, True, False, False, False]

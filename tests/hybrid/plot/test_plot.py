@@ -61,6 +61,14 @@ def test_modes_have_colours_of_their_own_and_a_legend(contacts):
     assert [text.get_text() for text in row.get_legend().get_texts()] == ["free", "contact"]
 
 
+def test_each_component_adds_the_same_height_to_a_figure(contacts):
+    heights = [
+        plot_arc(contacts, names)[0].get_figure().get_size_inches()[1]
+        for names in (["x1"], ["x1", "v1"], ["x1", "v1", "x2"])
+    ]
+    assert np.diff(heights).tolist() == pytest.approx([1.5, 1.5])
+
+
 def test_axes_may_be_given_one_a_component(bounces):
     _, given = plt.subplots(2, 1)
     assert list(plot_arc(bounces, ax=given)) == list(given)
@@ -159,6 +167,25 @@ def test_graph_shows_loops_at_many_modes():
     axes.get_figure().canvas.draw()
     assert {"a", "d", "a->b ↑", "mark 0 ↕", "mark 1 ↕"} <= texts(axes)
     assert len(axes.patches) == 2
+
+
+@pytest.mark.parametrize("count", range(1, 8))
+def test_loops_stay_beside_their_modes(count):
+    """Labels are within 50 to 100 points of the middle of the mode, on whichever side the loop is."""
+    names = [f"mode {i}" for i in range(count)]
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode(name, lambda t, x, p: (1.0,)) for name in names],
+        transitions=[
+            Transition(name, target, Guard(lambda t, x, p: x.q, +1), name=f"{kind} {name}")
+            for place, name in enumerate(names)
+            for kind, target in (("loop", name), ("on", names[(place + 1) % count]))
+        ],
+    )
+    loops = [text for text in plot_graph(system).texts if text.get_text().startswith("loop")]
+    assert len(loops) == count
+    for loop in loops:
+        assert 50.0 < np.hypot(*loop.xyann) < 100.0
 
 
 def test_graph_of_many_modes_has_one_arrow_for_two_modes():

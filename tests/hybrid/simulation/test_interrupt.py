@@ -275,6 +275,12 @@ def test_bursts_grow_only_if_they_use_up_their_steps(code):
     assert (bursts.steps == interrupt.FIRST_BURST) == (code == codes.DONE)
 
 
+@pytest.mark.parametrize("steps", [(10, 4), (4, 10), (10, 10)])
+def test_one_of_several_runs_at_its_limit_of_steps_ends_them_all(steps):
+    runs = [SimpleNamespace(stop=threading.Event(), max_steps=10, steps=each) for each in steps]
+    assert interrupt.Bursts(runs).judged(codes.MAX_STEPS) == codes.MAX_STEPS
+
+
 def test_many_short_calls_of_a_kernel():
     """Two orbits of so many intervals are followed in more calls than an integer has digits."""
     found = lyapunov.two_orbit_exponents(

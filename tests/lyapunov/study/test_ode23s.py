@@ -33,6 +33,17 @@ def linear_jacobian(t, y):
     return LINEAR
 
 
+def slow(t, y, p, out):
+    """``linear`` with a thousand units of time in place of one."""
+    out[0] = (-0.5 * y[0] + 3.0 * y[1] + math.sin(2e-3 * t)) / 1000.0
+    out[1] = (-3.0 * y[0] - 0.5 * y[1] + y[2]) / 1000.0
+    out[2] = -0.04 * (y[2] - math.cos(1e-3 * t))
+
+
+def slow_jacobian(t, y):
+    return LINEAR / 1000.0
+
+
 def van_der_pol(t, y, p, out):
     out[0] = y[1]
     out[1] = 20.0 * (1.0 - y[0] ** 2) * y[1] - y[0]
@@ -96,6 +107,8 @@ def plain_ode23s(function, jacobian, y, span, rtol, atol):
 
 CASES = {
     "linear and stiff": (linear, linear_jacobian, (1.0, 0.5, 2.0), SPAN, 1e-6),
+    "from zero": (linear, linear_jacobian, (0.0, 0.0, 2.0), SPAN, 1e-3),
+    "slow": (slow, slow_jacobian, (1.0, 0.5, 2.0), (0.0, 2000.0), 1e-5),
     "van der Pol": (van_der_pol, van_der_pol_jacobian, (2.0, -0.1), (0.0, 25.0), 1e-4),
 }
 

@@ -372,3 +372,20 @@ def test_what_the_compiled_system_says():
         modes=[Mode("lag", branching, jacobian=lambda t, x, p: ((-1.0,),))],
     )
     assert "narrower than a step may be stepped over" in repr(compile_system(untraced))
+
+
+@pytest.mark.parametrize("roundings", [35, 60, 100, 170])
+def test_a_pulse_hardly_wider_than_the_rounding_of_time_is_met_in_short_steps(roundings):
+    """The status says that the steps do not resolve it."""
+    system = HybridSystem(
+        state=("q",),
+        parameters={"a": 0.0, "w": 1.0},
+        modes=[Mode("m", lambda t, x, p: (np.exp(-(((t - p.a) / p.w) ** 2)) / p.w,))],
+    )
+    parameters = {"a": 1e6 + 0.4, "w": roundings * np.spacing(1e6)}
+    arc = simulate(
+        system, (1.0,), (1e6, 1e6 + 1.0), parameters=parameters, solver=Taylor(rtol=1e-6, atol=1e-8)
+    )
+    assert arc.status.code == StatusCode.SUCCESS
+    assert "the forcing is not resolved" in arc.status.message
+    assert arc.x[-1, 0] == pytest.approx(1.0 + np.sqrt(np.pi), abs=5e-3)

@@ -40,6 +40,7 @@ def results(lines, x=X, kind=VECTOR_SIGNATURE, index=0, size=4):
         "out[0] = x[1] % x[0]",
         "out[0] = x[0] % x[1]",
         "out[0] = (-x[3]) % 2.5",
+        "out[0] = copysign(1.0, x[3] % (-2.5)) + 2*copysign(1.0, (-x[3]) % 2.5)",
         "out[0] = np.fmod(x[1], x[0])",
         "out[0] = x[0]**1.7",
         "out[0] = max(x[0], x[1], x[3], 1e-300)",

@@ -244,6 +244,22 @@ def test_powers_of_a_guard(power, kind):
     assert kinds(contact(power)) == [EXACT, kind]
 
 
+def test_half_integer_powers_of_two_guards_have_no_common_clock():
+    def field(t, x, p):
+        return x.y, (1.0 - x.x) ** 1.5 - x.x**1.5
+
+    system = HybridSystem(
+        state=("x", "y"),
+        modes=[Mode("between", field)],
+        transitions=[
+            Transition("between", None, Guard(lambda t, x, p: x.x, -1), name="left"),
+            Transition("between", None, Guard(lambda t, x, p: 1.0 - x.x, -1), name="right"),
+        ],
+    )
+    [found] = emit(system).propagators
+    assert (found.kind, found.reason) == (RUNGE_KUTTA, "it has fractional powers of more than one guard")
+
+
 def test_hunt_crossley_contact_is_desingularised():
     damped = contact(1.5, lambda x: -x.y * np.maximum(x.x, 0.0) ** 1.5)
     assert kinds(damped) == [EXACT, DESINGULARISED]

@@ -7,11 +7,11 @@ import pytest
 from numba import njit
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
-from hybrid.kernels.events import sides
+from hybrid.kernels.events import derivatives, sides
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
 from hybrid.simulation.trajectory import start
 
-_side_of = sides.side_of
+_side_of, _moment = sides.side_of, derivatives.moment_of_rounding
 EPS = np.finfo(float).eps
 # Guards of ``q`` on the ramp ``q' = r``, the sign each takes for ``r > 0`` and for ``r < 0``, and the order
 # of the derivative that tells, where ``q`` is within rounding of zero.
@@ -21,6 +21,8 @@ SHAPES = {
     "signed square": (lambda z: z * abs(z), (1, -1), {BY_SPEED, BY_STEP}),
     "square": (lambda z: z * z, (1, 1), {BY_ACCELERATION}),
     "bowl": (lambda z: -np.cosh(z) + 1.0, (-1, -1), {BY_ACCELERATION}),
+    # Speed and acceleration change sign within rounding.
+    "cube that turns": (lambda z: z**3 - 1e-29 * z, (1, -1), {BY_STEP}),
     "two slopes": (lambda z: np.where(z > 0.0, 3.0 * z, z), (1, -1), {BY_SPEED}),
 }
 SIZE = 0.7
@@ -53,6 +55,55 @@ def test_a_flat_guard_goes_where_every_state_within_rounding_goes(shape, rate):
         assert order in orders or (roundings == 0.0 and order == BY_STEP)
         # The next step shows what the point does not.
         assert order == BY_STEP or found == expected[0 if rate > 0.0 else 1]
+
+
+@cache
+def parted(bent):
+    """``q`` is at rest; ``u`` and ``w`` accelerate it in opposite directions."""
+    return HybridSystem(
+        state=("q", "u", "w"),
+        parameters={"a": 1.0, "b": 1.0},
+        modes=[Mode("run", lambda t, x, p: (x.u - x.w, p.a, p.b))],
+        transitions=[
+            Transition("run", "run", Guard(lambda t, x, p: np.sin(x.q) if bent else x.q + 0.0 * x.u))
+        ],
+    )
+
+
+@pytest.mark.parametrize("bent", [False, True])
+@pytest.mark.parametrize(
+    ("a", "b"), [(3.0, 0.5), (0.5, 3.0), (0.2, 0.1), (0.1, 0.2), (-2.0, -9.0), (-9.0, -2.0)]
+)
+def test_a_guard_at_rest_goes_where_all_forces_together_push_it(a, b, bent):
+    x = np.array([0.0, 1.0, 1.0])
+    run = start(parted(bent), x, 0.0, mode="run", parameters={"a": a, "b": b}, solver=DOP853())
+    assert side(run.model, run.run, 0.0, x, run.work) == (np.sign(a - b), BY_ACCELERATION)
+
+
+@njit
+def moment(model, run, t, x, work):
+    model.field(0, t, x, model.parameters, work.field)
+    return _moment(model, run, t, work)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_the_moment_of_rounding_is_that_of_what_moves(unit):
+
+    def found(sizes, q_rate, a, b, t):
+        parameters = {"a": a * unit, "b": b * unit}
+        run = start(parted(False), np.ones(3), 0.0, mode="run", parameters=parameters, solver=DOP853())
+        run.run.scale[:] = np.array(sizes) * unit
+        return moment(run.model, run.run, t, np.array([0.0, q_rate * unit, 0.0]), run.work)
+
+    # Largest size and largest rate, without ``w``, which is at rest.
+    assert found((3.0, 1.5, 100.0), 0.5, -2.0, 0.0, 0.7) == pytest.approx(1.5 * EPS, rel=1e-12, abs=0.0)
+    assert found((1.5, 3.0, 100.0), -4.0, 2.0, 0.0, 0.7) == pytest.approx(0.75 * EPS, rel=1e-12, abs=0.0)
+    assert found((1.0, 1.0, 1.0), 1.0 / unit, 1.0 / unit, 1.0 / unit, 0.0) == pytest.approx(
+        unit * EPS, rel=1e-12, abs=0.0
+    )
+    # The rounding of time may be larger; if nothing moves, there is no other.
+    assert found((3.0, 1.5, 100.0), 0.5, -2.0, 0.0, -9.0) == pytest.approx(9.0 * EPS, rel=1e-12, abs=0.0)
+    assert found((3.0, 1.5, 100.0), 0.0, 0.0, 0.0, 0.7) == pytest.approx(0.7 * EPS, rel=1e-12, abs=0.0)
 
 
 POWERS = {"cube": lambda z: z**3, "signed square": lambda z: z * np.abs(z), "fifth power": lambda z: z**5}

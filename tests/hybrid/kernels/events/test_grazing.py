@@ -86,6 +86,17 @@ class TestTouches:
             np.testing.assert_allclose(arc.jumps.t, chosen, rtol=0, atol=1e-14 / np.sqrt(c))
 
     @pytest.mark.parametrize("guard", GUARDS)
+    @pytest.mark.parametrize("direction", [-1, 0, +1])
+    @pytest.mark.parametrize("method", [DOP853, Tsit5])
+    def test_a_run_may_end_just_after_a_dip_within_its_tolerances(self, method, direction, guard):
+        for c in (1e-9, 1e-8, 1e-7):
+            exact = {-1: [-1.0], 0: [-1.0, 1.0], +1: [1.0]}[direction]
+            for beyond in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0):
+                end = 1.0 + (1.0 + beyond) * np.sqrt(c)
+                arc = run(-c, guard, direction, end, solver=method(rtol=1e-6, atol=1e-6))
+                np.testing.assert_allclose((arc.jumps.t - 1.0) / np.sqrt(c), exact, rtol=0, atol=1e-5)
+
+    @pytest.mark.parametrize("guard", GUARDS)
     @pytest.mark.parametrize("c", [0.0, 1e-12, 1e-13])
     def test_a_touch_within_the_tolerances_is_kept_on_the_arc(self, c, guard):
         arc = run(c, guard, solver=DOP853())
@@ -109,6 +120,17 @@ class TestTouches:
         assert run(1e-12, guard).grazings == ()
         touch = run(0.0, guard)
         assert len(touch.grazings) == 1 or [jump.kind for jump in touch.jumps] == ["grazing", "grazing"]
+
+    @pytest.mark.parametrize("guard", GUARDS)
+    @pytest.mark.parametrize("direction", [-1, 0, +1])
+    @pytest.mark.parametrize("share", [3 / 8, 1 / 2, 3 / 4])
+    def test_a_touch_between_two_pieces_of_its_step_is_kept(self, share, direction, guard):
+        """The flight is one step, which is halved until the guard turns at an end of its pieces."""
+        arc = run(0.0, guard, direction, end=1.0 / share)
+        assert (arc.steps, len(arc.jumps)) == (1, 0)
+        [grazing] = arc.grazings
+        assert grazing.t == pytest.approx(1.0, abs=1e-7)
+        assert grazing.value == pytest.approx(0.0, abs=1e-15)
 
     @pytest.mark.parametrize("c", [1e-3, 1e-6, 1e-8])
     def test_a_clear_miss_is_not(self, c):
@@ -233,3 +255,18 @@ def test_a_guard_that_is_not_affine_is_followed_from_a_turning_point():
     arc = simulate(system, (height(0.0), 0.0), (0.0, 1.0), mode="run")
     assert len(arc.jumps) in (0, 2)
     np.testing.assert_allclose(arc.jumps.t, first, atol=1e-7)
+
+
+def test_a_touch_is_kept_whatever_the_guard_would_be_outside_of_the_step():
+    """``q = (t + a) (t - b)^2`` is negative before the run begins, and touches zero on its only step."""
+    system = HybridSystem(
+        state=("q",),
+        parameters={"a": 0.5, "b": 1.0},
+        modes=[Mode("run", lambda t, x, p: ((t - p.b) ** 2 + 2.0 * (t + p.a) * (t - p.b),))],
+        transitions=[Transition("run", "run", Guard(lambda t, x, p: np.sin(x.q)))],
+    )
+    for a in (0.2, 0.5, 0.9):
+        for b in np.linspace(0.4, 1.4, 41):
+            arc = simulate(system, (a * b * b,), (0.0, 1.5), parameters={"a": a, "b": b})
+            assert (arc.steps, len(arc.jumps), len(arc.grazings)) == (1, 0, 1)
+            assert arc.grazings[0].t == pytest.approx(b, abs=1e-7)

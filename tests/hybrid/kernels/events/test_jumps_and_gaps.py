@@ -103,3 +103,26 @@ def test_a_flat_root_and_a_jump_at_one_place_fire_once_each(power, flat_first, s
             arc = simulate(system, (size, 0.0), (0.0, 10.0), parameters={"k": k}, solver=SOLVERS[solver])
             fired = list(arc.jumps.transition)
             assert [fired.count(name) for name in ("spike", "flat", "switch")] == [6, 3, 1]
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+def test_crossings_between_two_gaps_are_found(solver):
+    """The guard is a number only within 0.07 of each whole time; a step spans several of these."""
+    system = HybridSystem(
+        state=("s",),
+        modes=[Mode("run", lambda t, x, p: (1.0,))],
+        transitions=[
+            Transition(
+                "run",
+                "run",
+                Guard(lambda t, x, p: np.log(np.cos(2 * np.pi * x.s) - 0.9) + 2.5, direction),
+                name=name,
+            )
+            for name, direction in (("up", +1), ("down", -1))
+        ],
+    )
+    arc = simulate(system, (0.06,), (0.06, 6.5), solver=solver)
+    beside = np.arccos(0.9 + np.exp(-2.5)) / (2 * np.pi)
+    for name, shift in (("up", -beside), ("down", beside)):
+        found = [jump.t for jump in arc.jumps if jump.transition == name]
+        np.testing.assert_allclose(found, np.arange(1, 7) + shift, rtol=0, atol=1e-13)

@@ -1,0 +1,30 @@
+"""How far the run of a case is used: up to its first trouble."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hybrid.testing.case import _before_trouble
+
+
+@pytest.mark.parametrize(
+    ("kinds", "touches", "expected"),
+    [
+        # Without trouble all but the last stretch counts.
+        (["transverse"] * 4, [], 3.5),
+        (["transverse", "transverse", "grazing", "transverse"], [], 1.5),
+        (["transverse", "transverse", "grazing", "grazing"], [], 1.5),
+        (["transverse", "grazing", "transverse", "transverse"], [], 0.5),
+        (["transverse"] * 4, [2.5, 3.5], 1.5),
+        (["transverse", "transverse", "transverse", "grazing"], [1.5], 0.5),
+        # Half of the time up to the first trouble if no jump comes before it.
+        (["grazing"] * 4, [], 5.0),
+        (["grazing"] * 4, [0.5], 0.25),
+    ],
+)
+def test_time_before_trouble_is_midway_between_two_jumps(kinds, touches, expected):
+    jumps = SimpleNamespace(t=np.arange(1.0, 5.0), kind=np.array(kinds))
+    grazings = [SimpleNamespace(t=t) for t in touches]
+    arc = SimpleNamespace(t=np.array([0.0, 10.0]), jumps=jumps, grazings=grazings)
+    assert _before_trouble(arc) == expected
