@@ -109,10 +109,14 @@ def turns_back(model, run, transition, before, work):
     mode, t = run.mode, run.phase
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
-        return speed * before > 0.0
+    moves = abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work)
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
-    return acceleration * before > acceleration_rounding(model, run, mode, t, run.y, work)
+    settled = acceleration_rounding(model, run, mode, t, run.y, work)
+    if moves:
+        # Where a guard has turned, its speed still grows. If the speed shrinks, the field leads to the guard
+        # from both sides, and the state comes to rest there.
+        return speed * before > 0.0 and not acceleration * before < -settled
+    return acceleration * before > settled
 
 
 @exported(INTEGER, Task, INTEGER)
