@@ -143,7 +143,8 @@ def find_event(task, h):
             if length != NOT_THERE:
                 restore_sides(model, run)
                 run.rehearsal[3, blurred] = side
-                returns = run.last_fired == blurred and run.since_entry <= h
+                rounding = EPSILON * abs(run.phase)
+                returns = run.last_fired == blurred and run.since_entry <= max(h, rounding)
                 if crosses_towards(model.direction[blurred], -side) and not returns:
                     return 0.0, length, blurred
                 return math.nan, 0.0, NO_TRANSITION

@@ -87,20 +87,21 @@ def leave_guard(model, run, transition, t, work):
 
 
 @njit(**KERNEL)
-def is_resolved(model, run, transition, t, h, on_guard, work):
+def is_resolved(model, run, transition, t, h, work):
     """Whether the error of the attempted step leaves the sign of a guard at both ends of the step alone.
 
     The tolerances let the error of a state be many times the state itself, if that is small enough. The signs
-    of such a state, and crossings found from them, are those of the error. A guard that is zero at the start
-    has its side from its derivatives.
+    of such a state, and crossings found from them, are those of the error. It is not asked of a guard that is
+    zero at the start: its derivatives tell its side.
     """
     for i in range(model.dimension):
         # Where a step is too long, either estimate may be close to zero.
         error = h * (abs(work.error[i]) + abs(work.second_error[i]))
         size = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
         work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
-    begins = on_guard > 0 or keeps_sign(model, transition, t, run.y, work)
-    return begins and keeps_sign(model, transition, t + h, work.new, work)
+    return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
+        model, transition, t + h, work.new, work
+    )
 
 
 @njit(**INLINE)
@@ -170,7 +171,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
             proved = min(proved, share)
         if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
             continue
-        if not is_resolved(model, run, transition, t, h, on_guard, work):
+        if on_guard == 0 and not is_resolved(model, run, transition, t, h, work):
             blurred = transition
         if theta == NO_ROOT:
             run.side[transition] = side

@@ -336,9 +336,9 @@ def last_terms(series, column, order, h):
 
 
 @njit(**INLINE)
-def is_close(series, column, order, on_guard, error):
-    """Whether a guard with a series is closer to zero than an error, at the start of the step or at its end."""
-    return abs(series[order + 1, column]) < error or (on_guard == 0 and abs(series[0, column]) < error)
+def is_close(series, column, order, error):
+    """Whether a guard with a series is closer to zero than an error, at the start or the end of the step."""
+    return abs(series[order + 1, column]) < error or abs(series[0, column]) < error
 
 
 @njit(**INLINE)
@@ -354,16 +354,16 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
     As ``runge_kutta_guards.is_resolved``. ``column`` is that of the guard, or -1 if the guard is no series.
     """
     n, series = model.dimension, work.series
-    if model.degree[run.mode] > 0:
-        # A polynomial has no other terms.
+    if model.degree[run.mode] > 0 or on_guard > 0:
+        # A polynomial has no other terms; the derivatives of a guard that is zero tell its side.
         return True
     if column >= 0:
-        if on_guard == 0 and 0.0 < abs(series[0, column]) < UNDERFLOW:
+        if 0.0 < abs(series[0, column]) < UNDERFLOW:
             # The last terms have no digits.
             return False
         # Rounding of a sum of terms that cancel is less on a shorter step, rounding of the state is not.
         error = MARGIN * last_terms(series, column, order, h) + EPSILON * series[order + 2, column]
-        if not is_close(series, column, order, on_guard, error):
+        if not is_close(series, column, order, error):
             return True
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
         size = abs(work.gradient[n]) * size_of_time(model, t)
@@ -376,9 +376,10 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
         size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
         error = last_terms(series, i, order, h)
         work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
-    begins = on_guard > 0 or keeps_sign(model, transition, t, run.y, work)
     later = time_at(series, order, clock, t, 1.0, h)
-    return begins and keeps_sign(model, transition, later, work.trial, work)
+    return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
+        model, transition, later, work.trial, work
+    )
 
 
 @njit(**KERNEL)
@@ -454,7 +455,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
                 continue
             # What is far from a bound for the last terms is resolved.
             seen = degree <= order - TAIL_OF_GUARD and not is_close(
-                series, column, order, on_guard, MARGIN * rest + UNDERFLOW
+                series, column, order, MARGIN * rest + UNDERFLOW
             )
             if not seen and not is_resolved_by_series(
                 model, run, transition, column, order, t, h, clock, on_guard, work
