@@ -12,7 +12,7 @@ and its level has reached the guard ``h`` there.
 
 from numba import njit
 
-from hybrid.kernels.events.guards import guard_speed, guard_value
+from hybrid.kernels.events.guards import guard_speed, guard_value, rounding_band
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # The signs at the ends of a step must bear so many times its error.
@@ -62,17 +62,34 @@ def underflows(model, transition, t, x, later, y, scalar):
 
 
 @njit(**KERNEL)
+def speed_displaced(model, transition, mode, t, x, distance, work):
+    """Speed of a guard at a state beside ``x``, where the guard is larger by ``distance``.
+
+    ``work.gradient`` is current, and tells where that is.
+    """
+    n, square = model.dimension, 0.0
+    for i in range(n):
+        square += work.gradient[i] * work.gradient[i]
+    for i in range(n):
+        work.state[i] = x[i] + (distance * work.gradient[i] / square if square > 0.0 else 0.0)
+    model.field(mode, t, work.state, model.parameters, work.field_after)
+    return guard_speed(model, transition, t, work.state, work.field_after, work.gradient)
+
+
+@njit(**KERNEL)
 def is_held(model, transition, mode, t, x, speed, work):
     """Whether the field on the other side of a guard, as far beyond it, does not lead on to that side.
 
     ``speed`` is the guard's speed at ``x``, and leads towards the guard; ``work.gradient`` is current.
     """
-    n, square = model.dimension, 0.0
-    for i in range(n):
-        square += work.gradient[i] * work.gradient[i]
     value = guard_value(model, transition, t, x, work.scalar)
-    for i in range(n):
-        work.state[i] = x[i] - (2.0 * value * work.gradient[i] / square if square > 0.0 else 0.0)
-    model.field(mode, t, work.state, model.parameters, work.field_after)
-    beyond = guard_speed(model, transition, t, work.state, work.field_after, work.gradient)
-    return not beyond * speed > 0.0
+    return not speed_displaced(model, transition, mode, t, x, -2.0 * value, work) * speed > 0.0
+
+
+@njit(**KERNEL)
+def leads_to_guard(model, run, transition, mode, t, x, side, work):
+    """Whether the field on one side of a guard, as near as rounding, leads to the guard."""
+    value = guard_value(model, transition, t, x, work.scalar)
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    distance = side * rounding_band(model, run, transition, t, x, work) - value
+    return speed_displaced(model, transition, mode, t, x, distance, work) * side < 0.0

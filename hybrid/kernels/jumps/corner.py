@@ -13,6 +13,7 @@ from hybrid.kernels.events.guards import (
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_SPEED, JUMPING
+from hybrid.kernels.events.resolution import leads_to_guard
 from hybrid.kernels.events.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 from hybrid.kernels.types.codes import (
     NO_MODE,
@@ -109,14 +110,13 @@ def turns_back(model, run, transition, before, work):
     mode, t = run.mode, run.phase
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    moves = abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work)
+    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
+        # If the field leads to the guard from both sides, the state comes to rest there.
+        return speed * before > 0.0 and not leads_to_guard(
+            model, run, transition, mode, t, run.y, before, work
+        )
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
-    settled = acceleration_rounding(model, run, mode, t, run.y, work)
-    if moves:
-        # Where a guard has turned, its speed still grows. If the speed shrinks, the field leads to the guard
-        # from both sides, and the state comes to rest there.
-        return speed * before > 0.0 and not acceleration * before < -settled
-    return acceleration * before > settled
+    return acceleration * before > acceleration_rounding(model, run, mode, t, run.y, work)
 
 
 @exported(INTEGER, Task, INTEGER)
