@@ -17,6 +17,7 @@ from hybrid.kernels.events.guards import (
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_STEP
+from hybrid.kernels.events.resolution import underflows
 from hybrid.kernels.events.sides import side_of
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
@@ -66,6 +67,8 @@ def arrived(model, run, work):
         transition = model.outgoing[slot]
         before = run.side[transition]
         if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
+            continue
+        if underflows(model, transition, t, run.y, t, run.y, work.scalar):
             continue
         now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
         if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):

@@ -13,6 +13,7 @@ from hybrid.kernels.events.guards import (
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_SPEED, JUMPING
+from hybrid.kernels.events.resolution import leads_to_guard
 from hybrid.kernels.events.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
 from hybrid.kernels.types.codes import (
     NO_MODE,
@@ -110,7 +111,10 @@ def turns_back(model, run, transition, before, work):
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
-        return speed * before > 0.0
+        # If the field leads to the guard from both sides, the state comes to rest there.
+        return speed * before > 0.0 and not leads_to_guard(
+            model, run, transition, mode, t, run.y, before, work
+        )
     acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
     return acceleration * before > acceleration_rounding(model, run, transition, mode, t, run.y, work)
 

@@ -4,12 +4,20 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
 from hybrid.kernels.events.guards import guard_value, is_forced, rounding_band, sides_at
 from hybrid.kernels.events.path import state_at
 from hybrid.kernels.events.record import remember_grazing, start_record
-from hybrid.kernels.steps.runge_kutta_guards import NOT_THERE, earliest_crossing, land
+from hybrid.kernels.events.resolution import restore_sides
+from hybrid.kernels.steps.runge_kutta_guards import (
+    NOT_THERE,
+    earliest_crossing,
+    land,
+    reach,
+    reach_any,
+)
 from hybrid.kernels.steps.step import (
     attempt,
     attempt_again,
@@ -34,6 +42,10 @@ from hybrid.kernels.types.task import task_of
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 6.0
+# Share of a step that is tried next if its error hides on which side of a guard it ends.
+SHORTER = 0.5
+# Shortest step, in units of the rounding of time.
+FINEST = 4.0 * EPSILON
 # Steps start short after an event. A flight that is a polynomial has no error that limits its steps, and one
 # step across many short bounces would lose them in its rounding error.
 LONGEST_AFTER_EVENT = 100.0
@@ -108,7 +120,10 @@ def find_event(task, h):
 
     Returns its length, the Euler step that completes it, and the transition. A step whose guards
     are proved on a part only is cut to that. A crossing that the interpolant has and the solution has not is
-    a grazing; the step is then searched again without that guard.
+    a grazing; the step is then searched again without that guard. A step whose error may have made the
+    crossing has the length zero and no transition. At a guard that holds the state, steps become as short as
+    rounding of time allows: there the state has reached the guard, and a transition in that direction fires.
+    Without one, or if it has just fired, the length is nan.
     """
     attempts, model, method, run, record, work = task_of(task)
     tangents = task.tangents
@@ -118,7 +133,22 @@ def find_event(task, h):
         interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
-        theta, fired, proved = earliest_crossing(model, method, run, t, h, ignored, work)
+        theta, fired, proved, blurred = earliest_crossing(model, method, run, t, h, ignored, work)
+        if blurred != NO_TRANSITION:
+            side = run.rehearsal[0, blurred]
+            if SHORTER * h > FINEST * measured_time(model, run, mode):
+                restore_sides(model, run)
+                return 0.0, 0.0, NO_TRANSITION
+            length = reach(model, run, blurred, t, h, tangents, work)
+            if length != NOT_THERE:
+                restore_sides(model, run)
+                run.rehearsal[3, blurred] = side
+                rounding = EPSILON * abs(run.phase)
+                returns = run.last_fired == blurred and run.since_entry <= max(h, rounding)
+                if crosses_towards(model.direction[blurred], -side) and not returns:
+                    return 0.0, length, blurred
+                return math.nan, 0.0, NO_TRANSITION
+            attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
         if run.grazing_place < min(theta, proved):
             remember_touch(model, method, run, record, t, h, work)
         if proved < min(theta, 1.0):
@@ -242,15 +272,26 @@ def runge_kutta_step(task, remaining):
         run.rejected += 1
         shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
         run.next_step = h * shrink
-        if h * shrink <= 4.0 * EPSILON * measured_time(model, run, mode) or h * shrink < 1e-200:
-            return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
+        if h * shrink <= FINEST * measured_time(model, run, mode) or h * shrink < 1e-200:
+            # The field may end at a guard, as ``sqrt(h)`` does at ``h``.
+            correction, run.pending = reach_any(model, run, t, h, tangents, work)
+            if run.pending == NO_TRANSITION:
+                return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
+            accept(model, method, run, tangents, 0.0, correction, work)
+            return GO_ON, correction
         return GO_ON, 0.0
-    grow = growth_factor(method, run, h, max(ratio, 1e-16))
-    run.next_step = max(proposed, h * grow) if last else h * grow
-    run.last_step, run.last_ratio = h, max(ratio, 1e-16)
     fired, correction, whole = NO_TRANSITION, 0.0, h
     if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
         h, correction, fired = find_event(task, h)
+        if math.isnan(h):
+            return STEP_TOO_SMALL, 0.0
+        if h == 0.0 and fired == NO_TRANSITION:
+            run.rejected += 1
+            run.next_step = SHORTER * whole
+            return GO_ON, 0.0
+    grow = growth_factor(method, run, whole, max(ratio, 1e-16))
+    run.next_step = max(proposed, whole * grow) if last else whole * grow
+    run.last_step, run.last_ratio = whole, max(ratio, 1e-16)
     if fired != NO_TRANSITION:
         run.next_step = min(run.next_step, LONGEST_AFTER_EVENT * h)
     if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:

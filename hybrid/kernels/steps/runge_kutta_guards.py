@@ -1,10 +1,16 @@
-"""Guards along a Runge-Kutta step: the earliest crossing, and landing on it."""
+"""Guards along a Runge-Kutta step: the earliest crossing, whether it is resolved, and landing on it."""
 
 import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT, divide_by_theta, first_crossing, stays
+from hybrid.kernels.arithmetic.bernstein import (
+    NO_ROOT,
+    crosses_towards,
+    divide_by_theta,
+    first_crossing,
+    stays,
+)
 from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
@@ -15,6 +21,12 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
+from hybrid.kernels.events.resolution import (
+    is_held,
+    keep_side,
+    keeps_sign,
+    underflows,
+)
 from hybrid.kernels.events.sampled import rests
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
@@ -74,22 +86,43 @@ def leave_guard(model, run, transition, t, work):
         run.on_guard[transition] = 0
 
 
+@njit(**KERNEL)
+def is_resolved(model, run, transition, t, h, work):
+    """Whether the error of the attempted step leaves the sign of a guard at both ends of the step alone.
+
+    The tolerances let the error of a state be many times the state itself, if that is small enough. The signs
+    of such a state, and crossings found from them, are those of the error. It is not asked of a guard that is
+    zero at the start: its derivatives tell its side.
+    """
+    for i in range(model.dimension):
+        # Where a step is too long, either estimate may be close to zero.
+        error = h * (abs(work.error[i]) + abs(work.second_error[i]))
+        size = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
+        work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
+    return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
+        model, transition, t + h, work.new, work
+    )
+
+
 @njit(**INLINE)
 def earliest_crossing(model, method, run, t, h, ignored, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
-    Returns ``(theta, transition, proved)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses before the
-    share ``proved`` of the step, to which the step is to be cut. The sides of guards without a crossing are
-    brought up to date, to the end of the step, and guards that were left are no longer held to be zero at its
-    start. For a guard with a crossing, ``run.rehearsal[3]`` holds its side before that.
+    Returns ``(theta, transition, proved, blurred)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses
+    before the share ``proved`` of the step, to which the step is to be cut. ``blurred`` is a transition whose
+    guard changes sides, or grazes, on the step, although ``is_resolved`` is false for it, or none. The sides
+    of guards without a crossing are brought up to date, to the end of the step, and guards that were left are
+    no longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
+    crossing, ``run.rehearsal[3]`` holds its side before that.
     ``work.path`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode, degree_of_path = run.mode, method.powers.shape[0] - 1
-    earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
+    earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     run.grazing_place = NO_ROOT
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         run.rehearsal[3, transition] = 0
+        keep_side(run, transition)
         if transition == ignored:
             leave_guard(model, run, transition, t + h, work)
             continue
@@ -136,13 +169,48 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
             )
             run.on_guard[transition] = 0
             proved = min(proved, share)
+        if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
+            continue
+        if on_guard == 0 and not is_resolved(model, run, transition, t, h, work):
+            blurred = transition
         if theta == NO_ROOT:
             run.side[transition] = side
             continue
         run.rehearsal[3, transition] = -side
         if theta < earliest:
             earliest, fired = theta, transition
-    return earliest, fired, proved
+    return earliest, fired, proved, blurred
+
+
+@njit(**KERNEL)
+def reach(model, run, transition, t, h, tangents, work):
+    """The Euler step, of at most ``h``, that takes the state to a guard as near as rounding of time tells.
+
+    The end is in ``work.new``. Returns the length of the step, or ``NOT_THERE`` if the guard is farther away,
+    or does not hold the state: then the field beyond the guard leads on.
+    """
+    value = guard_value(model, transition, t, run.y, work.scalar)
+    speed = guard_speed(model, transition, t, run.y, work.stages[0], work.gradient)
+    if not speed * value < 0.0 or not abs(value) <= abs(speed) * h:
+        return NOT_THERE
+    length = -value / speed
+    for i in range(model.dimension * (1 + tangents)):
+        work.new[i] = run.y[i] + length * work.stages[0, i]
+    return length if is_held(model, transition, run.mode, t, run.y, speed, work) else NOT_THERE
+
+
+@njit(**KERNEL)
+def reach_any(model, run, t, h, tangents, work):
+    """``reach`` for the first guard of the mode that is there and fires; the transition comes second."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        side = run.side[transition]
+        if run.on_guard[transition] == 0 and crosses_towards(model.direction[transition], -side):
+            length = reach(model, run, transition, t, h, tangents, work)
+            if length != NOT_THERE:
+                run.rehearsal[3, transition] = side
+                return length, transition
+    return NOT_THERE, NO_TRANSITION
 
 
 @njit(**KERNEL)

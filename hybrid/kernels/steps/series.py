@@ -26,6 +26,7 @@ from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.path import state_at, time_at, value_at
 from hybrid.kernels.events.record import remember_grazing, start_record
+from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.steps.series_guards import (
     earliest_on_series,
@@ -77,6 +78,9 @@ MOST_RISE_OF_EXACT = 1.0
 # The field and the slope of a series may differ by the tolerance over this share of a step.
 SHARE_OF_STEP = 0.25
 MOST_HALVINGS = 1000
+# Share of a step that is tried next if the end of the series hides on which side of a guard the step ends.
+SHORTER = 0.75
+MOST_SHORTER = 100
 # Rounding of a state by which the noise of its field is measured.
 ROUNDING = 8.0 * EPSILON
 # How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
@@ -350,7 +354,14 @@ def series_step(task, remaining):
         evaluate_with_sizes(series, order, h, 0, front)
     fired, cut = NO_TRANSITION, False
     if guards > 0:
-        theta, fired, proved = earliest_on_series(model, method, run, order, t, h, clock, work)
+        theta, fired, proved, blurred = earliest_on_series(model, method, run, order, t, h, clock, work)
+        for _ in range(MOST_SHORTER):
+            if blurred == NO_TRANSITION or SHORTER * h <= 4.0 * EPSILON * measured_time(model, run, mode):
+                break
+            h *= SHORTER
+            evaluate_with_sizes(series, order, h, 0, front)
+            restore_sides(model, run)
+            theta, fired, proved, blurred = earliest_on_series(model, method, run, order, t, h, clock, work)
         if run.grazing_place < min(theta, proved):
             s = run.grazing_place * h
             state_at(series, order, n, s, work.state)

@@ -15,9 +15,22 @@ from hybrid.kernels.arithmetic.bernstein import (
 )
 from hybrid.kernels.arithmetic.lanes import four_times, load, store
 from hybrid.kernels.events.crossings import crossing_on_path
-from hybrid.kernels.events.guards import error_band, note_grazing, rounding_band
+from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
+    error_band,
+    note_grazing,
+    rounding_band,
+    size_of_time,
+)
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
-from hybrid.kernels.events.path import value_at
+from hybrid.kernels.events.path import time_at, value_at
+from hybrid.kernels.events.resolution import (
+    MARGIN,
+    UNDERFLOW,
+    keep_side,
+    keeps_sign,
+    underflows,
+)
 from hybrid.kernels.events.sampled import rests
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
@@ -34,6 +47,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 UNSEEN = 64.0
 # Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
 MOST_CORRECTIONS = 60
+# Number of terms at the end of a series by which its error is judged: some may be zero.
+TAIL_OF_GUARD = 5
 # High powers of a series are left out of a proof if their sum is below this share of the size of the guard.
 NEGLIGIBLE = 0.003
 
@@ -304,23 +319,87 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
     return s
 
 
+@njit(**INLINE)
+def is_root(model, mode):
+    """Whether the series of a guard in a mode is that of its root."""
+    return model.propagator[mode] in (DESINGULARISED, ROOTED)
+
+
+@njit(**INLINE)
+def last_terms(series, column, order, h):
+    """The sum of the magnitudes of the last terms of a series: more than all that are left out."""
+    power, total = h**order, 0.0
+    for o in range(order, max(order - TAIL_OF_GUARD, 0), -1):
+        total += abs(series[o, column]) * power
+        power /= h
+    return total
+
+
+@njit(**INLINE)
+def is_close(series, column, order, error):
+    """Whether a guard with a series is closer to zero than an error, at the start or the end of the step."""
+    return abs(series[order + 1, column]) < error or abs(series[0, column]) < error
+
+
+@njit(**INLINE)
+def underflows_on_series(series, column, order):
+    """``underflows`` for a guard with a series."""
+    return max(abs(series[0, column]), abs(series[order + 1, column])) < UNDERFLOW
+
+
+@njit(**KERNEL)
+def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
+    """Whether the end of the series leaves the sign of a guard at both ends of the step alone.
+
+    As ``runge_kutta_guards.is_resolved``. ``column`` is that of the guard, or -1 if the guard is no series.
+    """
+    n, series = model.dimension, work.series
+    if model.degree[run.mode] > 0 or on_guard > 0:
+        # A polynomial has no other terms; the derivatives of a guard that is zero tell its side.
+        return True
+    if column >= 0:
+        if 0.0 < abs(series[0, column]) < UNDERFLOW:
+            # The last terms have no digits.
+            return False
+        # Rounding of a sum of terms that cancel is less on a shorter step, rounding of the state is not.
+        error = MARGIN * last_terms(series, column, order, h) + EPSILON * series[order + 2, column]
+        if not is_close(series, column, order, error):
+            return True
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        size = abs(work.gradient[n]) * size_of_time(model, t)
+        for i in range(n):
+            size += abs(work.gradient[i]) * max(abs(run.y[i]), abs(series[order + 1, i]))
+        rounding = ROUNDING_OF_STATE * EPSILON * size
+        return error <= (math.sqrt(rounding) if is_root(model, run.mode) else rounding)
+    for i in range(n):
+        work.trial[i] = series[order + 1, i]
+        size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
+        error = last_terms(series, i, order, h)
+        work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
+    later = time_at(series, order, clock, t, 1.0, h)
+    return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
+        model, transition, later, work.trial, work
+    )
+
+
 @njit(**KERNEL)
 def earliest_on_series(model, method, run, order, t, h, clock, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
-    Returns ``(theta, transition, proved)``, and brings sides up to date, as
+    Returns ``(theta, transition, proved, blurred)``, and brings sides up to date, as
     ``runge_kutta_guards.earliest_crossing`` does, with the sides before crossings kept. A guard that is a
     series itself is a polynomial, up to the remainder of the series; what it is a sum of stands behind the
     series. For any other guard its own expression is bounded on the series of the state.
     """
     mode, series = run.mode, work.series
     kind = model.propagator[mode]
-    earliest, fired, proved = NO_ROOT, NO_TRANSITION, 1.0
+    earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     run.grazing_place = NO_ROOT
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         run.rehearsal[3, transition] = 0
+        keep_side(run, transition)
         on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
             if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
@@ -330,6 +409,13 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             )
             run.on_guard[transition] = 0
             proved = min(proved, share)
+            later = time_at(series, order, clock, t, 1.0, h)
+            for i in range(model.dimension):
+                work.trial[i] = series[order + 1, i]
+            if underflows(model, transition, t, run.y, later, work.trial, work.scalar):
+                continue
+            if not is_resolved_by_series(model, run, transition, -1, order, t, h, clock, on_guard, work):
+                blurred = transition
             if theta == NO_ROOT:
                 run.side[transition] = side
                 continue
@@ -347,7 +433,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if kind != EXACT:
             band = error_band(method, run, work.gradient, model.dimension)
         # A value that is small for a guard is less small for the root of the guard.
-        if kind in (DESINGULARISED, ROOTED):
+        if is_root(model, mode):
             rounding, band = math.sqrt(rounding), math.sqrt(band)
         size, power = beyond_known_roots(series, column, h, on_guard, size)
         if on_guard > 0:
@@ -365,6 +451,16 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if verdict == CLEAR:
             continue
         if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
+            if underflows_on_series(series, column, order):
+                continue
+            # What is far from a bound for the last terms is resolved.
+            seen = degree <= order - TAIL_OF_GUARD and not is_close(
+                series, column, order, MARGIN * rest + UNDERFLOW
+            )
+            if not seen and not is_resolved_by_series(
+                model, run, transition, column, order, t, h, clock, on_guard, work
+            ):
+                blurred = transition
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
             run.rehearsal[3, transition] = side
@@ -383,10 +479,14 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
         if theta > 1.0 and side == run.side[transition] and on_guard == 0:
             note_grazing(run, transition, degree, side, band, work)
+        if underflows_on_series(series, column, order):
+            continue
+        if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
+            blurred = transition
         if theta == NO_ROOT:
             run.side[transition] = side
             continue
         run.rehearsal[3, transition] = -side
         if theta < earliest:
             earliest, fired = theta, transition
-    return earliest, fired, proved
+    return earliest, fired, proved, blurred

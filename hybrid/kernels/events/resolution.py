@@ -1,0 +1,95 @@
+"""Whether a step tells on which side of a guard the solution is.
+
+Error control keeps the error of a step below the tolerances, not below the state: a state that decays below
+its absolute tolerance may have either sign at the end of a step, and anything between. A change of side found
+there is one of the error. So a step on which a guard changes sides, or grazes, must tell the sides at its
+ends; else the step is repeated with a shorter length, on which the error is smaller.
+
+A field that is not smooth at a guard has such an error on every step that reaches the guard. The steps then
+end at the guard as far as rounding of time tells. ``h' = -sqrt(abs(h)) * sign(h)`` comes to rest at zero so,
+and its level has reached the guard ``h`` there.
+"""
+
+from numba import njit
+
+from hybrid.kernels.events.guards import guard_speed, guard_value, rounding_band
+from hybrid.kernels.types.options import INLINE, KERNEL
+
+# The signs at the ends of a step must bear so many times its error.
+MARGIN = 1e3
+# The last terms of a series for a guard below this size may have lost their digits.
+UNDERFLOW = 1e-250
+
+
+@njit(**INLINE)
+def keep_side(run, transition):
+    """Remember what is known of a guard at the start of a step."""
+    run.rehearsal[0, transition] = run.side[transition]
+    run.rehearsal[1, transition] = run.on_guard[transition]
+
+
+@njit(**KERNEL)
+def restore_sides(model, run):
+    """Return to what was known of the guards at the start of the step."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        run.side[transition] = run.rehearsal[0, transition]
+        run.on_guard[transition] = run.rehearsal[1, transition]
+
+
+@njit(**KERNEL)
+def keeps_sign(model, transition, t, x, work):
+    """Whether a guard has one sign for all errors of the state, ``work.field_after``, on a straight line."""
+    positive = False
+    for part in range(2):
+        share = MARGIN if part == 0 else -MARGIN
+        for i in range(model.dimension):
+            work.state[i] = x[i] + share * work.field_after[i]
+        value = guard_value(model, transition, t, work.state, work.scalar)
+        if part == 0:
+            positive = value > 0.0
+        elif (value > 0.0) != positive:
+            return False
+    return True
+
+
+@njit(**KERNEL)
+def underflows(model, transition, t, x, later, y, scalar):
+    """Whether a guard is too small for a sign at both of two places, but not zero."""
+    first = abs(guard_value(model, transition, t, x, scalar))
+    last = abs(guard_value(model, transition, later, y, scalar))
+    return 0.0 < max(first, last) < UNDERFLOW
+
+
+@njit(**KERNEL)
+def speed_displaced(model, transition, mode, t, x, distance, work):
+    """Speed of a guard at a state beside ``x``, where the guard is larger by ``distance``.
+
+    ``work.gradient`` is current, and tells where that is.
+    """
+    n, square = model.dimension, 0.0
+    for i in range(n):
+        square += work.gradient[i] * work.gradient[i]
+    for i in range(n):
+        work.state[i] = x[i] + (distance * work.gradient[i] / square if square > 0.0 else 0.0)
+    model.field(mode, t, work.state, model.parameters, work.field_after)
+    return guard_speed(model, transition, t, work.state, work.field_after, work.gradient)
+
+
+@njit(**KERNEL)
+def is_held(model, transition, mode, t, x, speed, work):
+    """Whether the field on the other side of a guard, as far beyond it, does not lead on to that side.
+
+    ``speed`` is the guard's speed at ``x``, and leads towards the guard; ``work.gradient`` is current.
+    """
+    value = guard_value(model, transition, t, x, work.scalar)
+    return not speed_displaced(model, transition, mode, t, x, -2.0 * value, work) * speed > 0.0
+
+
+@njit(**KERNEL)
+def leads_to_guard(model, run, transition, mode, t, x, side, work):
+    """Whether the field on one side of a guard, as near as rounding, leads to the guard."""
+    value = guard_value(model, transition, t, x, work.scalar)
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    distance = side * rounding_band(model, run, transition, t, x, work) - value
+    return speed_displaced(model, transition, mode, t, x, distance, work) * side < 0.0
