@@ -3,7 +3,8 @@
 Error control keeps the error of a step below the tolerances, not below the state: a state that decays below
 its absolute tolerance may have either sign at the end of a step, and anything between. A change of side found
 there is one of the error. So a step on which a guard changes sides, or grazes, must tell the sides at its
-ends; else the step is repeated with a shorter length, on which the error is smaller.
+ends, unless the guard moves on through zero; else the step is repeated with a shorter length, on which the
+error is smaller.
 
 A field that is not smooth at a guard has such an error on every step that reaches the guard. The steps then
 end at the guard as far as rounding of time tells. ``h' = -sqrt(abs(h)) * sign(h)`` comes to rest at zero so,
@@ -15,8 +16,8 @@ from numba import njit
 from hybrid.kernels.events.guards import guard_speed, guard_value, rounding_band
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# The signs at the ends of a step must bear so many times its error.
-MARGIN = 1e3
+# The signs at the ends of a step must bear so many times its estimated error.
+MARGIN = 100.0
 # The last terms of a series for a guard below this size may have lost their digits.
 UNDERFLOW = 1e-250
 

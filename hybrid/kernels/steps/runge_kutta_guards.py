@@ -22,6 +22,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.resolution import (
+    MARGIN,
     is_held,
     keep_side,
     keeps_sign,
@@ -87,21 +88,27 @@ def leave_guard(model, run, transition, t, work):
 
 
 @njit(**KERNEL)
-def is_resolved(model, run, transition, t, h, work):
+def is_resolved(model, method, run, transition, t, h, work):
     """Whether the error of the attempted step leaves the sign of a guard at both ends of the step alone.
 
     The tolerances let the error of a state be many times the state itself, if that is small enough. The signs
     of such a state, and crossings found from them, are those of the error. It is not asked of a guard that is
-    zero at the start: its derivatives tell its side.
+    zero at the start: its derivatives tell its side. Nor is it asked where the guard moves on through zero,
+    much farther than the error: this step or the next finds the crossing.
     """
     for i in range(model.dimension):
         # Where a step is too long, either estimate may be close to zero.
         error = h * (abs(work.error[i]) + abs(work.second_error[i]))
         size = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
         work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
-    return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
-        model, transition, t + h, work.new, work
-    )
+    if keeps_sign(model, transition, t, run.y, work) and keeps_sign(model, transition, t + h, work.new, work):
+        return True
+    s, moved = method.b.shape[0], 0.0
+    before = guard_speed(model, transition, t, run.y, work.stages[0], work.gradient)
+    after = guard_speed(model, transition, t + h, work.new, work.stages[s], work.gradient)
+    for i in range(model.dimension):
+        moved += abs(work.gradient[i]) * work.field_after[i]
+    return before * after > 0.0 and min(abs(before), abs(after)) * h > MARGIN * moved
 
 
 @njit(**INLINE)
@@ -171,7 +178,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
             proved = min(proved, share)
         if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
             continue
-        if on_guard == 0 and not is_resolved(model, run, transition, t, h, work):
+        if on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work):
             blurred = transition
         if theta == NO_ROOT:
             run.side[transition] = side
