@@ -1,7 +1,13 @@
-"""Start-up times: the import, the first run with an empty cache, and the next process."""
+"""Start-up times: the import, the first run with an empty cache, and the next process.
+
+``--wheel FILE`` also times a first run of a wheel, which contains the kernels.
+"""
 
 from __future__ import annotations
 
+import argparse
+import subprocess
+import sys
 from tempfile import TemporaryDirectory
 
 from benchmarks.common import Process, fastest_process, fresh_process, heading, table
@@ -30,6 +36,9 @@ assert simulate(pendulum, (1.0, 0.0), (0.0, 5.0)).status.ok
 
 
 def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--wheel", help="a wheel of this library")
+    wheel = options.parse_args().wheel
     heading("Seconds of whole processes, including the start of the interpreter.")
     rows = []
 
@@ -43,12 +52,19 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         cache = {"HYBRID_CACHE_DIR": folder}
         first = fresh_process(RUN, cache)
-        report("first run, empty cache", first, 20)
-        report("the next process", fastest_process(RUN, cache), 1)
+        report("first run, empty cache", first, 8)
+        report("the next process", fastest_process(RUN, cache), 0.5)
         report("first spectrum after that", fresh_process(SPECTRUM, cache))
-        report("the next process with a spectrum", fastest_process(SPECTRUM, cache), 1)
+        report("the next process with a spectrum", fastest_process(SPECTRUM, cache), 0.5)
         report("first run of a new model", fresh_process(OWN_MODEL, cache))
-        report("the next process with that model", fastest_process(OWN_MODEL, cache), 1)
+        report("the next process with that model", fastest_process(OWN_MODEL, cache), 0.5)
+    if wheel:
+        with TemporaryDirectory() as folder:
+            pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", folder, wheel]
+            subprocess.run(pip, check=True)
+            installed = {"HYBRID_CACHE_DIR": f"{folder}/cache", "PYTHONPATH": folder, "PYTHONSAFEPATH": "1"}
+            report("first run of a wheel, empty cache", fresh_process(RUN, installed), 1)
+            report("the next process", fastest_process(RUN, installed), 0.5)
     table(["", "wall clock", "processor", "target"], rows)
     print("Messages of the first run:", first.messages.replace("\n", " ") or "none")
 

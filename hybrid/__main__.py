@@ -1,20 +1,33 @@
-"""``python -m hybrid compile``: compile the kernels in advance, so that the first run does not wait."""
+"""``python -m hybrid compile``: compile the kernels in advance, so that the first run does not wait.
+
+With ``--portable FOLDER`` they are compiled for all processors of the family, as a wheel contains them.
+"""
 
 from __future__ import annotations
 
 import argparse
+import platform
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
-from hybrid.compiler.cache import second_process
+from hybrid.compiler.cache import second_process, shipped
 from hybrid.compiler.cache.folder import cache_directory
-from hybrid.compiler.cache.loader import ALL_KERNELS, is_kept
+from hybrid.compiler.cache.loader import ALL_KERNELS, is_kept, is_shipped, portable
 from hybrid.display.progress import progress_bar
 
 # Seconds between two checks of the progress.
 LOOK = 0.3
+PORTABLE = """\
+import sys
+from pathlib import Path
+from hybrid.compiler.cache.folder import keep
+from hybrid.compiler.cache.loader import compiled, portable
+for module in sys.argv[2:]:
+    keep(portable(module, Path(sys.argv[1])), compiled(module))
+"""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -28,44 +41,90 @@ def parser() -> argparse.ArgumentParser:
         default=second_process.processors(),
         help="how many compile at once (default: %(default)s, all processors)",
     )
+    compiling.add_argument(
+        "--portable",
+        type=Path,
+        metavar="FOLDER",
+        help="compile for all processors of this machine's family, into this folder",
+    )
     return options
 
 
 def compile_kernels(processes: int) -> list[str]:
     """Compile every kernel that is not on disk yet, in several processes; returns those that failed."""
-    missing = [module for module in ALL_KERNELS if not is_kept(module)]
+    return _compile(processes, is_kept, [second_process.PROGRAM], {})
+
+
+def compile_portable(processes: int, folder: Path) -> list[str]:
+    """Compile every kernel for all processors of this machine's family; returns those that failed.
+
+    Raises
+    ------
+    ValueError
+        If no base is known for the family.
+    """
+    base = shipped.base()
+    if base is None:
+        raise ValueError(
+            f"Portable kernels are compiled for {', '.join(shipped.BASES)}; this is {platform.machine()}."
+        )
+    return _compile(
+        processes,
+        lambda module: portable(module, folder).exists(),
+        [PORTABLE, str(folder.absolute())],
+        base.environment(),
+    )
+
+
+def _compile(
+    processes: int, is_done: Callable[[str], bool], program: Sequence[str], variables: Mapping[str, str]
+) -> list[str]:
+    missing = [module for module in ALL_KERNELS if not is_done(module)]
     # Modules share functions, which each process compiles only once: hence one process per share.
     shares = [missing[i :: max(1, processes)] for i in range(max(1, processes))]
-    running = [_compiling(share) for share in shares if share]
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-c", *program, *share],
+            env={**second_process.environment(), **variables},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+        )
+        for share in shares
+        if share
+    ]
     done: set[str] = set()
     with progress_bar(len(missing), "hybrid: compiling the kernels", bool(missing), "module") as bar:
         while any(process.poll() is None for process in running):
             time.sleep(LOOK)
-            for module in filter(is_kept, set(missing) - done):
+            for module in filter(is_done, set(missing) - done):
                 done.add(module)
                 bar.update()
-    return [module for module in missing if not is_kept(module)]
+    return [module for module in missing if not is_done(module)]
 
 
-def _compiling(modules: Sequence[str]) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-c", second_process.PROGRAM, *modules],
-        env=second_process.environment(),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-    )
+def _folder(chosen: Path | None) -> Path:
+    if chosen is not None:
+        return chosen
+    return shipped.FOLDER if all(map(is_shipped, ALL_KERNELS)) else cache_directory()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit status."""
     given = parser().parse_args(arguments)
     begin = time.perf_counter()
-    failed = compile_kernels(given.processes)
+    if given.portable is None:
+        failed = compile_kernels(given.processes)
+    else:
+        try:
+            failed = compile_portable(given.processes, given.portable)
+        except ValueError as error:
+            print(f"hybrid: {error}", file=sys.stderr)
+            return 1
     if failed:
         print(f"hybrid: these kernels were not compiled: {', '.join(failed)}.", file=sys.stderr)
     else:
         seconds = time.perf_counter() - begin
-        print(f"hybrid: all kernels are compiled, in {cache_directory()} ({seconds:.0f} s).")
+        print(f"hybrid: all kernels are compiled, in {_folder(given.portable)} ({seconds:.0f} s).")
     return 1 if failed else 0
 
 

@@ -84,19 +84,11 @@ def _private_folder() -> Path:
 
 
 def source_key(*texts: str) -> str:
-    """Short hash of source texts and of the compiler's version."""
-    digest = hashlib.sha256(_compiler_version().encode())
+    """Short hash of texts."""
+    digest = hashlib.sha256()
     for text in texts:
         digest.update(text.encode())
     return digest.hexdigest()[:24]
-
-
-@cache
-def _compiler_version() -> str:
-    # Numba itself is imported only when a kernel is compiled.
-    from importlib.metadata import version
-
-    return version("numba")
 
 
 def keep(path: Path, content: bytes) -> bool:

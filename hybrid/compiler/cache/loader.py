@@ -1,4 +1,6 @@
-"""Compiled kernels, from the cache or compiled now; the cache folder is named by a hash of all their sources.
+"""Compiled kernels: shipped with the package, from the cache, or compiled now.
+
+Files are named by a hash of all sources of the kernels, so machine code of other sources is never loaded.
 
 Numba is imported only to compile them.
 """
@@ -13,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
-from hybrid.compiler.cache import second_process
+from hybrid.compiler.cache import second_process, shipped
 from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, keep, kept, source_key
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.interrupts import between_passes
@@ -57,19 +59,18 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
 
     A line on standard error announces the compilation, once per process.
     """
-    path = _path(module)
     with _COMPILING:
-        content = kept(path)
+        content = _on_disk(module)
         if content is None:
             with announced(MESSAGE):
                 if module == DRIVER:
                     second_process.start([each for each in EVENTS if not is_kept(each)])
                 elif module in EVENTS:
                     second_process.finish()
-                    content = kept(path)
+                    content = _on_disk(module)
                 if content is None:
                     content = compiled(module)
-                    keep(path, content)
+                    keep(_path(module), content)
     return SimpleNamespace(**kernels_in(content))
 
 
@@ -109,9 +110,24 @@ def _path(module: str) -> Path:
     return cache_folder(f"kernels-{kernels_key(module)}") / f"{module}.o"
 
 
+def _on_disk(module: str) -> bytes | None:
+    content = shipped.shipped(module, sources_key(module))
+    return kept(_path(module)) if content is None else content
+
+
 def is_kept(module: str) -> bool:
     """Whether compiled code of a kernel module is on disk."""
-    return _path(module).exists()
+    return is_shipped(module) or _path(module).exists()
+
+
+def is_shipped(module: str) -> bool:
+    """Whether compiled code of a kernel module came with the package, for this processor."""
+    return shipped.is_shipped(module, sources_key(module))
+
+
+def portable(module: str, folder: Path) -> Path:
+    """Path in ``folder`` of a module's kernels that were compiled to be shipped."""
+    return shipped.path_in(folder, module, sources_key(module))
 
 
 def sources_in(folder: Path) -> list[Path]:
@@ -131,6 +147,15 @@ def _source_of(module: str) -> Path | None:
 
 @cache
 def kernels_key(module: str = DRIVER) -> str:
+    """Hash of all that the machine code of a kernel module depends on: sources, compiler and processor."""
+    # Numba itself is imported only when a kernel is compiled.
+    from importlib.metadata import version
+
+    return source_key(processor(), version("numba"), sources_key(module))
+
+
+@cache
+def sources_key(module: str = DRIVER) -> str:
     """Hash of all sources of a kernel module: our kernels, and files of its own package if it has another.
 
     The form of the files in the cache belongs to them, too.
@@ -138,7 +163,7 @@ def kernels_key(module: str = DRIVER) -> str:
     sources = [*sources_in(PACKAGE / "kernels"), *FORM]
     if not module.startswith("hybrid."):
         sources += sorted(_own_sources(module))
-    return source_key(processor(), *(path.read_text(encoding="utf-8") for path in sources))
+    return source_key(*(path.read_text(encoding="utf-8") for path in sources))
 
 
 def _own_sources(module: str) -> set[Path]:

@@ -19,7 +19,7 @@ from hybrid.compiler.cache.folder import (
     keep,
     source_key,
 )
-from hybrid.compiler.cache.loader import kernels_key, load_kernels
+from hybrid.compiler.cache.loader import kernels_key, load_kernels, sources_key
 from hybrid.compiler.cache.seal import sealed
 from hybrid.compiler.llvm.functions import shared_functions
 
@@ -283,7 +283,7 @@ def test_kernels_of_another_package_depend_on_what_they_are_made_of(tmp_path, mo
         if changed:
             path = package / f"{changed}.py"
             path.write_text(path.read_text() + "# changed\n")
-        keys.append(kernels_key.__wrapped__("otherpackage.kernels"))
+        keys.append(sources_key.__wrapped__("otherpackage.kernels"))
     assert keys[0] == keys[1]
     assert len(set(keys[1:])) == 3
     assert kernels_key("lyapunov.kernels") != kernels_key()

@@ -1,0 +1,57 @@
+"""What building a wheel does besides packing files: it compiles the kernels, so that the first run need not.
+
+An editable installation is left as it is: its kernels are compiled when a run first needs them. The same
+holds for a wheel whose kernels could not be compiled, or are for a family of processors without a base.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+NEEDED = {"attrs", "llvmlite", "numba", "numpy", "platformdirs", "tqdm"}
+
+
+class Kernels(BuildHookInterface):
+    """Puts the machine code of the kernels into the wheel."""
+
+    def dependencies(self) -> list[str]:
+        """What the compilation needs of the package's own dependencies."""
+        if self.target_name != "wheel":
+            return []
+        required = self.metadata.core.dependencies
+        return [each for each in required if re.match(r"[\w-]+", each).group() in NEEDED]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile the kernels; the files belong to this platform, and to any version of Python."""
+        if version == "editable":
+            return
+        self._folder = tempfile.TemporaryDirectory()
+        into = Path(self._folder.name) / "machine_code"
+        done = subprocess.run(
+            [sys.executable, "-m", "hybrid", "compile", "--portable", str(into)],
+            cwd=self.root,
+            env=os.environ | {"HYBRID_CACHE_DIR": str(into.parent / "cache")},
+            check=False,
+        )
+        if done.returncode:
+            self.app.display_warning("The wheel contains no compiled kernels: the first run compiles them.")
+            return
+        for path in sorted(into.iterdir()):
+            build_data["force_include"][str(path)] = f"hybrid/{into.name}/{path.name}"
+        build_data["pure_python"] = False
+        platform = re.sub(r"\W", "_", sysconfig.get_platform())
+        build_data["tag"] = f"py3-none-{platform}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove the compiled files, which the wheel contains now."""
+        if version != "editable":
+            self._folder.cleanup()

@@ -1,0 +1,133 @@
+"""Kernels that come with the package."""
+
+import pytest
+from llvmlite import binding
+
+import hybrid.__main__ as command
+from hybrid.compiler.cache import loader, shipped
+
+MODULE = "hybrid.kernels.steps.step"
+NAMES = ["field_at", "jacobian_at", "no_step"]
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """A folder with the kernels of one module, for all processors of this family."""
+    folder = tmp_path_factory.mktemp("machine_code")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "ALL_KERNELS", (MODULE,))
+        assert command.main(["compile", "--portable", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture
+def package(compiled, tmp_path, monkeypatch):
+    """The package as a wheel with these kernels installs it, and an empty cache."""
+    folder = tmp_path / "machine_code"
+    folder.mkdir()
+    for path in compiled.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setattr(shipped, "FOLDER", folder)
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path / "cache"))
+    # What was decided for the real processor and the real folder is not used.
+    shipped._runs_here.cache_clear()
+    yield folder
+    shipped._runs_here.cache_clear()
+
+
+def kept_in(folder):
+    return [path.name for path in folder.rglob("*.o")]
+
+
+def load():
+    return loader.load_kernels.__wrapped__(MODULE)
+
+
+def refuse(module):
+    raise AssertionError(f"{module} was compiled")
+
+
+def test_a_run_loads_them_and_compiles_nothing(package, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(loader, "compiled", refuse)
+    assert loader.is_kept(MODULE)
+    assert loader.is_shipped(MODULE)
+    kernels = load()
+    assert set(NAMES) <= set(vars(kernels))
+    assert kernels.no_step.address != 0
+    assert kept_in(tmp_path / "cache") == []
+    monkeypatch.setattr(command, "ALL_KERNELS", (MODULE,))
+    assert command.main(["compile"]) == 0
+    assert str(package) in capsys.readouterr().out
+
+
+def test_they_do_not_depend_on_the_compiler_that_is_installed(package, monkeypatch):
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "0.0")
+    loader.kernels_key.cache_clear()
+    assert loader.is_shipped(MODULE)
+    loader.kernels_key.cache_clear()
+
+
+def stored(monkeypatch):
+    """Let the kernels be compiled; returns the list of modules that were."""
+    asked = []
+
+    def compile_now(module):
+        asked.append(module)
+        return loader.file_of({}, b"")
+
+    monkeypatch.setattr(loader, "compiled", compile_now)
+    return asked
+
+
+def test_kernels_of_other_sources_are_not_loaded(package, monkeypatch):
+    asked = stored(monkeypatch)
+    [path] = package.iterdir()
+    key = loader.sources_key(MODULE)
+    path.rename(package / path.name.replace(key, key[::-1]))
+    assert not loader.is_kept(MODULE)
+    load()
+    assert asked == [MODULE]
+
+
+def test_a_processor_without_the_instructions_compiles_its_own(package, monkeypatch):
+    family = shipped.base()
+    if not family.needs:
+        pytest.skip("every processor of this family has all instructions of the base")
+    asked = stored(monkeypatch)
+    has = dict(binding.get_host_cpu_features())
+    lacking = sorted(family.needs)[0]
+    monkeypatch.setattr(shipped.binding, "get_host_cpu_features", lambda: has | {lacking: False})
+    assert not loader.is_kept(MODULE)
+    load()
+    assert asked == [MODULE]
+
+
+@pytest.mark.parametrize("machine", ["riscv64", ""])
+def test_a_family_without_a_base_ships_nothing(package, monkeypatch, capsys, machine):
+    monkeypatch.setattr(shipped.platform, "machine", lambda: machine)
+    assert not loader.is_shipped(MODULE)
+    assert command.main(["compile", "--portable", str(package)]) == 1
+    said = capsys.readouterr().err
+    assert "x86_64" in said
+    assert machine in said
+
+
+def test_damaged_files_are_compiled_again_and_a_line_says_so(package, monkeypatch, capsys):
+    asked = stored(monkeypatch)
+    [path] = package.iterdir()
+    path.write_bytes(path.read_bytes()[:-1])
+    load()
+    assert asked == [MODULE]
+    assert "damaged" in capsys.readouterr().err
+
+
+def test_both_names_of_a_family_have_one_base():
+    assert shipped.BASES["x86_64"] is shipped.BASES["AMD64"]
+    assert shipped.BASES["arm64"] is shipped.BASES["aarch64"]
+
+
+def test_they_are_compiled_for_the_oldest_processor_of_the_family(tmp_path, monkeypatch):
+    tell = "import sys, numba\nopen(sys.argv[1], 'w').write(str(numba.config.CPU_NAME))"
+    monkeypatch.setattr(command, "PORTABLE", tell)
+    command.compile_portable(1, tmp_path / "name")
+    assert (tmp_path / "name").read_text() == shipped.base().name
