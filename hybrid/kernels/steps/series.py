@@ -83,6 +83,9 @@ SHORTER = 0.75
 MOST_SHORTER = 100
 # Rounding of a state by which the noise of its field is measured.
 ROUNDING = 8.0 * EPSILON
+# The terms of a series must be normal floats, from 2**-1022 to 2**1024. In units of time far from its pace
+# they grow or fall by as many bits per order as the step has. All orders together may take this many.
+MOST_BITS = 900.0
 # How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
 FALL_OF_EXACT = 4.0
 # Largest correction of a landing, as a share of the step.
@@ -179,6 +182,27 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
         growth = largest(binary_logarithms(newer)) - largest(binary_logarithms(older))
         regular = growth <= 0.5 * TAIL * last
     return (1.0 if exact else SAFETY) * power_of_two(-last), regular
+
+
+@njit(**KERNEL)
+def within_floats(series, n, first, stride, groups, order, rtol, atol, exact, weights):
+    """The order up to which the terms of a series are normal floats, with its longest step.
+
+    Units of time far from the pace of the solution make the later terms overflow or vanish. Terms that vanish
+    in a low order, too, are those of a polynomial, and the order stays as it is.
+    """
+    least, highest = (TAIL_OF_EXACT if exact else TAIL) + 1, order
+    h, regular = longest_step(series, n, first, stride, groups, least, rtol, atol, exact, weights)
+    if not least * abs(math.log2(h)) <= MOST_BITS:
+        h, regular = longest_step(series, n, first, stride, groups, highest, rtol, atol, exact, weights)
+        return highest, h, regular
+    while order > least:
+        h, regular = longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights)
+        most = int(MOST_BITS / abs(math.log2(h)))
+        if order <= most:
+            break
+        order = max(least, most)
+    return order, h, regular
 
 
 @njit(**KERNEL)
@@ -329,6 +353,11 @@ def series_step(task, remaining):
         start, stride = model.tangent_start, model.tangent_columns[mode]
         groups = whole_registers(tangents, NARROW) // NARROW
         h, regular = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
+        reach = power_of_two(MOST_BITS / order)
+        if not 1.0 < h * reach < reach * reach:
+            order, h, regular = within_floats(
+                series, n, start, stride, groups, order, rtol, atol, exact, work.weights
+            )
     if not h > 0.0:
         return NON_FINITE, 0.0
     if clock < 0:
