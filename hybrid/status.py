@@ -92,7 +92,8 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         ),
         StatusCode.NON_FINITE: (
             f"The field or the state became infinite or nan {where}.",
-            "Check the model there; a field must also be defined slightly beyond the guards of its mode.",
+            "Check the model there; a field must also be defined slightly beyond the guards of its mode, "
+            "as np.maximum(depth, 0)**1.5 is.",
         ),
         StatusCode.ACCUMULATION: (
             f"After {last} the state rests on its guard {where} and the field pushes it through the guard: "

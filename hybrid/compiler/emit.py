@@ -29,6 +29,7 @@ from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
+from hybrid.compiler.written import Written, beyond_guards, variational, zeros_first
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import WIDE
 from hybrid.symbolic.continuity import jumps_of, may_jump
@@ -54,11 +55,6 @@ if TYPE_CHECKING:
     from hybrid.system.elements import Transition
     from hybrid.system.graph import HybridSystem
 
-# A cell of a matrix in the statements for a derivative, and how the statement for a cell that is zero ends.
-_CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
-ZERO_CELL = "] = 0.0"
-# So many zeros are written by a loop.
-MANY_ZEROS = 50
 Result = TypeVar("Result")
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
@@ -94,19 +90,27 @@ def _emitted(system: HybridSystem) -> Emitted:
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
     symbols = writer.symbols
+    evaluated = [
+        writer.remembered(
+            ("beyond", id(mode.field), id(mode.jacobian), tuple(around)),
+            partial(beyond_guards, field, around, symbols),
+        )
+        for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
+    ]
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
     series = [each.series for each in propagators]
     places = _places(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
-        "field": [field.value for field in fields],
-        "field_jacobian": [_zeros_first(field.derivative, n) for field in fields],
+        "field": [field.value for field in evaluated],
+        "field_jacobian": [zeros_first(field.derivative, n) for field in evaluated],
         "variational_field": [
             writer.remembered(
-                ("variational", id(mode.field), id(mode.jacobian)), partial(_variational, field, n)
+                ("variational", id(mode.field), id(mode.jacobian), tuple(around)),
+                partial(variational, field, n),
             )
-            for mode, field in zip(system.modes, fields, strict=True)
+            for mode, field, around in zip(system.modes, evaluated, boundaries, strict=True)
         ],
         "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
         "guard_gradient": [guard.derivative for guard in guards],
@@ -115,7 +119,7 @@ def _emitted(system: HybridSystem) -> Emitted:
             for expression, straight in zip(traced, affine, strict=True)
         ],
         "reset": [reset.value for reset in resets],
-        "reset_jacobian": [_zeros_first(reset.derivative, n) for reset in resets],
+        "reset_jacobian": [zeros_first(reset.derivative, n) for reset in resets],
         "series": _placed(places, [each.statements for each in series]),
         "tangent_series": _placed(places, [each.tangent_statements for each in series]),
     }
@@ -204,17 +208,6 @@ def _without_text(propagator: Propagator) -> Propagator:
     return attrs.evolve(propagator, series=series)
 
 
-@attrs.frozen
-class _Written:
-    """Statements for a function and its derivative; the expressions behind them if it was traced."""
-
-    value: list[str]
-    derivative: list[str]
-    expressions: list[sympy.Expr] | None = None
-    jacobian: list[list[sympy.Expr]] | None = None
-    given: bool = False
-
-
 class _Writer:
     """Writes the statements of model functions, and gathers those that stay opaque."""
 
@@ -235,11 +228,11 @@ class _Writer:
         found: Result = self._known[key]
         return found
 
-    def write(self, function: ModelFunction) -> _Written:
+    def write(self, function: ModelFunction) -> Written:
         """Statements for a function and its derivative."""
         return self.remembered(("written", *function.identity), lambda: self._write(function))
 
-    def _write(self, function: ModelFunction) -> _Written:
+    def _write(self, function: ModelFunction) -> Written:
         targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
         try:
             expressions = self.traced(function.value)
@@ -252,36 +245,36 @@ class _Writer:
         else:
             derivative = self._given_derivative(function, function.derivative)
         given = function.derivative is not None
-        return _Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
+        return Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
-    def condition(self, function: ModelFunction) -> _Written:
+    def condition(self, function: ModelFunction) -> Written:
         """Statements for the condition of a guard; a truth value becomes 1 or 0."""
         return self.remembered((CONDITION, *function.identity), lambda: self._condition(function))
 
-    def _condition(self, function: ModelFunction) -> _Written:
+    def _condition(self, function: ModelFunction) -> Written:
         try:
             [value] = self.traced(function.value)
         except ModelError as reason:
-            return _Written(self._opaque_value(function, ["out[0]"], reason), [])
+            return Written(self._opaque_value(function, ["out[0]"], reason), [])
         value = Select(value, ONE, ZERO) if value.is_Boolean else value
         # It is evaluated at crossings only, so it is not worth a long search for common parts.
-        return _Written(assignments(["out[0]"], [value], thorough=False), [], [value])
+        return Written(assignments(["out[0]"], [value], thorough=False), [], [value])
 
     def surfaces(self, traced: Sequence[sympy.Expr | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The zero sets of all guards, as `hybrid.compiler.surfaces.surfaces` numbers them."""
         scaled = self.remembered("surfaces", dict[sympy.Expr, Any])
         return surfaces([each.guard.function for each in self.system.transitions], traced, scaled)
 
-    def identity(self) -> _Written:
+    def identity(self) -> Written:
         """The reset of a transition that has none."""
         return self.remembered("identity", self._identity)
 
-    def _identity(self) -> _Written:
+    def _identity(self) -> Written:
         n = self.system.dimension
         value = assignments([f"out[{i}]" for i in range(n)], self.symbols.x)
         cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
         entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
-        return _Written(value, assignments(cells, entries), [*self.symbols.x])
+        return Written(value, assignments(cells, entries), [*self.symbols.x])
 
     def traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
         """Expressions of a function; ModelError if it has none that can be compiled."""
@@ -289,10 +282,10 @@ class _Writer:
         _check_printable(expressions)
         return expressions
 
-    def _write_opaque(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> _Written:
+    def _write_opaque(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> Written:
         value = self._opaque_value(function, targets, reason)
         if function.derivative is not None:
-            return _Written(value, self._given_derivative(function, function.derivative))
+            return Written(value, self._given_derivative(function, function.derivative))
         error = complex_step_error(self.system.variables, function)
         if error is not None:
             raise ModelError(
@@ -300,7 +293,7 @@ class _Writer:
                 f"stopped: {type(error).__name__}: {error}. Write it with NumPy functions (np.sin, "
                 f"np.maximum) or give its derivative as {function.derivative_name}=."
             ) from (reason.__cause__ or error)
-        return _Written(value, self._complex_step(function, reason))
+        return Written(value, self._complex_step(function, reason))
 
     def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
         shape = () if function.size is None else (function.size,)
@@ -369,13 +362,13 @@ def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
         raise TraceError(f"the function {missing} has no compiled form")
 
 
-def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> _Written:
+def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> Written:
     function = reset_function(system.transitions[index], system.dimension)
     return writer.identity() if function is None else writer.write(function)
 
 
 def _boundaries(
-    system: HybridSystem, mode: str, guards: Sequence[_Written], symbols: Symbols
+    system: HybridSystem, mode: str, guards: Sequence[Written], symbols: Symbols
 ) -> list[Boundary]:
     return [
         Boundary(
@@ -389,7 +382,7 @@ def _boundaries(
 
 
 def _gradients(
-    system: HybridSystem, mode: str, guards: Sequence[_Written]
+    system: HybridSystem, mode: str, guards: Sequence[Written]
 ) -> list[Sequence[sympy.Expr] | None]:
     """The gradients of the guards in a mode; None for one that is not traced."""
     pairs = zip(system.transitions, guards, strict=True)
@@ -398,7 +391,7 @@ def _gradients(
 
 
 def _where_it_jumps(
-    system: HybridSystem, index: int, field: _Written, boundaries: Sequence[Boundary], symbols: Symbols
+    system: HybridSystem, index: int, field: Written, boundaries: Sequence[Boundary], symbols: Symbols
 ) -> str:
     """Where the field of a mode jumps in the state, in words; empty if it is proved to jump nowhere."""
     if field.expressions is None:
@@ -412,7 +405,7 @@ def _where_it_jumps(
     return ", or ".join(_INDEXED.sub(lambda match: names[match[0]], place) for place in places)
 
 
-def _has_proved_period(system: HybridSystem, written: Iterable[_Written], writer: _Writer) -> bool:
+def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer: _Writer) -> bool:
     """Whether all traced functions are proved to have the declared period, at any parameters."""
     if system.period is None:
         return True
@@ -443,42 +436,12 @@ def _ends_mode(transition: Transition) -> bool:
     return transition.source != transition.target and transition.guard.when is None
 
 
-def _written_condition(writer: _Writer, transition: Transition) -> _Written:
+def _written_condition(writer: _Writer, transition: Transition) -> Written:
     function = condition_function(transition)
-    return _Written([], [], []) if function is None else writer.condition(function)
+    return Written([], [], []) if function is None else writer.condition(function)
 
 
-def _zeros_first(statements: list[str], n: int) -> list[str]:
-    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
-    others = [each for each in statements if not each.endswith(ZERO_CELL)]
-    if len(statements) - len(others) < MANY_ZEROS:
-        return statements
-    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
-    return [*loop, *others]
-
-
-def _variational(field: _Written, n: int) -> list[str]:
-    """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
-
-    Entries that are proved zero cost nothing, and what field and Jacobian share is computed once.
-    """
-    entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
-    if field.expressions is None or field.jacobian is None or field.given:
-        local = [_CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
-        lines = [*field.value, *local]
-    else:
-        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}
-        targets = [*(f"out[{i}]" for i in range(n)), *entry.values()]
-        lines = assignments(targets, [*field.expressions, *(field.jacobian[i][j] for i, j in entry)])
-    lines.append(f"for v in range({n}, len(x), {n}):")
-    for i in range(n):
-        terms = [f"{entry[i, j]}*x[v + {j}]" for j in range(n) if (i, j) in entry]
-        lines.append(f"    out[v + {i}] = {' + '.join(terms) or '0.0'}")
-    trace = [entry[i, i] for i in range(n) if (i, i) in entry]
-    return [*lines, f"out[len(x)] = {' + '.join(trace) or '0.0'}"]
-
-
-def _is_affine(written: _Written, variables: Sequence[sympy.Symbol]) -> bool:
+def _is_affine(written: Written, variables: Sequence[sympy.Symbol]) -> bool:
     """Whether the derivative in the variables, which come first, is proved to depend on none of them."""
     if written.expressions is None or written.jacobian is None:
         return False

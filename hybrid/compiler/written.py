@@ -1,0 +1,110 @@
+"""The statements of model functions, with what is known of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import attrs
+import sympy
+
+from hybrid.compiler.propagators.equations import Boundary, known_positive
+from hybrid.compiler.taylor.roots import is_multiple
+from hybrid.symbolic.expressions import ZERO, Less, Maximum, Select
+from hybrid.symbolic.nodes import mentions, nodes_of, replaced
+from hybrid.symbolic.printer import assignments
+from hybrid.symbolic.tracing import Symbols
+
+# A cell of a matrix in the statements for a derivative, and how the statement for a cell that is zero ends.
+_CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
+_ZERO_CELL = "] = 0.0"
+# So many zeros are written by a loop.
+MANY_ZEROS = 50
+
+
+@attrs.frozen
+class Written:
+    """Statements for a function and its derivative; the expressions behind them if it was traced."""
+
+    value: list[str]
+    derivative: list[str]
+    expressions: list[sympy.Expr] | None = None
+    jacobian: list[list[sympy.Expr]] | None = None
+    given: bool = False
+
+
+def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbols) -> Written:
+    """The field of a mode, with roots of its guards that are zero beyond the guard.
+
+    Inside the mode nothing changes. Where the mode begins and ends, rounding leaves the state on either side
+    of the guard: there ``(-x.q)**1.5`` is no number, but ``np.maximum(-x.q, 0)**1.5`` is.
+    """
+    if field.expressions is None or field.jacobian is None:
+        return field
+    roots = _roots_inside(field.expressions, known_positive(boundaries), symbols)
+    if not roots:
+        return field
+    expressions = [replaced(entry, roots) for entry in field.expressions]
+    entries = [entry for row in field.jacobian for entry in row]
+    roots |= _roots_inside(entries, known_positive(boundaries), symbols)
+    n = len(symbols.x)
+    jacobian = [[replaced(entry, roots) for entry in row] for row in field.jacobian]
+    cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
+    derivative = assignments(cells, [entry for row in jacobian for entry in row])
+    return Written(
+        assignments([f"out[{i}]" for i in range(n)], expressions),
+        field.derivative if field.given else derivative,
+        expressions,
+        jacobian,
+        field.given,
+    )
+
+
+def _roots_inside(
+    expressions: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
+) -> dict[sympy.Expr, sympy.Expr]:
+    """Fractional powers of what is never negative in the mode, and what takes their place."""
+    found = {}
+    for power in nodes_of(sympy.Pow, *expressions):
+        if power.exp.is_Integer or not mentions(power.base, symbols.variables):
+            continue
+        for guard in known:
+            if is_multiple(power.base, guard, symbols):
+                factor, extended = sympy.cancel(power.base / guard), Maximum(power.base, ZERO)
+                if factor.is_Number and factor.is_positive:
+                    found[power] = extended**power.exp
+                elif not factor.is_Number:
+                    # With a negative factor the root has no value inside the mode, which must show.
+                    found[power] = Select(Less(ZERO, factor), extended, power.base) ** power.exp
+                break
+    return found
+
+
+def zeros_first(statements: list[str], n: int) -> list[str]:
+    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
+    others = [each for each in statements if not each.endswith(_ZERO_CELL)]
+    if len(statements) - len(others) < MANY_ZEROS:
+        return statements
+    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
+    return [*loop, *others]
+
+
+def variational(field: Written, n: int) -> list[str]:
+    """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
+
+    Entries that are proved zero cost nothing, and what field and Jacobian share is computed once.
+    """
+    entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
+    if field.expressions is None or field.jacobian is None or field.given:
+        local = [_CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
+        lines = [*field.value, *local]
+    else:
+        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}
+        targets = [*(f"out[{i}]" for i in range(n)), *entry.values()]
+        lines = assignments(targets, [*field.expressions, *(field.jacobian[i][j] for i, j in entry)])
+    lines.append(f"for v in range({n}, len(x), {n}):")
+    for i in range(n):
+        terms = [f"{entry[i, j]}*x[v + {j}]" for j in range(n) if (i, j) in entry]
+        lines.append(f"    out[v + {i}] = {' + '.join(terms) or '0.0'}")
+    trace = [entry[i, i] for i in range(n) if (i, i) in entry]
+    return [*lines, f"out[len(x)] = {' + '.join(trace) or '0.0'}"]
