@@ -118,12 +118,14 @@ factors = st.one_of(
     st.builds(lambda c: lambda t: (t / (c + 1)) * np.exp(1 - t / (c + 1)), centres),
     st.builds(lambda c, w: lambda t: np.cos(w * (t - c)), centres, st.floats(0.1, 1.0)),
     st.builds(lambda c, w: lambda t: 1 + np.cos(w * (t - c)), centres, st.floats(0.1, 1.0)),
-    st.builds(lambda r: lambda t: np.exp(r * t), rates),
     st.builds(lambda c: lambda t: np.exp(np.where(np.abs(t - c) < 1e-2, 9.0, 0.0)) - 1, centres),
     st.builds(lambda c: lambda t: np.cosh((t - c) / 10), centres),
 )
-powers = st.builds(
-    lambda f, n: lambda t: f(t) ** n, factors, st.sampled_from([1, 1, 2, 3, 4, 8, 30, 300, 3000])
+# An exponential is seen where it is large, at the start of a step or in its growth, however steep it is.
+exponentials = st.builds(lambda r: lambda t: np.exp(r * t), rates)
+powers = st.one_of(
+    st.builds(lambda f, n: lambda t: f(t) ** n, factors, st.sampled_from([1, 1, 2, 3, 4, 8, 30, 300, 3000])),
+    st.builds(lambda f, n: lambda t: f(t) ** n, exponentials, st.sampled_from([1, 2, 3, 4, 8])),
 )
 products = st.lists(powers, min_size=1, max_size=3).map(
     lambda each: lambda t: reduce(mul, [f(t) for f in each])
