@@ -64,7 +64,7 @@ def test_a_spectrum_of_a_contact_as_it_is_written_in_textbooks():
 def test_a_root_that_has_no_value_inside_the_mode_has_none_afterwards():
     wrong = oscillator(lambda x, p: p.K * (x.q + 0.5) ** 1.5)
     arc = simulate(wrong, (1.0, 0.0), (0.0, 30.0), mode="free")
-    assert arc.status.code is StatusCode.NON_FINITE
+    assert not arc.status.ok
     negative = oscillator(SAME["multiple"])
     arc = simulate(negative, (1.0, 0.0), (0.0, 30.0), mode="free", parameters={"R": -2.0})
     assert not arc.status.ok
