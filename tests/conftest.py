@@ -1,6 +1,7 @@
 """Settings of all tests: the same examples each time, no deadlines, no display."""
 
 import os
+from contextlib import suppress
 
 from hypothesis import HealthCheck, settings
 
@@ -16,3 +17,10 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("ci")
+
+# Hypothesis also draws numbers that it finds in the modules which a process has imported so far. So the
+# examples of a test would depend on which tests ran in its process before.
+with suppress(ImportError, AttributeError):
+    from hypothesis.internal.conjecture import providers
+
+    providers.is_local_module_file = lambda path: False
