@@ -63,7 +63,9 @@ def test_the_readme_shows_what_it_says():
     assert "accumulate" in printed
     assert names["report"].jumps.keys() == {"impact", "touch", "leave"}
     assert not names["report"].never_seen
-    assert "jacobian: entry D_v of v is -0.15 at t = 0, x = (0.004, 0)" in printed
+    # The state of the smallest case depends on which numbers Hypothesis draws.
+    assert "jacobian: entry D_v of v is -0.15 at t = 0, x = (" in printed
+    assert "the complex step of the field gives -0.15006" in printed
     assert "case: parameters c = 0.15006, the others as declared" in printed
 
 
