@@ -170,7 +170,7 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
                 for j in range(n):
                     work.jacobian[c, i] += work.sizes[i, j] * abs(run.y[n * (1 + c) + j])
     before = run.growth[0]
-    multiply(work.saltation, run.y, n, tangents, work.state)
+    multiply(work.saltation, run.y, n, tangents, work.state, work.rounding)
     if not anew:
         return 0.0
     orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True)
@@ -463,7 +463,7 @@ def rest(task, limit_mode):
     recall_map(model, run, tangents, work)
     change_mode_of_instant(model, run, limit_mode, work)
     chatter_matrix(model, run, transition, work)
-    multiply(work.saltation, run.instant, n, n, work.state)
+    multiply(work.saltation, run.instant, n, n, work.state, work.rounding)
     if tangents > 0:
         map_of_instant(run, n, work.saltation)
         assume_sizes(n, work)
