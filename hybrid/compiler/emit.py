@@ -2,8 +2,9 @@
 
 Each function is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
 fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
-columns, time last. The variational field is the one function that reads all of ``x (n (1 + k),)``: the state
-and ``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
+columns, time last; the Jacobian of a field leaves the cells alone that are proved zero, but for those of
+time. The variational field is the one function that reads all of ``x (n (1 + k),)``: the state and ``k``
+tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import function_of_index
 from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Propagator, Series
+from hybrid.compiler.jacobians import CELL, slope_columns, without_zeros, zeros_first
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.propagators.choice import propagator
@@ -54,11 +56,6 @@ if TYPE_CHECKING:
     from hybrid.system.elements import Transition
     from hybrid.system.graph import HybridSystem
 
-# A cell of a matrix in the statements for a derivative, and how the statement for a cell that is zero ends.
-_CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
-ZERO_CELL = "] = 0.0"
-# So many zeros are written by a loop.
-MANY_ZEROS = 50
 Result = TypeVar("Result")
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
@@ -97,11 +94,12 @@ def _emitted(system: HybridSystem) -> Emitted:
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
+    jacobians = [without_zeros(field.derivative, n) for field in fields]
     series = [each.series for each in propagators]
     places = _places(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
         "field": [field.value for field in fields],
-        "field_jacobian": [_zeros_first(field.derivative, n) for field in fields],
+        "field_jacobian": [*jacobians],
         "variational_field": [
             writer.remembered(
                 ("variational", id(mode.field), id(mode.jacobian)), partial(_variational, field, n)
@@ -115,7 +113,7 @@ def _emitted(system: HybridSystem) -> Emitted:
             for expression, straight in zip(traced, affine, strict=True)
         ],
         "reset": [reset.value for reset in resets],
-        "reset_jacobian": [_zeros_first(reset.derivative, n) for reset in resets],
+        "reset_jacobian": [zeros_first(reset.derivative, n) for reset in resets],
         "series": _placed(places, [each.statements for each in series]),
         "tangent_series": _placed(places, [each.tangent_statements for each in series]),
     }
@@ -146,6 +144,7 @@ def _emitted(system: HybridSystem) -> Emitted:
         forcing_component=tuple(each.component for each in forcing),
         first_residue=tuple(accumulate(map(len, residual), initial=0)),
         residue_component=tuple(each.component for each in cancelling),
+        slope_columns=tuple(slope_columns(each, n) for each in jacobians),
         traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,
@@ -448,15 +447,6 @@ def _written_condition(writer: _Writer, transition: Transition) -> _Written:
     return _Written([], [], []) if function is None else writer.condition(function)
 
 
-def _zeros_first(statements: list[str], n: int) -> list[str]:
-    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
-    others = [each for each in statements if not each.endswith(ZERO_CELL)]
-    if len(statements) - len(others) < MANY_ZEROS:
-        return statements
-    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
-    return [*loop, *others]
-
-
 def _variational(field: _Written, n: int) -> list[str]:
     """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
 
@@ -464,7 +454,7 @@ def _variational(field: _Written, n: int) -> list[str]:
     """
     entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
     if field.expressions is None or field.jacobian is None or field.given:
-        local = [_CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
+        local = [CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
         lines = [*field.value, *local]
     else:
         entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}

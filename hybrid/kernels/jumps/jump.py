@@ -5,6 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward
+from hybrid.kernels.arithmetic.slopes import whole_jacobian
 from hybrid.kernels.arithmetic.tangent import (
     STRAINED,
     log_abs_determinant,
@@ -366,7 +367,7 @@ def follow_impacts(task, transition, remaining):
         assume_sizes(n, work)
         carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
         if not apart:
-            model.field_jacobian(target, run.phase, x_limit, model.parameters, work.jacobian)
+            whole_jacobian(model, target, run.phase, x_limit, work.jacobian)
             drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
             drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
     run.round = 1
