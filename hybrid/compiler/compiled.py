@@ -245,6 +245,7 @@ class CompiledSystem:
             forcing_component=_indices(self.emitted.forcing_component),
             first_residue=_indices(self.emitted.first_residue),
             residue_component=_indices(self.emitted.residue_component),
+            **_slopes(self.emitted.slope_columns),
             surface=_indices(self.emitted.surface),
             orientation=_indices(self.emitted.orientation),
             paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
@@ -280,6 +281,14 @@ def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.nd
         ]
         first.append(len(indices))
     return _indices(first), _indices(indices)
+
+
+def _slopes(columns: Sequence[Sequence[Sequence[int]]]) -> dict[str, np.ndarray]:
+    """The entries of the Jacobians of all modes: where each row begins and ends, and their columns."""
+    rows = [row for of_mode in columns for row in of_mode]
+    n, ends = len(columns[0]), np.cumsum([0, *map(len, rows)])
+    first = np.array([ends[n * mode : n * mode + n + 1] for mode in range(len(columns))])
+    return {"first_slope": first, "slope_column": _indices(column for row in rows for column in row)}
 
 
 def _program_runners(needed: bool) -> dict[str, Any]:

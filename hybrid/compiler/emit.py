@@ -2,8 +2,9 @@
 
 Each function is one function ``(index, t, x, p, out)``, with the index of a mode or of a transition, that
 fills ``out`` and allocates nothing. ``x`` may be longer than the state. Derivatives have ``n + 1``
-columns, time last. The variational field is the one function that reads all of ``x (n (1 + k),)``: the state
-and ``k`` tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
+columns, time last; the Jacobian of a field leaves the cells alone that are proved zero, but for those of
+time. The variational field is the one function that reads all of ``x (n (1 + k),)``: the state and ``k``
+tangent vectors. It writes their derivatives and, one place further, the divergence of the field.
 """
 
 from __future__ import annotations
@@ -23,13 +24,14 @@ from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import function_of_index
 from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Propagator, Series
+from hybrid.compiler.jacobians import slope_columns, without_zeros, zeros_first
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
-from hybrid.compiler.written import Written, beyond_guards, variational, zeros_first
+from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import WIDE
 from hybrid.symbolic.continuity import jumps_of, may_jump
@@ -100,11 +102,12 @@ def _emitted(system: HybridSystem) -> Emitted:
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
+    jacobians = [without_zeros(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
     places = _places(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
         "field": [field.value for field in evaluated],
-        "field_jacobian": [zeros_first(field.derivative, n) for field in evaluated],
+        "field_jacobian": [*jacobians],
         "variational_field": [
             writer.remembered(
                 ("variational", id(mode.field), id(mode.jacobian), tuple(around)),
@@ -150,6 +153,7 @@ def _emitted(system: HybridSystem) -> Emitted:
         forcing_component=tuple(each.component for each in forcing),
         first_residue=tuple(accumulate(map(len, residual), initial=0)),
         residue_component=tuple(each.component for each in cancelling),
+        slope_columns=tuple(slope_columns(each, n) for each in jacobians),
         traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,

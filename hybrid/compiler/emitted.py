@@ -125,6 +125,8 @@ class Emitted:
         the number of all.
     residue_component
         By residue: the component of the state whose rate it is.
+    slope_columns
+        By mode and component: the columns of the state in which its row of the Jacobian may have entries.
     traced_field
         By mode: whether tracing could follow the field.
     surface, orientation
@@ -153,6 +155,7 @@ class Emitted:
     forcing_component: tuple[int, ...]
     first_residue: tuple[int, ...]
     residue_component: tuple[int, ...]
+    slope_columns: tuple[tuple[tuple[int, ...], ...], ...]
     traced_field: tuple[bool, ...]
     surface: tuple[int, ...]
     orientation: tuple[int, ...]

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import attrs
 import sympy
 
+from hybrid.compiler.jacobians import CELL
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.symbolic.expressions import ZERO, Less, Maximum, Select
 from hybrid.symbolic.nodes import mentions, nodes_of, replaced
 from hybrid.symbolic.printer import assignments
 from hybrid.symbolic.tracing import Symbols
-
-# A cell of a matrix in the statements for a derivative, and how the statement for a cell that is zero ends.
-_CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
-_ZERO_CELL = "] = 0.0"
-# So many zeros are written by a loop.
-MANY_ZEROS = 50
 
 
 @attrs.frozen
@@ -80,15 +74,6 @@ def _roots_inside(
     return found
 
 
-def zeros_first(statements: list[str], n: int) -> list[str]:
-    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
-    others = [each for each in statements if not each.endswith(_ZERO_CELL)]
-    if len(statements) - len(others) < MANY_ZEROS:
-        return statements
-    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
-    return [*loop, *others]
-
-
 def variational(field: Written, n: int) -> list[str]:
     """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
 
@@ -96,7 +81,7 @@ def variational(field: Written, n: int) -> list[str]:
     """
     entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
     if field.expressions is None or field.jacobian is None or field.given:
-        local = [_CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
+        local = [CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
         lines = [*field.value, *local]
     else:
         entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}

@@ -1,5 +1,6 @@
 """The compiled functions of a model, called from Python."""
 
+from hybrid.kernels.arithmetic.slopes import whole_jacobian
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR
 from hybrid.kernels.types.layout import Model
 from hybrid.kernels.types.options import exported
@@ -22,6 +23,6 @@ def vector_function(model, function, index, t, x, out):
 def matrix_function(model, function, index, t, x, out):
     """Jacobian ``(n, n + 1)`` of a field (function 0) or a reset (2) into ``out``."""
     if function == 0:
-        model.field_jacobian(index, t, x, model.parameters, out)
+        whole_jacobian(model, index, t, x, out)
     else:
         model.reset_jacobian(index, t, x, model.parameters, out)

@@ -9,6 +9,7 @@ import attrs
 from hybrid.kernels.types import codes
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import (
+    SUCCESS,
     Status,
     StatusCode,
     chatter_status,
@@ -91,17 +92,16 @@ def _kinks(trajectory: Trajectory) -> Iterator[str]:
 
 
 def _status(trajectory: Trajectory, code: int) -> Status:
-    where = f"at t = {trajectory.t:.12g} in mode {trajectory.mode!r}"
     if code == StatusCode.INTERRUPTED:
-        return run_status(code, where, None, bare_time=False)
-    run, jumps = trajectory.run, trajectory.jumps
+        return run_status(code, _place(trajectory), None, bare_time=False)
+    run = trajectory.run
     singular, ambiguous = run.singular_jumps, run.order_mattered
     grazed = run.ill_conditioned if trajectory.tangents else 0
     if trajectory.tangents and singular:
         return Status(
             StatusCode.SINGULAR_SALTATION,
-            f"{singular} of {jumps} jumps had no saltation matrix: they grazed exactly, or were the limit of "
-            "several transitions that accumulate in turn.",
+            f"{singular} of {trajectory.jumps} jumps had no saltation matrix: they grazed exactly, or were "
+            "the limit of several transitions that accumulate in turn.",
             "The tangent vectors are not valid after these jumps. Move the parameters away from the grazing.",
         )
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
@@ -115,6 +115,7 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
     if code == codes.DONE and ambiguous:
+        jumps = trajectory.jumps
         also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""
         return Status(
             StatusCode.AMBIGUOUS_ORDER,
@@ -124,6 +125,9 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         )
     if code == codes.DONE and grazed:
         return _grazed(trajectory, grazed)
+    if code == codes.DONE:
+        return SUCCESS
+    where = _place(trajectory)
     names = trajectory.system.transition_names
     if code == codes.STUCK:
         fired = _round(trajectory)
@@ -134,6 +138,10 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     last = run.last_fired
     bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
     return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
+
+
+def _place(trajectory: Trajectory) -> str:
+    return f"at t = {trajectory.t:.12g} in mode {trajectory.mode!r}"
 
 
 def _grazed(trajectory: Trajectory, grazed: int) -> Status:

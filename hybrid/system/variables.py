@@ -82,7 +82,7 @@ class Variables:
         """Number of state components ``n``."""
         return self.state if isinstance(self.state, int) else len(self.state)
 
-    @property
+    @cached_property
     def state_names(self) -> tuple[str, ...]:
         """Names of the components; ``x0, x1, ...`` if only their number was given."""
         return tuple(f"x{i}" for i in range(self.state)) if isinstance(self.state, int) else self.state

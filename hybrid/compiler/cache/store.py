@@ -71,6 +71,7 @@ def _read(path: Path) -> Emitted | None:
         parts = ("first_forcing", "forcing_component", "first_residue", "residue_component")
         for name in (*of_transitions, *of_modes, "timed_guard", *parts):
             found[name] = tuple(found[name])
+        found["slope_columns"] = tuple(tuple(map(tuple, rows)) for rows in found["slope_columns"])
         names = ("rows", "checked", "numbers", "first")
         rows, checked, numbers, first = (found["programs"][name] for name in names)
         found["programs"] = Programs(

@@ -9,6 +9,7 @@ import sympy
 from hybrid.compiler.emitted import Series
 from hybrid.compiler.propagators.equations import ELEMENTARY
 from hybrid.compiler.taylor.loops import StateLoop, TangentLoop, indented, padded
+from hybrid.compiler.taylor.pairs import columns_of
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences
 from hybrid.kernels.types.codes import NARROW, WIDE
 from hybrid.symbolic.constants import Constants
@@ -123,7 +124,7 @@ class Body:
         """
         free = self.columns
         alone = self._state("s", names, columns, starts, rates, guards)
-        self._place_pairs(alone.block)
+        self._place_pairs(alone)
         width, self.columns = self.columns, free
         names, rates = [*names, None], [*rates, trace]
         columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, "0.0"]
@@ -134,7 +135,7 @@ class Body:
         vectors.expect(seeds.values(), tangents)
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
-        self._place_pairs(moved.block)
+        self._place_pairs(moved)
         together = [*moved.higher(), *carried.higher()]
         shared = [*self.preamble, *self.constants.statements(), "o = 0"]
         return Series(
@@ -166,11 +167,17 @@ class Body:
         moved.write_front(self.behind_guards + OTHERS, crossing)
         return moved
 
-    def _place_pairs(self, block: Recurrences) -> None:
-        for factors in "ab" if block.common_left is None else "b":
+    def _place_pairs(self, loop: StateLoop) -> None:
+        block, found = loop.block, loop.layers()
+        for name, count in columns_of(found).items():
+            if block.common_left is not None and name == found[0].left:
+                continue
             self.columns = padded(self.columns, WIDE)
-            self.preamble.append(f"{block.prefix}{factors} = {self.columns}")
-            self.columns += padded(len(block.pairs))
+            self.preamble.append(f"{name} = {self.columns}")
+            self.columns += padded(count)
+        for layer in found:
+            for column, place in enumerate(layer.places):
+                self.preamble.append(f"{block.prefix}c{place} = {layer.right} + {column}")
 
 
 def groups(n: int) -> str:

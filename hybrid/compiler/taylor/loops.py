@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import sympy
 
+from hybrid.compiler.taylor.pairs import Layer, layers
 from hybrid.compiler.taylor.series import Recurrences
 from hybrid.kernels.types.codes import NARROW, WIDE
 
@@ -52,6 +53,12 @@ class StateLoop:
         columns = self.names | others
         self.front = [columns.get(str(i), "0.0") for i in range(width)]
 
+    def layers(self) -> list[Layer]:
+        """How the factors of the convolutions lie side by side."""
+        block = self.block
+        squares = [block.rows.get(right) == left for left, right in block.pairs]
+        return layers([left for left, _ in block.pairs], squares, block.prefix)
+
     def first(self) -> list[str]:
         """Statements for order zero."""
         block = self.block
@@ -64,7 +71,7 @@ class StateLoop:
     def higher(self) -> list[str]:
         """Statements for order ``o``; ``shrink`` is 1/o."""
         block = self.block
-        inner = [f"{block.prefix}s{i} = out[o, {block.prefix}b + {i}]" for i in range(len(block.pairs))]
+        inner = [f"{block.prefix}s{i} = out[o, {block.prefix}c{i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
         after = [f"{name} = {value}" for name, value in block.before().items()]
         sums = [*inner, *self._sums("o + 1")]
@@ -78,20 +85,19 @@ class StateLoop:
     def _rows(self) -> list[str]:
         """Write adjacent columns as one vector, so that they can soon be read as one vector."""
         block, rows = self.block, [("0", self.front)]
-        if block.pairs:
-            rows.append((f"{block.prefix}b", list(block.pairs.values())))
-        if block.pairs and block.common_left is None:
-            rows.append((f"{block.prefix}a", [f"out[o, {left}]" for left, _ in block.pairs]))
+        values, found = list(block.pairs.values()), self.layers()
+        rows += [(each.right, [values[i] for i in each.places]) for each in found if each.right != each.left]
+        if block.common_left is None:
+            rows += [(each.left, [f"out[o, {left}]" for left in each.lefts]) for each in found if each.lefts]
         return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
 
     def _sums(self, order: str) -> list[str]:
-        prefix, width = self.block.prefix, padded(len(self.block.pairs))
-        left = self.block.common_left
-        if not width:
-            return []
-        if left is None:
-            return [f"convolve_pairs(out, {order}, 2, {prefix}a, {prefix}b, {width}, {WIDE})"]
-        return [f"convolve(out, {order}, 2, {left}, {prefix}b, {width}, {WIDE})"]
+        common = self.block.common_left
+        name = "convolve_pairs" if common is None else "convolve"
+        factors = [(common or each.left, each.right, padded(len(each.places))) for each in self.layers()]
+        return [
+            f"{name}(out, {order}, 2, {left}, {right}, {width}, {WIDE})" for left, right, width in factors
+        ]
 
 
 class TangentLoop:

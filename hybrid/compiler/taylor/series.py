@@ -210,7 +210,7 @@ class Recurrences:
         self.pairs.setdefault((left, right), "")
         place = self.places.setdefault((left, right), len(self.places))
         self.lefts.setdefault(left, place)
-        column = f"{self.prefix}b + {place}"
+        column = f"{self.prefix}c{place}"
         # The second factor often depends on the first and is known later, so its term is added last.
         inner = f"{self.prefix}s{place} + {self._left_before(left)}*out[1, {column}]"
         return f"({inner} + out[1, {left}]*{self.prefix}p{place})", column

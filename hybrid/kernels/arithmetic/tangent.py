@@ -140,12 +140,23 @@ def keep_apart(model, run, mode, tangents, gram):
 
 
 @njit(**KERNEL)
-def multiply(matrix, y, n, tangents, image):
-    """Multiply the tangent vectors in ``y (n (1 + k),)`` by a matrix; ``image (n,)`` is scratch."""
+def multiply(matrix, y, n, tangents, image, ends):
+    """Multiply the tangent vectors in ``y (n (1 + k),)`` by a matrix.
+
+    ``image (n,)`` is scratch, and so is ``ends (2, n)``: each row has entries between two columns only, since
+    a jump changes a few components of a large system.
+    """
+    for i in range(n):
+        first, last = 0, n
+        while first < n and matrix[i, first] == 0.0:
+            first += 1
+        while last > first and matrix[i, last - 1] == 0.0:
+            last -= 1
+        ends[0, i], ends[1, i] = first, last
     for start in range(n, n * (1 + tangents), n):
         for i in range(n):
             total = 0.0
-            for j in range(n):
+            for j in range(int(ends[0, i]), int(ends[1, i])):
                 total += matrix[i, j] * y[start + j]
             image[i] = total
         for i in range(n):
@@ -190,7 +201,7 @@ def solve(system, n, out):
             system[rank, j], system[pivot, j] = system[pivot, j], system[rank, j]
         for i in range(n):
             factor = system[i, column] / system[rank, column]
-            for j in range(column, n + 1 if i != rank else 0):
+            for j in range(column, n + 1 if i != rank and factor != 0.0 else 0):
                 system[i, j] -= factor * system[rank, j]
         rank += 1
     rank = 0
@@ -225,7 +236,8 @@ def log_abs_determinant(matrix, magnitude, n):
         total += math.log(size)
         for i in range(column + 1, n):
             factor = matrix[i, column] / matrix[column, column]
-            for j in range(column, n):
+            # The matrix of a jump that changes a few components of a large system is nearly the identity.
+            for j in range(column, n if factor != 0.0 else 0):
                 term = factor * matrix[column, j]
                 matrix[i, j] -= term
                 magnitude[i, j] = max(magnitude[i, j], abs(factor) * magnitude[column, j])

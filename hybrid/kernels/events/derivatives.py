@@ -10,6 +10,7 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     guard_acceleration,
@@ -26,13 +27,10 @@ SPREADS, BENDS, SPREADS_OF_BENDS, PLACE = range(4)
 
 
 @njit(**INLINE)
-def _spread(model, run, t, i, work):
+def _spread(model, run, mode, t, i, work):
     """How far state and time, moved by their own sizes, move the rate of one component."""
-    n = model.dimension
-    spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
-    for j in range(n):
-        spread += abs(work.jacobian[i, j]) * run.scale[j]
-    return spread
+    spread = abs(work.field[i]) + abs(work.jacobian[i, model.dimension]) * size_of_time(model, t)
+    return spread + spread_of_rate(model, mode, i, work.jacobian, run.scale)
 
 
 @njit(**INLINE)
@@ -50,7 +48,7 @@ def spread_rates(model, run, transition, mode, t, x, work):
     n, spreads = model.dimension, work.rounding[SPREADS]
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     for i in range(n):
-        spreads[i] = _spread(model, run, t, i, work) if _matters(model, transition, i, work) else 0.0
+        spreads[i] = _spread(model, run, mode, t, i, work) if _matters(model, transition, i, work) else 0.0
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
         component = model.residue_component[residue]
@@ -60,7 +58,7 @@ def spread_rates(model, run, transition, mode, t, x, work):
 
 
 @njit(**KERNEL)
-def _bend_rates(model, run, transition, t, work):
+def _bend_rates(model, run, transition, mode, t, work):
     """Time derivatives of these rates along the flow, and how far they move, into ``work.rounding``.
 
     ``work.field``, ``work.gradient`` and ``work.jacobian`` are current.
@@ -68,17 +66,18 @@ def _bend_rates(model, run, transition, t, work):
     n, spreads = model.dimension, work.rounding[SPREADS]
     bent = model.affine_guard[transition] == 0
     for i in range(n if bent else 0):
-        spreads[i] = _spread(model, run, t, i, work)
+        spreads[i] = _spread(model, run, mode, t, i, work)
     for i in range(n):
         bend, spread = 0.0, 0.0
         if _matters(model, transition, i, work):
             bend = work.jacobian[i, n]
             spread = abs(bend)
-            for j in range(n):
+            for place in range(model.first_slope[mode, i], model.first_slope[mode, i + 1]):
+                j = model.slope_column[place]
                 slope = work.jacobian[i, j]
                 if slope != 0.0:
                     bend += slope * work.field[j]
-                    spread += abs(slope) * (spreads[j] if bent else _spread(model, run, t, j, work))
+                    spread += abs(slope) * (spreads[j] if bent else _spread(model, run, mode, t, j, work))
         work.rounding[BENDS, i], work.rounding[SPREADS_OF_BENDS, i] = bend, spread
 
 
@@ -107,7 +106,7 @@ def acceleration_rounding(model, run, transition, mode, t, x, work):
     ``work.field`` and ``work.gradient`` are current.
     """
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
-    _bend_rates(model, run, transition, t, work)
+    _bend_rates(model, run, transition, mode, t, work)
     return SHARE * _size(work.gradient, work.rounding[SPREADS_OF_BENDS], model.dimension)
 
 
@@ -240,7 +239,7 @@ def acceleration_sign(model, run, transition, mode, t, x, work):
     as exact.
     """
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
-    _bend_rates(model, run, transition, t, work)
+    _bend_rates(model, run, transition, mode, t, work)
     acceleration, rounding = _derivative(model, transition, t, x, True, work)
     if math.isnan(acceleration):
         acceleration = guard_acceleration(model, run, transition, mode, t, x, work)

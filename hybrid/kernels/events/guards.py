@@ -5,6 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import lowest
+from hybrid.kernels.arithmetic.slopes import change_of_rate, jacobian_with_opposites, spread_of_rate
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -126,11 +127,12 @@ def widen_scale(model, run, work):
     is zero, in any units. ``work.field`` is current.
     """
     n, mode, t = model.dimension, run.mode, run.phase
-    model.field_jacobian(mode, t, run.y, model.parameters, work.jacobian)
+    jacobian_with_opposites(model, mode, t, run.y, work.jacobian)
     rounding, feedback = work.state, 0.0
     for i in range(n):
         size = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
-        for j in range(n):
+        for place in range(model.first_slope[mode, i], model.first_slope[mode, i + 1]):
+            j = model.slope_column[place]
             size += abs(work.jacobian[i, j] * run.y[j])
             feedback = max(feedback, abs(work.jacobian[i, j] * work.jacobian[j, i]))
         rounding[i] = ROUNDING_OF_STATE * EPSILON * size
@@ -139,10 +141,8 @@ def widen_scale(model, run, work):
         spread = spread_of_terms(model, run, first + residue, t, run.y, work)
         rounding[model.residue_component[residue]] += spread
     for i in range(n):
-        change, noise = work.jacobian[i, n], 0.0
-        for j in range(n):
-            change += work.jacobian[i, j] * work.field[j]
-            noise += abs(work.jacobian[i, j]) * rounding[j]
+        change = work.jacobian[i, n] + change_of_rate(model, mode, i, work.jacobian, work.field)
+        noise = spread_of_rate(model, mode, i, work.jacobian, rounding)
         rate = abs(work.field[i])
         moment = rate / abs(change) if abs(change) > noise else math.inf
         if feedback > 0.0:
@@ -203,9 +203,7 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     total = 0.0
     for i in range(n):
         if work.gradient[i] != 0.0:
-            bend = work.jacobian[i, n]
-            for j in range(n):
-                bend += work.jacobian[i, j] * work.field[j]
+            bend = work.jacobian[i, n] + change_of_rate(model, mode, i, work.jacobian, work.field)
             total += work.gradient[i] * bend
     if model.affine_guard[transition] == 1:
         return total

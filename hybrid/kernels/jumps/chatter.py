@@ -5,6 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.arithmetic.slopes import change_of_rate, spread_of_rate, whole_jacobian
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
 from hybrid.kernels.jumps.rounds import fired_before
 from hybrid.kernels.types.layout import EPSILON
@@ -199,7 +200,7 @@ def speed_gradient(model, run, transition, mode, t, x, out, work):
     """
     n = model.dimension
     model.field(mode, t, x, model.parameters, work.field)
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    whole_jacobian(model, mode, t, x, work.jacobian)
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     for j in range(n):
         total = 0.0
@@ -251,32 +252,28 @@ def chatter_matrix(model, run, transition, work):
 
 
 @njit(**KERNEL)
-def along_mean(model, run, transition, t, x, direction, span, out, work):
+def along_mean(model, run, transition, t, x, direction, span, mean, jacobian, out, work):
     """Derivative of the mean field at ``x (n,)`` in a direction, into ``out (n,)``.
 
-    That of the guard's acceleration is a central difference. It moves no component by more than a share of
-    the component's size, or of the way that the component goes in the time ``span``.
+    ``mean (n,)`` and ``jacobian`` are the mean field and the Jacobian of the field there. The derivative of
+    the guard's acceleration is a central difference. It moves no component by more than a share of the
+    component's size, or of the way that the component goes in the time ``span``.
     """
-    n, place, mean = model.dimension, work.reset_jacobian[0], work.new
-    mean_field(model, run, transition, t, x, mean, work)
+    n, place, beside = model.dimension, work.rounding[0], work.rounding[1]
     step = math.inf
     for i in range(n):
         size = max(abs(x[i]), run.scale[i], span * abs(mean[i]))
         if size > 0.0 and direction[i] != 0.0:
             step = min(step, 6e-6 * size / abs(direction[i]))
     step = step if step < math.inf else 1.0
-    model.field_jacobian(run.mode, t, x, model.parameters, work.jacobian)
-    for i in range(n):
-        out[i] = 0.0
-        for j in range(n):
-            out[i] += work.jacobian[i, j] * direction[j]
     for i in range(n):
         place[i] = x[i] + step * direction[i]
-    change = mean_field(model, run, transition, t, place, mean, work)
+    change = mean_field(model, run, transition, t, place, beside, work)
     for i in range(n):
         place[i] = x[i] - step * direction[i]
-    change -= mean_field(model, run, transition, t, place, mean, work)
+    change -= mean_field(model, run, transition, t, place, beside, work)
     for i in range(n):
+        out[i] = change_of_rate(model, run.mode, i, jacobian, direction)
         out[i] -= change / (2.0 * step) * run.trail[IMPULSE, i]
 
 
@@ -285,13 +282,16 @@ def drift_with_mean(model, run, transition, span, work):
     """Carry the columns of ``work.saltation`` along the mean field for a short time, to its second order."""
     n, t = model.dimension, run.phase + 0.5 * span
     middle, column, image = work.trial, work.error, work.second_error
+    mean, jacobian = work.new, work.reset_jacobian
     for i in range(n):
         middle[i] = 0.5 * (run.y[i] + work.settled[i])
+    mean_field(model, run, transition, t, middle, mean, work)
+    model.field_jacobian(run.mode, t, middle, model.parameters, jacobian)
     for j in range(n):
         for i in range(n):
             column[i] = work.saltation[i, j]
         for order in range(1, 3):
-            along_mean(model, run, transition, t, middle, column, span, image, work)
+            along_mean(model, run, transition, t, middle, column, span, mean, jacobian, image, work)
             for i in range(n):
                 column[i] = image[i] * span / order
                 work.saltation[i, j] += column[i]
@@ -319,14 +319,15 @@ def add_change_of_duration(model, method, run, target, span, work):
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
     for j in range(n):
         run.instant[j] = by_speed * work.error[j] + by_height * work.gradient[j]
-    apart, excess = False, work.field_after
+    apart, excess, tolerances = False, work.field_after, work.rounding[0]
+    for j in range(n):
+        tolerances[j] = method.atol + method.rtol * run.scale[j]
     for i in range(n):
         # Rounding of the fields and of the impulse, a quotient by the speed, and the error of the limit.
         blurred = abs(work.field[i]) + abs(work.field_after[i]) + pull * run.scale[i] / speed
         blurred *= 16.0 * EPSILON
-        for j in range(n):
-            steepness = abs(work.jacobian[i, j]) + abs(work.reset_jacobian[i, j])
-            blurred += steepness * (method.atol + method.rtol * run.scale[j])
+        blurred += spread_of_rate(model, run.mode, i, work.jacobian, tolerances)
+        blurred += spread_of_rate(model, target, i, work.reset_jacobian, tolerances)
         excess[i] = mean[i] - excess[i]
         if abs(excess[i]) > blurred:
             apart = True
@@ -361,8 +362,8 @@ def drift_is_known(model, run, target, span, work):
     matter. The Jacobian at the limit is left in ``work.jacobian``.
     """
     n, t = model.dimension, run.phase
-    model.field_jacobian(target, t, run.y, model.parameters, work.reset_jacobian)
-    model.field_jacobian(target, t + span, work.settled, model.parameters, work.jacobian)
+    whole_jacobian(model, target, t, run.y, work.reset_jacobian)
+    whole_jacobian(model, target, t + span, work.settled, work.jacobian)
     for i in range(n):
         change = 0.0
         for j in range(n):

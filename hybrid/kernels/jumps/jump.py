@@ -5,6 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward
+from hybrid.kernels.arithmetic.slopes import whole_jacobian
 from hybrid.kernels.arithmetic.tangent import (
     STRAINED,
     log_abs_determinant,
@@ -170,7 +171,7 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
                 for j in range(n):
                     work.jacobian[c, i] += work.sizes[i, j] * abs(run.y[n * (1 + c) + j])
     before = run.growth[0]
-    multiply(work.saltation, run.y, n, tangents, work.state)
+    multiply(work.saltation, run.y, n, tangents, work.state, work.rounding)
     if not anew:
         return 0.0
     orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True)
@@ -366,7 +367,7 @@ def follow_impacts(task, transition, remaining):
         assume_sizes(n, work)
         carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
         if not apart:
-            model.field_jacobian(target, run.phase, x_limit, model.parameters, work.jacobian)
+            whole_jacobian(model, target, run.phase, x_limit, work.jacobian)
             drift(run.y, n, tangents, work.jacobian, span, work.state, work.field)
             drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
     run.round = 1
@@ -463,7 +464,7 @@ def rest(task, limit_mode):
     recall_map(model, run, tangents, work)
     change_mode_of_instant(model, run, limit_mode, work)
     chatter_matrix(model, run, transition, work)
-    multiply(work.saltation, run.instant, n, n, work.state)
+    multiply(work.saltation, run.instant, n, n, work.state, work.rounding)
     if tangents > 0:
         map_of_instant(run, n, work.saltation)
         assume_sizes(n, work)

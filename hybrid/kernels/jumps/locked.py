@@ -98,7 +98,7 @@ def follow(run, n, work):
             system[j, i] = instant[n + n * j + i]
         system[j, n] = instant[j]
     solve(system, n, later)
-    multiply(work.reset_jacobian, instant, n, n, work.state)
+    multiply(work.reset_jacobian, instant, n, n, work.state, work.rounding)
     for i in range(n):
         kick = work.settled[i]
         for j in range(n):

@@ -3,6 +3,7 @@
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
+from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.crossings import first_change
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import (
@@ -85,8 +86,7 @@ def has_come_to_rest(model, run, work):
         fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, work)
         for i in range(n):
             height += abs(work.gradient[i]) * moved[i]
-            for j in range(n):
-                fastest += abs(work.gradient[i] * work.jacobian[i, j]) * moved[j]
+            fastest += abs(work.gradient[i]) * spread_of_rate(model, mode, i, work.jacobian, moved)
         if not (abs(value) <= height and abs(speed) <= fastest):
             return False
         model.reset(transition, t, run.y, model.parameters, work.state)

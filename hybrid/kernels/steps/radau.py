@@ -10,6 +10,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.linear import factorise, substitute
+from hybrid.kernels.arithmetic.slopes import whole_jacobian
 from hybrid.kernels.steps.step import combine, error_ratio, estimate_error
 from hybrid.kernels.types.kinds import INTEGER, REAL, VECTOR
 from hybrid.kernels.types.layout import Method, Model, Work
@@ -148,7 +149,7 @@ def solve_tangents(model, method, mode, t, h, y, tangents, work):
     vector = work.systems[(s + 1) * n]
     for stage in range(1, s + 1):
         combine(y, h, method.a[stage], work.stages, s + 1, n, work.trial)
-        model.field_jacobian(mode, t + method.c[stage] * h, work.trial, model.parameters, work.jacobian)
+        whole_jacobian(model, mode, t + method.c[stage] * h, work.trial, work.jacobian)
         fill_rows(method, h, work.jacobian, n, stage, work.systems)
         trace = 0.0
         for i in range(n):
@@ -185,7 +186,7 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
     """
     n, s = model.dimension, method.b.shape[0]
     length = n * (1 + tangents)
-    model.field_jacobian(mode, t, y, model.parameters, work.jacobian)
+    whole_jacobian(model, mode, t, y, work.jacobian)
     for stage in range(1, s + 1):
         fill_rows(method, h, work.jacobian, n, stage, work.systems)
     gamma = method.error[0]

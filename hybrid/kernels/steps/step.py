@@ -4,6 +4,7 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.slopes import change_of_rate, whole_jacobian
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR, Pair
 from hybrid.kernels.types.layout import Method, Model, Task, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
@@ -25,7 +26,7 @@ def rates(model, mode, t, y, tangents, out):
 
 @njit(**KERNEL)
 def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
-    """The same, without the divergence, by the Jacobian ``(n, n + 1)``, which is left in ``jacobian``.
+    """The same, without the divergence, by the Jacobian, for which ``jacobian (n, n + 1)`` is scratch.
 
     Runs by series have no variational field: it is compiled for explicit and implicit methods alone.
     """
@@ -35,10 +36,7 @@ def rates_by_jacobian(model, mode, t, y, tangents, jacobian, out):
         model.field_jacobian(mode, t, y, model.parameters, jacobian)
     for first in range(n, n * (1 + tangents), n):
         for i in range(n):
-            rate = 0.0
-            for j in range(n):
-                rate += jacobian[i, j] * y[first + j]
-            out[first + i] = rate
+            out[first + i] = change_of_rate(model, mode, i, jacobian, y[first:])
 
 
 @exported(None, Model, INTEGER, REAL, VECTOR, VECTOR)
@@ -50,7 +48,7 @@ def field_at(model, mode, t, x, out):
 @exported(None, Model, INTEGER, REAL, VECTOR, MATRIX)
 def jacobian_at(model, mode, t, x, out):
     """``(D_x f, D_t f)`` into ``out (n, n + 1)``."""
-    model.field_jacobian(mode, t, x, model.parameters, out)
+    whole_jacobian(model, mode, t, x, out)
 
 
 @njit(**INLINE)

@@ -64,6 +64,8 @@ class Model(Structure):
     their rounding: ``first_residue[m]`` is the first of mode ``m``, their programs are behind those of all
     forcings, and ``residue_component`` is the component that one is the rate of. The residues of guards,
     those of their terms that may cancel so, have programs behind them.
+    ``field_jacobian`` writes its last column, and in row ``i`` of mode ``m`` the columns
+    ``slope_column[first_slope[m, i]:first_slope[m, i + 1]]``: all others are zero.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
@@ -95,6 +97,8 @@ class Model(Structure):
     forcing_component: INDICES
     first_residue: INDICES
     residue_component: INDICES
+    first_slope: INDEX_MATRIX
+    slope_column: INDICES
     surface: INDICES
     orientation: INDICES
     paired: INDICES

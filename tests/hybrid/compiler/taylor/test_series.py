@@ -8,6 +8,7 @@ import sympy
 from hybrid import Guard, HybridSystem, Mode, Transition
 from hybrid.compiler.emit import emit
 from hybrid.compiler.parts import PARTS, SERIES, TANGENT_SERIES
+from hybrid.compiler.taylor import pairs
 from hybrid.compiler.taylor.series import Recurrences
 from hybrid.compiler.taylor.sums import Term, added
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT, NARROW, RUNGE_KUTTA, TAYLOR
@@ -297,6 +298,25 @@ def test_any_number_of_tangent_vectors(count):
     for vector, series in zip(vectors, together, strict=True):
         _, [alone] = series_of(system, [A, 0.5], vectors=vector[None])
         np.testing.assert_array_equal(series, alone)
+
+
+@pytest.mark.parametrize("tangents", [0, 3])
+def test_series_do_not_depend_on_where_the_factors_lie(monkeypatch, tangents):
+    def field(t, x, p):
+        s = np.diff(np.concatenate([[0.0], x]))
+        pull = s + 0.3 * s**3 + 0.2 * s[::-1] * s + 0.1 * np.sin(s[0]) * s**2
+        return np.append(pull[1:], 0.0) - pull + np.cos(t) * x
+
+    system = system_of(field, state=6)
+    x = np.array([0.3, -0.2, 0.5, 0.7, -0.4, 0.1])
+    states, vectors = series_of(system, x, t=0.4, tangents=tangents)
+    monkeypatch.setattr(pairs, "MANY", 2)
+    monkeypatch.setattr(pairs, "LEAST", 1)
+    others, carried = series_of(system, x, t=0.4, tangents=tangents)
+    np.testing.assert_allclose(others[:, :6], states[:, :6], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        np.reshape(carried, (-1, 6)), np.reshape(vectors, (-1, 6)), rtol=1e-12, atol=1e-13
+    )
 
 
 def test_the_reason_is_told():

@@ -12,7 +12,7 @@ from hybrid.kernels.arithmetic import tangent
 
 _orthonormalise, _log_abs_determinant = tangent.orthonormalise, tangent.log_abs_determinant
 _solve, _strain = tangent.solve, tangent.strain
-_independence_kernel = tangent.independence
+_independence_kernel, _multiply = tangent.independence, tangent.multiply
 
 
 @njit
@@ -28,6 +28,11 @@ def _independence(y, n, k, gram):
 @njit
 def _solved(system, out):
     _solve(system, len(out), out)
+
+
+@njit
+def _multiplied(matrix, y, n, k, image, ends):
+    _multiply(matrix, y, n, k, image, ends)
 
 
 @njit
@@ -227,3 +232,28 @@ def test_rotations_and_scales_do_not_strain():
 def test_singular_matrices_strain_without_bound():
     assert _strain_of(np.zeros((2, 2)), -np.inf) == np.inf
     assert _strain_of(np.diag([1.0, 0.0]), -np.inf) == np.inf
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 40])
+@pytest.mark.parametrize("kind", ["dense", "jump", "empty rows"])
+def test_products_and_determinants_of_matrices_with_zeros(n, kind):
+    """The matrix of a jump in a large system is the identity but for a few rows."""
+    rng = np.random.default_rng(n)
+    matrix = rng.normal(size=(n, n))
+    if kind == "jump":
+        changed = rng.integers(n, size=2)
+        matrix = np.eye(n)
+        matrix[changed] = rng.normal(size=(2, n)) * (rng.random((2, n)) < 0.5)
+    elif kind == "empty rows":
+        matrix[::3] = 0.0
+    vectors = rng.normal(size=(n, 3))
+    y = np.concatenate([np.full(n, 7.0), vectors.T.ravel()])
+    _multiplied(matrix, y, n, 3, np.empty(n), np.empty((4, n)))
+    np.testing.assert_allclose(y[n:].reshape(3, n).T, matrix @ vectors, rtol=1e-13, atol=1e-13)
+    assert np.all(y[:n] == 7.0)
+    sign, expected = np.linalg.slogdet(matrix)
+    found = log_determinant(matrix)
+    if kind == "empty rows" or sign == 0.0:
+        assert found == -math.inf
+    else:
+        assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)

@@ -1,0 +1,26 @@
+"""The factors of many convolutions side by side: none gets lost."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hybrid.compiler.taylor import pairs
+from hybrid.compiler.taylor.pairs import columns_of, layers
+
+lists = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 5)), min_size=1, max_size=200, unique=True)
+
+
+@given(lists)
+def test_each_convolution_has_one_place_and_its_own_factors(numbers):
+    """The second number is that of the other factor, 0 for the first factor itself."""
+    lefts = [str(left) for left, _ in numbers]
+    found = layers(lefts, [other == 0 for _, other in numbers], "s")
+    assert sorted(place for layer in found for place in layer.places) == list(range(len(numbers)))
+    sizes, blocks = columns_of(found), {layer.left: layer.lefts for layer in found if layer.lefts}
+    for layer in found:
+        assert list(blocks[layer.left][: len(layer.places)]) == [lefts[place] for place in layer.places]
+        assert len(layer.places) <= min(sizes[layer.left], sizes[layer.right])
+        if layer.left == layer.right:
+            assert all(numbers[place][1] == 0 for place in layer.places)
+    rights = [layer.right for layer in found]
+    assert len(rights) == len(set(rights))
+    assert len(found) == 1 or len(found) * pairs.LEAST <= len(numbers)
