@@ -78,7 +78,7 @@ def speed_displaced(model, transition, mode, t, x, distance, work):
 
 
 @njit(**KERNEL)
-def is_held(model, transition, mode, t, x, speed, work):
+def field_holds(model, transition, mode, t, x, speed, work):
     """Whether the field on the other side of a guard, as far beyond it, does not lead on to that side.
 
     ``speed`` is the guard's speed at ``x``, and leads towards the guard; ``work.gradient`` is current.

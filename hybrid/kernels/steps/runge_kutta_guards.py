@@ -23,7 +23,7 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.resolution import (
     MARGIN,
-    is_held,
+    field_holds,
     keep_side,
     keeps_sign,
     underflows,
@@ -203,7 +203,7 @@ def reach(model, run, transition, t, h, tangents, work):
     length = -value / speed
     for i in range(model.dimension * (1 + tangents)):
         work.new[i] = run.y[i] + length * work.stages[0, i]
-    return length if is_held(model, transition, run.mode, t, run.y, speed, work) else NOT_THERE
+    return length if field_holds(model, transition, run.mode, t, run.y, speed, work) else NOT_THERE
 
 
 @njit(**KERNEL)
