@@ -53,15 +53,13 @@ def arrived(model, run, work):
     """The transition whose guard is reached or passed at the end of a run; it still belongs to this run.
 
     Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
-    and takes a guard that it starts beyond as crossed; but the steps of Runge-Kutta methods can pass a guard
-    by their own rounding without having found it.
+    and takes a guard that it starts beyond as crossed: then one of the two runs fires the transition.
     """
     mode, t, found = run.mode, run.phase, NO_TRANSITION
     model.field(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
         work.settled[i] = run.scale[i]
-        if model.propagator[mode] != RUNGE_KUTTA:
-            run.scale[i] = abs(run.y[i])
+        run.scale[i] = abs(run.y[i])
     widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]

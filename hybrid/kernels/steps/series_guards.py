@@ -311,8 +311,8 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
             if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
                 return closer
         else:
-            closer = 0.5 * (low + high)
-            change = high - low
+            # A bisection says nothing of how the steps of the method shrink.
+            closer, change = 0.5 * (low + high), math.inf
         if high - low <= EPSILON * high:
             return closer
         s, last = closer, change
