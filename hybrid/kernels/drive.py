@@ -17,7 +17,7 @@ from hybrid.kernels.events.guards import (
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_STEP
-from hybrid.kernels.events.resolution import underflows
+from hybrid.kernels.events.resolution import rests_on_guard, underflows
 from hybrid.kernels.events.sides import side_of
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
@@ -122,7 +122,7 @@ def enter(parts, task):
     if not finite(run, model.dimension * (1 + task.tangents)):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)
-    if fires == RESTING:
+    if fires == RESTING or (fires == NO_TRANSITION and rests_on_guard(model, task.method, run, task.work)):
         limit_mode = model.accumulates_to[run.last_fired]
         if limit_mode == NO_MODE:
             run.at_rest = 1
