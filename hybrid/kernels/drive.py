@@ -17,7 +17,7 @@ from hybrid.kernels.events.guards import (
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_STEP
-from hybrid.kernels.events.resolution import underflows
+from hybrid.kernels.events.resolution import rests_on_guard, underflows
 from hybrid.kernels.events.sides import side_of
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
@@ -53,15 +53,13 @@ def arrived(model, run, work):
     """The transition whose guard is reached or passed at the end of a run; it still belongs to this run.
 
     Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
-    and takes a guard that it starts beyond as crossed; but the steps of Runge-Kutta methods can pass a guard
-    by their own rounding without having found it.
+    and takes a guard that it starts beyond as crossed: then one of the two runs fires the transition.
     """
     mode, t, found = run.mode, run.phase, NO_TRANSITION
     model.field(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
         work.settled[i] = run.scale[i]
-        if model.propagator[mode] != RUNGE_KUTTA:
-            run.scale[i] = abs(run.y[i])
+        run.scale[i] = abs(run.y[i])
     widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
@@ -124,7 +122,7 @@ def enter(parts, task):
     if not finite(run, model.dimension * (1 + task.tangents)):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)
-    if fires == RESTING:
+    if fires == RESTING or (fires == NO_TRANSITION and rests_on_guard(model, task.method, run, task.work)):
         limit_mode = model.accumulates_to[run.last_fired]
         if limit_mode == NO_MODE:
             run.at_rest = 1

@@ -178,32 +178,24 @@ def restrict(coefficients, degree, start):
 
 
 @njit(**KERNEL)
-def lowest(coefficients, degree, side, stack):
-    """Place and value of the deepest interior minimum of ``side * polynomial``; ``NO_ROOT`` if there is none.
+def next_turn(coefficients, degree, start, stack):
+    """Place, value and kind of the first turn beyond ``start``; ``NO_ROOT`` if there is none before 1.
 
-    Minima are where the derivative crosses zero upwards. ``stack (depth, >= degree + 3)`` is scratch.
+    The kind is +1 for a minimum and -1 for a maximum. ``stack (depth, >= degree + 3)`` is scratch.
     """
     slope = stack[stack.shape[0] - 2]
-    best, depth = NO_ROOT, 0.0
-    start = 0.0
-    # The derivative has fewer roots than the polynomial. The part before ``start`` has been searched.
-    for _ in range(2 * degree):
-        for i in range(degree):
-            slope[i] = side * (coefficients[i + 1] - coefficients[i])
-        restrict(slope, degree - 1, start)
-        rising = slope[0] > 0.0
-        theta, _ = first_crossing(slope, degree - 1, 1 if rising else -1, -1 if rising else 1, stack)
-        if theta > 1.0:
-            break
-        start += theta * (1.0 - start)
-        if not rising:
-            value, _ = value_and_slope(coefficients, degree, start)
-            if best > 1.0 or side * value < side * depth:
-                best, depth = start, value
-        start += CLUSTER
-        if start >= 1.0:
-            break
-    return best, depth
+    if start >= 1.0:
+        return NO_ROOT, 0.0, 0
+    for i in range(degree):
+        slope[i] = coefficients[i + 1] - coefficients[i]
+    restrict(slope, degree - 1, start)
+    kind = -1 if slope[0] > 0.0 else 1
+    theta, _ = first_crossing(slope, degree - 1, -kind, kind, stack)
+    if theta > 1.0:
+        return NO_ROOT, 0.0, kind
+    place = start + theta * (1.0 - start)
+    value, _ = value_and_slope(coefficients, degree, place)
+    return place, value, kind
 
 
 @njit(**KERNEL)
@@ -216,3 +208,12 @@ def divide_by_theta(coefficients, degree):
     for i in range(degree):
         coefficients[i] = coefficients[i + 1] * degree / (i + 1)
     return degree - 1
+
+
+@njit(**KERNEL)
+def multiply_by_theta(coefficients, degree):
+    """Undo ``divide_by_theta``; returns the new degree."""
+    for i in range(degree, -1, -1):
+        coefficients[i + 1] = coefficients[i] * (i + 1) / (degree + 1)
+    coefficients[0] = 0.0
+    return degree + 1

@@ -27,6 +27,7 @@ from hybrid.kernels.events.onset import (
 )
 from hybrid.kernels.events.path import rounding_of_start, state_at, time_at
 from hybrid.kernels.events.sampled import NOWHERE, SETTLED, sample, sampled_change
+from hybrid.kernels.events.touches import note_touch
 from hybrid.kernels.types.codes import (
     HIGH,
     HIGH_MIDDLE,
@@ -44,8 +45,6 @@ MOST_PIECES = 3000
 SMALL_SHARE = 1e-2
 # Pieces longer than this share of the step are not tested for lying within the tolerances.
 SHORT_PIECE = 1e-2
-# A guard that comes closer to zero than this share of its largest value on a piece may touch zero.
-CLOSE = 1e-4
 # A piece lies within rounding if, all over it, the guard is no farther from zero than this many times the
 # rounding in its middle.
 WITHIN_ROUNDING = 4.0
@@ -111,6 +110,13 @@ def certain_sign(model, transition, path, order, clock, start, pace, place, base
     """Sign of a guard at a place of the step, 0 if rounding leaves it open."""
     row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)]
     return 1 if row[LOW] > 0.0 else (-1 if row[HIGH] < 0.0 else 0)
+
+
+@njit(**KERNEL)
+def _distance_at(model, transition, path, order, clock, start, pace, place, side, work):
+    """How far a guard is from zero at a place of the step, on its side, at least."""
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, place, 0.0, 0.0, work)]
+    return row[LOW] if side > 0 else -row[HIGH]
 
 
 @njit(**KERNEL)
@@ -198,14 +204,16 @@ def root_in_bracket(
 
 @njit(**KERNEL)
 def _turn_between(model, transition, path, order, clock, start, pace, low, high, side, base, tilt, work):
-    """Where a guard on ``side`` comes closest to zero between two places; NOWHERE if at an end."""
-    for place, towards in ((low, True), (high, False)):
-        row = work.registers[
-            _row_at(model, transition, path, order, clock, start, pace, place, base, tilt, work)
-        ]
-        slope = 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side
-        if not abs(slope) < math.inf or (slope < 0.0) != towards:
-            return NOWHERE
+    """Where a guard on ``side`` comes closest to zero between two places; NOWHERE if it does not turn there.
+
+    A turn within rounding of the upper end counts as between them.
+    """
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, high, base, tilt, work)]
+    if not (row[MOST_SLOPE] if side > 0 else -row[LEAST_SLOPE]) >= 0.0:
+        return NOWHERE
+    row = work.registers[_row_at(model, transition, path, order, clock, start, pace, low, base, tilt, work)]
+    if not (row[LEAST_SLOPE] + row[MOST_SLOPE]) * side < 0.0:
+        return NOWHERE
     while high - low > 2.0 * EPSILON * high:
         place = 0.5 * (low + high)
         if not low < place < high:
@@ -230,14 +238,6 @@ def _tolerated(model, method, run, transition, path, order, clock, start, pace, 
 
 
 @njit(**KERNEL)
-def _note_touch(run, transition, place, value, length):
-    """Keep the earliest touch of the step."""
-    if 0.0 < place < length and place / length < run.grazing_place:
-        run.grazing_place, run.grazing_value = place / length, value
-        run.grazing_guard = transition
-
-
-@njit(**KERNEL)
 def _returns(model, run, transition, path, order, clock, start, pace, side, on_guard, work):
     """Whether the rounding of a jump has left the guard beyond zero at the start of the step."""
     if on_guard > 0:
@@ -257,10 +257,11 @@ def first_change(
     from there. Returns ``(place, side after, proved)``. The place is ``NOWHERE`` if the guard does not change
     its sign before ``proved``; the step is to be cut to ``proved``.
     """
-    direction = model.direction[transition]
+    direction, proved = model.direction[transition], length
     pieces, top = 0, 0
-    # The last place where the guard was certain to be on its side, and where it came closest to zero.
+    # The last place where the guard was certain to be on its side.
     sure = 0.0
+    # Where and how close the guard has come to zero: a touch, once the guard is farther from zero again.
     touch, depth = NOWHERE, math.inf
     base, tilt, leaves = 0.0, 0.0, False
     if is_zero(on_guard):
@@ -292,7 +293,16 @@ def first_change(
         rounding = WITHIN_ROUNDING * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
         bounded = -math.inf < row[LEAST_SLOPE] and row[MOST_SLOPE] < math.inf
         smooth = bounded and low < middle < high and side != 0
-        if clear and not (smooth and nearest <= CLOSE * farthest):
+        turns = smooth and (row[LEAST_SLOPE] <= 0.0 if side > 0 else row[MOST_SLOPE] >= 0.0)
+        short, tolerated = high - low <= SHORT_PIECE * length, 0.0
+        if turns and not exact and (clear or short):
+            tolerated = _tolerated(
+                model, method, run, transition, path, order, clock, start, pace, middle, work
+            )
+        if clear and not (turns and nearest <= max(rounding, tolerated)):
+            if touch != NOWHERE:
+                note_touch(run, transition, touch / length, depth * side)
+                touch, depth = NOWHERE, math.inf
             sure = high
             if base != 0.0 or tilt != 0.0:
                 base, tilt = _still_hidden(
@@ -300,12 +310,8 @@ def first_change(
                 )
             top -= 1
             continue
-        tolerated = 0.0
-        if smooth and not exact and (clear or high - low <= SHORT_PIECE * length):
-            tolerated = _tolerated(
-                model, method, run, transition, path, order, clock, start, pace, middle, work
-            )
-        shallow = smooth and not monotone and farthest <= max(rounding, tolerated)
+        level = short or row[HIGH] - row[LOW] <= rounding
+        shallow = turns and not monotone and farthest <= max(rounding, tolerated if level else 0.0)
         # If the guard's range on the piece is no wider than in its middle, halving the piece does not help.
         tells = not row[HIGH] - row[LOW] <= NO_BETTER * (row[HIGH_MIDDLE] - row[LOW_MIDDLE])
         if not tells and not row[HIGH_MIDDLE] - row[LOW_MIDDLE] < math.inf:
@@ -320,17 +326,18 @@ def first_change(
             if base != 0.0 or tilt != 0.0:
                 _shifted(row, base, tilt, low, high)
         splits = low < middle < high and high - low > EPSILON * length and tells
-        if splits and not (clear or monotone or shallow):
+        if splits and not (monotone or shallow):
             if pieces <= MOST_PIECES:
                 stack[top, 0] = middle
                 top += 1
                 stack[top, 0], stack[top, 1] = low, middle
                 continue
             if low > SMALL_SHARE * length:
-                return NOWHERE, side, low
-            run.unproved += 1
-        turn = high
-        if smooth and not monotone:
+                proved = low
+                break
+            run.unproved += 0 if clear else 1
+        turn = high if not smooth and high < length else NOWHERE
+        if turns:
             turn = _turn_between(
                 model, transition, path, order, clock, start, pace, low, high, side, base, tilt, work
             )
@@ -344,7 +351,7 @@ def first_change(
                 # The guard crosses zero and turns back: each side of the turn has one change of sign.
                 stack[top, 0], high = turn, turn
                 top += 1
-            elif within and value < depth and on_guard == 0:
+            elif within and value < depth and (on_guard == 0 or sure > 0.0):
                 touch, depth = turn, value
         top -= 1
         after = side
@@ -395,14 +402,19 @@ def first_change(
             side = after
             if crosses_towards(direction, after) and not again:
                 return place, side, length
+        elif touch != NOWHERE and depth < _distance_at(
+            model, transition, path, order, clock, start, pace, high, side, work
+        ):
+            note_touch(run, transition, touch / length, depth * side)
+            touch, depth = NOWHERE, math.inf
         side, sure = after, high
         if base != 0.0 or tilt != 0.0:
             base, tilt = _still_hidden(
                 model, transition, path, order, clock, start, pace, high, side, base, tilt, work
             )
     if touch != NOWHERE:
-        _note_touch(run, transition, touch, depth * side, length)
-    return NOWHERE, side, length
+        note_touch(run, transition, touch / length, depth * side)
+    return NOWHERE, side, proved
 
 
 @njit(**KERNEL)

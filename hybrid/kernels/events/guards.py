@@ -4,7 +4,6 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import lowest
 from hybrid.kernels.arithmetic.slopes import change_of_rate, jacobian_with_opposites, spread_of_rate
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -177,18 +176,6 @@ def error_band(method, run, gradient, n):
     for i in range(n):
         size += abs(gradient[i]) * (method.atol + method.rtol * run.scale[i])
     return size
-
-
-@njit(**KERNEL)
-def note_grazing(run, transition, degree, side, band, work):
-    """Keep the earliest place of the step where a guard comes within ``band`` of zero and turns back.
-
-    ``work.polynomial`` holds the guard on the step.
-    """
-    theta, value = lowest(work.polynomial, degree, side, work.stack)
-    if 0.0 < theta < 1.0 and abs(value) <= band and theta < run.grazing_place:
-        run.grazing_place, run.grazing_value = theta, value
-        run.grazing_guard = transition
 
 
 @njit(**KERNEL)

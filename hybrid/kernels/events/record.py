@@ -1,8 +1,7 @@
-"""Writes the record of a run: its steps and grazings."""
+"""Writes the steps of a run into its record."""
 
 from numba import njit
 
-from hybrid.kernels.events.guards import allowed, keep_grazing
 from hybrid.kernels.types.options import KERNEL
 
 
@@ -18,11 +17,3 @@ def start_record(run, record, t, span):
     record.step_jumps[slot] = run.jumps
     record.steps = slot + 1
     return slot
-
-
-@njit(**KERNEL)
-def remember_grazing(model, run, record, time, work):
-    """Record the grazing found on a step, at ``work.state``, if its transition is allowed there."""
-    transition = run.grazing_guard
-    if allowed(model, transition, time, work.state, work.scalar):
-        keep_grazing(model, run, record, transition, time, work.state, run.grazing_value, work)

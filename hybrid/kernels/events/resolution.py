@@ -13,13 +13,19 @@ and its level has reached the guard ``h`` there.
 
 from numba import njit
 
-from hybrid.kernels.events.guards import guard_speed, guard_value, rounding_band
+from hybrid.kernels.events.guards import error_band, guard_speed, guard_value, rounding_band
+from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # The signs at the ends of a step must bear so many times its estimated error.
 MARGIN = 100.0
 # The last terms of a series for a guard below this size may have lost their digits.
 UNDERFLOW = 1e-250
+# Speeds as near to a guard as its rounding, and so many times farther, tell how the speed grows with the
+# distance. Below this share of proportional growth the state reaches the guard in finite time.
+FARTHER = 16.0
+SHARE = 0.5
 
 
 @njit(**INLINE)
@@ -78,7 +84,7 @@ def speed_displaced(model, transition, mode, t, x, distance, work):
 
 
 @njit(**KERNEL)
-def is_held(model, transition, mode, t, x, speed, work):
+def field_holds(model, transition, mode, t, x, speed, work):
     """Whether the field on the other side of a guard, as far beyond it, does not lead on to that side.
 
     ``speed`` is the guard's speed at ``x``, and leads towards the guard; ``work.gradient`` is current.
@@ -94,3 +100,50 @@ def leads_to_guard(model, run, transition, mode, t, x, side, work):
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     distance = side * rounding_band(model, run, transition, t, x, work) - value
     return speed_displaced(model, transition, mode, t, x, distance, work) * side < 0.0
+
+
+@njit(**KERNEL)
+def draws_state(model, run, transition, mode, t, x, value, work):
+    """Whether the field leads to a guard from both sides, and reaches it in finite time.
+
+    A smooth field does not: near a guard that attracts the state, its speed is proportional to the distance.
+    ``value`` is that of the guard, and ``work.gradient`` is current.
+    """
+    distance = max(abs(value), rounding_band(model, run, transition, t, x, work))
+    side = -1.0 if model.direction[transition] > 0 else 1.0
+    for _ in range(2):
+        near = speed_displaced(model, transition, mode, t, x, side * distance - value, work) * side
+        far = speed_displaced(model, transition, mode, t, x, side * FARTHER * distance - value, work) * side
+        if not SHARE * FARTHER * near < far < 0.0:
+            return False
+        side = -side
+    return True
+
+
+@njit(**KERNEL)
+def rests_on_guard(model, method, run, work):
+    """Whether a jump has left the state on its guard, within the tolerances, and the field holds it there.
+
+    The flow would lead the state back to the guard at once. So would the flow of another mode from which the
+    same guard leads back to the mode before.
+    """
+    mode, left, fired, t = run.mode, run.previous_mode, run.last_fired, run.phase
+    if left == NO_MODE or fired == NO_TRANSITION:
+        return False
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        if left == mode:
+            returns = transition == fired
+        else:
+            returns = model.target[transition] == left and model.surface[transition] == model.surface[fired]
+        direction = model.direction[transition]
+        leaves = run.on_guard[transition] == BY_SPEED and run.side[transition] == -direction
+        if not returns or leaves:
+            continue
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        if abs(value) <= error_band(method, run, work.gradient, model.dimension) and draws_state(
+            model, run, transition, mode, t, run.y, value, work
+        ):
+            return True
+    return False

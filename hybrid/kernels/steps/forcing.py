@@ -31,7 +31,7 @@ from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # Verdicts on a piece of a step.
-EXPLAINED, UNKNOWN, HIDDEN = range(3)
+EXPLAINED, NOISY, UNKNOWN, HIDDEN = range(4)
 # A range is rounding if it is at most this many times as wide as the range at one point.
 FLAT = 4.0
 # An arbitrary place of the step.
@@ -42,8 +42,8 @@ BETWEEN = 0.25
 # Shares of the tolerance that may remain unseen, on the whole step and on one piece.
 SHARE = 0.1
 SHARE_OF_PIECE = 0.01
-# A piece as short as the rounding of time is taken as it is: what it may hide is as large as what this
-# rounding does to a jump. More than so many tolerances of it are reported.
+# A piece that rounding explains, or that is as short as the rounding of time, is taken as it is: what it may
+# hide is as large as what this rounding does to a jump. More than so many tolerances of it are reported.
 COARSE_PIECE = 10.0
 # Number of steps ahead for which monotone forcing is tested, and number of steps until the next test.
 AHEAD = 16.0
@@ -68,30 +68,33 @@ def _is_monotone(row):
 
 @njit(**KERNEL)
 def _is_steady(model, program, path, order, clock, start, h, negligible, work):
-    """Whether no row that is checked turns round on a step of length ``h``, or the forcing is negligible."""
+    """Whether no row that is checked turns round on a step of length ``h``, or the forcing is negligible.
+
+    Rounding does not count as a turn. Returned second is the range of the forcing if it turns by rounding.
+    """
     programs, registers = model.programs, work.registers
     first = programs.first[program]
     last = model.bound(programs, program, path, order, clock, start, 1.0, 0.5 * h, 0.5 * h, registers)
     row = registers[last]
     if row[HIGH] - row[LOW] <= negligible:
-        return True
+        return True, 0.0
     if not row[HIGH] - row[LOW] < math.inf:
-        return False
+        return False, 0.0
     doubtful, widths = False, work.samples[0]
     for place in range(last + 1):
         row, widths[place] = registers[place], 0.0
         if programs.checked[first + place] == 1 and not _is_monotone(row):
             doubtful, widths[place] = True, row[HIGH] - row[LOW]
             if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
-                return False
+                return False, 0.0
     if doubtful:
         # The middle may lie within rounding of a jump, another place will not.
         model.bound(programs, program, path, order, clock, start, 1.0, ELSEWHERE * h, 0.0, registers)
         for place in range(last + 1):
             row = registers[place]
             if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
-                return False
-    return True
+                return False, 0.0
+    return True, widths[last]
 
 
 @njit(**KERNEL)
@@ -133,7 +136,7 @@ def _beyond(row, j, place, work):
 def _judged(programs, first, last, j, whole, length, negligible, tolerance, work):
     """Whether a piece between the samples ``j`` and ``j + 1``, which has just been bounded, is explained.
 
-    HIDDEN if its middle is certain to lie beyond what they explain.
+    HIDDEN if its middle is certain to lie beyond what they explain, NOISY if rounding alone explains it.
     """
     samples, common = work.samples, work.samples[work.samples.shape[0] - 1]
     verdict = EXPLAINED
@@ -156,13 +159,26 @@ def _judged(programs, first, last, j, whole, length, negligible, tolerance, work
         slack = BETWEEN * max(common[i] - common[i + 1], 0.0)
         one, other = samples[j, i + 1] - samples[j, i], samples[j + 1, i + 1] - samples[j + 1, i]
         rounding = min(row[HIGH_MIDDLE] - row[LOW_MIDDLE], max(one, other))
-        if rounding < math.inf:
-            slack += FLAT * rounding
-        if row[LOW] < low - slack or row[HIGH] > high + slack:
-            if row[HIGH_MIDDLE] < low - slack or row[LOW_MIDDLE] > high + slack:
+        noise = FLAT * rounding if rounding < math.inf else 0.0
+        if row[LOW] < low - slack - noise or row[HIGH] > high + slack + noise:
+            if row[HIGH_MIDDLE] < low - slack - noise or row[LOW_MIDDLE] > high + slack + noise:
                 return HIDDEN
             verdict = UNKNOWN
+        elif row[LOW] < low - slack or row[HIGH] > high + slack:
+            verdict = max(verdict, NOISY)
     return verdict
+
+
+@njit(**INLINE)
+def _unseen(row, noise, length, tolerance):
+    """What the rounding of a forcing, whose bounds are ``row``, may add to its integral over a piece.
+
+    If the forcing has no tolerance, its factor in the field is unknown. Then the result is infinite if much
+    of the forcing is rounding, and otherwise zero.
+    """
+    if tolerance > 0.0:
+        return noise * length
+    return math.inf if noise > BETWEEN * max(abs(row[LOW]), abs(row[HIGH])) else 0.0
 
 
 @njit(**KERNEL)
@@ -170,12 +186,14 @@ def _first_hidden(model, program, path, order, clock, start, nodes, h, tolerance
     """The length on which a forcing is explained, of a step ``h``, and the first unexplained place after it.
 
     Both are ``h`` if all of it is explained. ``tolerance`` is that of the forcing's integral. Returned third
-    is the most that a piece as short as the rounding of time adds to that, as far as bounds can tell.
+    is the most that a piece adds to that, as far as bounds can tell, which rounding explains or which is as
+    short as the rounding of time.
     """
     programs = model.programs
     first, negligible = programs.first[program], SHARE * tolerance / h
-    if _is_steady(model, program, path, order, clock, start, h, negligible, work):
-        return h, h, 0.0
+    steady, noise = _is_steady(model, program, path, order, clock, start, h, negligible, work)
+    if steady:
+        return h, h, _unseen(work.registers[programs.first[program + 1] - 1 - first], noise, h, tolerance)
     last = programs.first[program + 1] - 1 - first
     _take_samples(model, program, path, order, clock, start, nodes, h, work)
     stack, pieces, coarse = work.intervals, 0, 0.0
@@ -204,20 +222,32 @@ def _first_hidden(model, program, path, order, clock, start, nodes, h, tolerance
             whole = False
             if verdict == UNKNOWN and pieces < MOST_PIECES:
                 if not (low < middle < high and high - low > finest and top < stack.shape[0] - 1):
-                    coarse = max(coarse, _beyond(work.registers[last], j, last, work) * (high - low))
+                    if tolerance > 0.0:
+                        beyond = _beyond(work.registers[last], j, last, work)
+                        coarse = max(coarse, beyond * (high - low))
                     top -= 1
                     continue
                 stack[top, 0], stack[top + 1, 0], stack[top + 1, 1] = middle, low, middle
                 top += 1
-            elif verdict != EXPLAINED:
+            elif verdict > NOISY:
                 return low, middle, coarse
             else:
+                if verdict == NOISY:
+                    row = work.registers[last]
+                    coarse = max(coarse, _unseen(row, _beyond(row, j, last, work), high - low, tolerance))
                 top -= 1
     return h, h, coarse
 
 
+@njit(**INLINE)
+def _tolerance(model, method, run, forcing):
+    """Tolerance for the integral of a forcing; zero if its contribution to the state is unknown."""
+    component = model.forcing_component[forcing]
+    return method.atol + method.rtol * abs(run.y[component]) if component >= 0 else 0.0
+
+
 @njit(**KERNEL)
-def _is_calm(model, run, mode, path, h, work):
+def _is_calm(model, method, run, mode, path, h, work):
     """Whether all forcing is monotone on the step and known to be so for longer."""
     start = run.phase
     known = run.calm_mode == mode + 1 and run.calm_cycle == run.cycle
@@ -228,9 +258,10 @@ def _is_calm(model, run, mode, path, h, work):
         return False
     for forcing in range(model.first_forcing[mode], model.first_forcing[mode + 1]):
         program = model.target.shape[0] + forcing
-        if has_program(model, program) and not _is_steady(
-            model, program, path, 0, -1, start, AHEAD * h, 0.0, work
-        ):
+        if not has_program(model, program):
+            continue
+        steady, noise = _is_steady(model, program, path, 0, -1, start, AHEAD * h, 0.0, work)
+        if not steady or AHEAD * h * noise > SHARE * _tolerance(model, method, run, forcing):
             run.calm_wait = WAIT
             return False
     run.calm_mode, run.calm_cycle = mode + 1, run.cycle
@@ -246,7 +277,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
     as its first place that is not explained has the length of the pulse.
     """
     mode, start = run.mode, run.phase
-    if clock < 0 and _is_calm(model, run, mode, path, h, work):
+    if clock < 0 and _is_calm(model, method, run, mode, path, h, work):
         return h
     rounding = 0.0 if clock >= 0 else measured_time(model, run, mode)
     longest, shortest = h, FINEST * rounding + EPSILON * h
@@ -257,14 +288,11 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
             program = model.target.shape[0] + forcing
             if not has_program(model, program):
                 continue
-            component, tolerance = model.forcing_component[forcing], 0.0
-            if component >= 0:
-                tolerance = method.atol + method.rtol * abs(run.y[component])
+            tolerance = _tolerance(model, method, run, forcing)
             place, other, rest = _first_hidden(
                 model, program, path, order, clock, start, nodes, explained, tolerance, finest, work
             )
-            # The factors of other forcings are unknown, and so are their contributions to the state.
-            coarse = coarse or (component >= 0 and rest > COARSE_PIECE * tolerance)
+            coarse = coarse or rest > COARSE_PIECE * tolerance
             if place < explained:
                 explained, beyond = place, other
         if explained >= h:

@@ -9,8 +9,9 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
 from hybrid.kernels.events.guards import guard_value, is_forced, rounding_band, sides_at
 from hybrid.kernels.events.path import state_at
-from hybrid.kernels.events.record import remember_grazing, start_record
+from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
+from hybrid.kernels.events.touches import note_touch, remember_touch, share_with_one_touch
 from hybrid.kernels.steps.runge_kutta_guards import (
     NOT_THERE,
     earliest_crossing,
@@ -85,12 +86,13 @@ def remember_step(model, method, run, record, t, h, work):
 
 
 @njit(**KERNEL)
-def remember_touch(model, method, run, record, t, h, work):
-    """Record the grazing at ``run.grazing_place`` on the attempted step."""
-    theta = run.grazing_place
+def remember_touch_on_step(model, method, run, record, t, h, whole, work):
+    """Record the touch at ``run.grazing_place`` of the attempted step, of which the length ``h`` is taken."""
+    place = run.grazing_place * whole
+    interpolation_stages(model, method, run.mode, t, h, run.y, work)
     interpolant_path(method, h, run.y, model.dimension, work)
-    state_at(work.path, method.powers.shape[0] - 1, model.dimension, theta, work.state)
-    remember_grazing(model, run, record, t + theta * h, work)
+    state_at(work.path, method.powers.shape[0] - 1, model.dimension, place / h, work.state)
+    remember_touch(model, run, record, place / h, t + place, work)
 
 
 @njit(**INLINE)
@@ -125,15 +127,15 @@ def find_event(task, h):
     rounding of time allows: there the state has reached the guard, and a transition in that direction fires.
     Without one, or if it has just fired, the length is nan.
     """
-    attempts, model, method, run, record, work = task_of(task)
+    attempts, model, method, run, _, work = task_of(task)
     tangents = task.tangents
     mode, t = run.mode, run.phase
-    ignored = NO_TRANSITION
+    ignored, touched = NO_TRANSITION, 0.0
     for _ in range(2):
         interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
-        theta, fired, proved, blurred = earliest_crossing(model, method, run, t, h, ignored, work)
+        theta, fired, proved, blurred = earliest_crossing(model, method, run, t, h, ignored, touched, work)
         if blurred != NO_TRANSITION:
             side = run.rehearsal[0, blurred]
             if SHORTER * h > FINEST * measured_time(model, run, mode):
@@ -149,8 +151,6 @@ def find_event(task, h):
                     return 0.0, length, blurred
                 return math.nan, 0.0, NO_TRANSITION
             attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
-        if run.grazing_place < min(theta, proved):
-            remember_touch(model, method, run, record, t, h, work)
         if proved < min(theta, 1.0):
             attempt_again(attempts, model, method, mode, t, proved * h, run.y, tangents, work)
             return proved * h, 0.0, NO_TRANSITION
@@ -171,10 +171,12 @@ def find_event(task, h):
             # Only a flight at the level of rounding lies between: the guard is as zero as it can be there.
             attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
             return theta * h, 0.0, fired
-        ignored = fired
-        run.grazing_place, run.grazing_value = theta, 0.0
-        run.grazing_guard = fired
-        remember_touch(model, method, run, record, t, h, work)
+        ignored, touched = fired, theta
+        note_touch(run, fired, theta, 0.0)
+    share = share_with_one_touch(run)
+    if share < 1.0:
+        attempt_again(attempts, model, method, mode, t, share * h, run.y, tangents, work)
+        return share * h, 0.0, NO_TRANSITION
     return h, 0.0, NO_TRANSITION
 
 
@@ -289,6 +291,8 @@ def runge_kutta_step(task, remaining):
             run.rejected += 1
             run.next_step = SHORTER * whole
             return GO_ON, 0.0
+        if run.grazing_place * whole <= h:
+            remember_touch_on_step(model, method, run, record, t, h, whole, work)
     grow = growth_factor(method, run, whole, max(ratio, 1e-16))
     run.next_step = max(proposed, whole * grow) if last else whole * grow
     run.last_step, run.last_ratio = whole, max(ratio, 1e-16)

@@ -17,18 +17,23 @@ from hybrid.kernels.events.guards import (
     error_band,
     guard_speed,
     guard_value,
-    note_grazing,
     rounding_band,
 )
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.resolution import (
     MARGIN,
-    is_held,
+    field_holds,
     keep_side,
     keeps_sign,
     underflows,
 )
 from hybrid.kernels.events.sampled import rests
+from hybrid.kernels.events.touches import (
+    forget_touches,
+    note_touch,
+    note_touches,
+    share_with_one_touch,
+)
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
@@ -112,26 +117,28 @@ def is_resolved(model, method, run, transition, t, h, work):
 
 
 @njit(**INLINE)
-def earliest_crossing(model, method, run, t, h, ignored, work):
+def earliest_crossing(model, method, run, t, h, ignored, touched, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
-    Returns ``(theta, transition, proved, blurred)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses
-    before the share ``proved`` of the step, to which the step is to be cut. ``blurred`` is a transition whose
-    guard changes sides, or grazes, on the step, although ``is_resolved`` is false for it, or none. The sides
-    of guards without a crossing are brought up to date, to the end of the step, and guards that were left are
-    no longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
+    The guard of ``ignored`` touches zero at the share ``touched`` of the step. Returns
+    ``(theta, transition, proved, blurred)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses before the
+    share ``proved`` of the step, to which the step is to be cut. ``blurred`` is a transition whose guard
+    changes sides, or grazes, on the step, although ``is_resolved`` is false for it, or none. The sides of
+    guards without a crossing are brought up to date, to the end of the step, and guards that were left are no
+    longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
     crossing, ``run.rehearsal[3]`` holds its side before that.
     ``work.path`` must hold the interpolant if any guard of the mode is not affine.
     """
     mode, degree_of_path = run.mode, method.powers.shape[0] - 1
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
-    run.grazing_place = NO_ROOT
+    forget_touches(run)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         run.rehearsal[3, transition] = 0
         keep_side(run, transition)
         if transition == ignored:
             leave_guard(model, run, transition, t + h, work)
+            note_touch(run, transition, touched, 0.0)
             continue
         on_guard = run.on_guard[transition]
         side = run.side[transition]
@@ -155,8 +162,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
             theta, side = first_crossing(
                 work.polynomial, degree, side, model.direction[transition], work.stack
             )
-            if theta > 1.0 and side == run.side[transition] and on_guard == 0:
-                note_grazing(run, transition, degree, side, band, work)
+            note_touches(run, transition, degree, on_guard, theta, band, work)
         else:
             if rests(model, run, transition, work.path, degree_of_path, -1, t, h, 1.0, work):
                 continue
@@ -186,7 +192,7 @@ def earliest_crossing(model, method, run, t, h, ignored, work):
         run.rehearsal[3, transition] = -side
         if theta < earliest:
             earliest, fired = theta, transition
-    return earliest, fired, proved, blurred
+    return earliest, fired, min(proved, share_with_one_touch(run)), blurred
 
 
 @njit(**KERNEL)
@@ -203,7 +209,7 @@ def reach(model, run, transition, t, h, tangents, work):
     length = -value / speed
     for i in range(model.dimension * (1 + tangents)):
         work.new[i] = run.y[i] + length * work.stages[0, i]
-    return length if is_held(model, transition, run.mode, t, run.y, speed, work) else NOT_THERE
+    return length if field_holds(model, transition, run.mode, t, run.y, speed, work) else NOT_THERE
 
 
 @njit(**KERNEL)

@@ -25,8 +25,9 @@ from hybrid.kernels.arithmetic.lanes import (
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.path import state_at, time_at, value_at
-from hybrid.kernels.events.record import remember_grazing, start_record
+from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
+from hybrid.kernels.events.touches import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.steps.series_guards import (
     earliest_on_series,
@@ -391,10 +392,12 @@ def series_step(task, remaining):
             evaluate_with_sizes(series, order, h, 0, front)
             restore_sides(model, run)
             theta, fired, proved, blurred = earliest_on_series(model, method, run, order, t, h, clock, work)
-        if run.grazing_place < min(theta, proved):
+        end = min(theta, proved, 1.0)
+        if run.grazing_place <= end:
             s = run.grazing_place * h
             state_at(series, order, n, s, work.state)
-            remember_grazing(model, run, record, time_at(series, order, clock, t, 1.0, s), work)
+            place = run.grazing_place / end
+            remember_touch(model, run, record, place, time_at(series, order, clock, t, 1.0, s), work)
         cut = proved < min(theta, 1.0)
         if cut:
             theta, fired = proved, NO_TRANSITION

@@ -18,7 +18,6 @@ from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
-    note_grazing,
     rounding_band,
     size_of_time,
 )
@@ -32,6 +31,7 @@ from hybrid.kernels.events.resolution import (
     underflows,
 )
 from hybrid.kernels.events.sampled import rests
+from hybrid.kernels.events.touches import forget_touches, note_touches, share_with_one_touch
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
@@ -311,8 +311,8 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
             if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
                 return closer
         else:
-            closer = 0.5 * (low + high)
-            change = high - low
+            # A bisection says nothing of how the steps of the method shrink.
+            closer, change = 0.5 * (low + high), math.inf
         if high - low <= EPSILON * high:
             return closer
         s, last = closer, change
@@ -394,7 +394,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
     mode, series = run.mode, work.series
     kind = model.propagator[mode]
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
-    run.grazing_place = NO_ROOT
+    forget_touches(run)
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
@@ -477,8 +477,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
-        if theta > 1.0 and side == run.side[transition] and on_guard == 0:
-            note_grazing(run, transition, degree, side, band, work)
+        note_touches(run, transition, degree, on_guard, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
         if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
@@ -489,4 +488,4 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         run.rehearsal[3, transition] = -side
         if theta < earliest:
             earliest, fired = theta, transition
-    return earliest, fired, proved, blurred
+    return earliest, fired, min(proved, share_with_one_touch(run)), blurred

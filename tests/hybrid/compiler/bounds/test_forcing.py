@@ -389,3 +389,28 @@ def test_a_pulse_hardly_wider_than_the_rounding_of_time_is_met_in_short_steps(ro
     assert arc.status.code == StatusCode.SUCCESS
     assert "the forcing is not resolved" in arc.status.message
     assert arc.x[-1, 0] == pytest.approx(1.0 + np.sqrt(np.pi), abs=5e-3)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("factor", [False, True], ids=["term", "factor"])
+@pytest.mark.parametrize("w", [1e14, 1e15, 1e16, 1e18])
+def test_forcing_that_rounding_of_time_hides_is_reported(w, factor, solver):
+    """Pulses of a width of 0.01 / w, at times of order one."""
+
+    def field(t, x, p):
+        pulses = p.A * np.exp(-1e4 * np.sin(p.w * t) ** 2)
+        return (-x.q * (1.0 + pulses) if factor else pulses - x.q,)
+
+    system = HybridSystem(state=("q",), parameters={"A": 100.0, "w": 1.0}, modes=[Mode("m", field)])
+    rough = type(solver)(rtol=1e-6, atol=1e-3, max_steps=3000)
+    arc = simulate(system, (1.0,), (0.0, 1.0), parameters={"w": w}, solver=rough)
+    assert not arc.status.ok or "the forcing is not resolved" in arc.status.message
+    # In time that is as fine as the pulses they are resolved.
+    span = 10.0 / w
+    fine = type(solver)(rtol=1e-7, atol=1e-6)
+    arc = simulate(system, (1.0,), (0.0, span), parameters={"w": w, "A": 100.0 / span}, solver=fine)
+    assert arc.status.ok
+    assert "not resolved" not in arc.status.message
+    # Half a pulse at the start, and pulses at pi, 2 pi and 3 pi.
+    area = 10.0 * 3.5 * np.sqrt(np.pi * 1e-4)
+    assert arc.x[-1, 0] == pytest.approx(np.exp(-area) if factor else 1.0 + area, abs=1e-3)

@@ -18,7 +18,12 @@ _first_crossing, _divide_by_theta, _stays = (
     bernstein.divide_by_theta,
     bernstein.stays,
 )
-_value_and_slope, _lowest, _restrict = bernstein.value_and_slope, bernstein.lowest, bernstein.restrict
+_value_and_slope, _next_turn, _restrict = (
+    bernstein.value_and_slope,
+    bernstein.next_turn,
+    bernstein.restrict,
+)
+_multiply_by_theta = bernstein.multiply_by_theta
 
 
 @njit
@@ -51,8 +56,13 @@ def restricted(coefficients, start):
 
 
 @njit
-def lowest(coefficients, side):
-    return _lowest(coefficients, coefficients.size - 1, side, np.zeros((64, coefficients.size + 3)))
+def next_turn(coefficients, start):
+    return _next_turn(coefficients, coefficients.size - 1, start, np.zeros((64, coefficients.size + 3)))
+
+
+@njit
+def multiplied(coefficients, degree):
+    return _multiply_by_theta(coefficients, degree)
 
 
 def powers(roots, pairs=()):
@@ -298,19 +308,30 @@ def test_values_and_slopes_of_a_constant():
     assert value_and_slope(np.array([3.0]), 0.3) == (3.0, 0.0)
 
 
-@given(apart, st.sampled_from([-1, 1]), st.floats(-1.0, 1.0))
-def test_the_deepest_minimum_inside(turns, side, height):
+@given(apart, st.floats(-1.0, 1.0))
+def test_the_turns_inside_one_after_another(turns, height):
     """Of ``height`` plus the integral of a product of factors: its turns are known."""
     slope = np.array([float(c) for c in powers(turns)])
     power = np.polynomial.polynomial.polyint(slope, k=height)
-    found, depth = lowest(bernstein([Fraction(float(c)) for c in power]), side)
-    inside = np.array([turn for turn in turns if 0 < turn < 1])
-    bends = np.polynomial.polynomial.polyval(inside, np.polynomial.polynomial.polyder(slope)) * side
-    minima = inside[bends > 0.0]
-    if not len(minima):
-        assert found == NONE
-        return
-    values = side * np.polynomial.polynomial.polyval(minima, power)
-    assert side * depth == pytest.approx(values.min(), abs=1e-9 * abs(power).sum())
-    if np.sum(values < values.min() + 1e-6 * abs(power).sum()) == 1:
-        assert found == pytest.approx(minima[values.argmin()], abs=1e-6)
+    coefficients = bernstein([Fraction(float(c)) for c in power])
+    start, found = 0.0, []
+    while (turn := next_turn(coefficients, start))[0] < NONE:
+        found.append(turn)
+        start = turn[0] + 1e-9
+    inside = np.sort([turn for turn in turns if 0 < turn < 1])
+    bends = np.sign(np.polynomial.polynomial.polyval(inside, np.polynomial.polynomial.polyder(slope)))
+    values = np.polynomial.polynomial.polyval(inside, power)
+    places, heights, kinds = np.array(found).reshape(-1, 3).T
+    np.testing.assert_allclose(places, inside, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(heights, values, rtol=0, atol=1e-9 * abs(power).sum())
+    np.testing.assert_array_equal(kinds, bends)
+
+
+@given(st.lists(st.floats(-5, 5), min_size=1, max_size=9))
+def test_a_multiplication_undoes_a_division(values):
+    degree = len(values) - 1
+    room = np.array([*values, 0.0])
+    assert multiplied(room, degree) == degree + 1
+    assert room[0] == 0.0
+    assert deflated(room, 1) == degree
+    np.testing.assert_allclose(room[:-1], values, rtol=1e-14)

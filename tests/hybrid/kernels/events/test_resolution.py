@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Taylor, Transition, Tsit5, simulate
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    Taylor,
+    Transition,
+    Tsit5,
+    simulate,
+)
 from hybrid.status import StatusCode
 
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5(), "RadauIIA": RadauIIA()}
@@ -83,3 +94,87 @@ def test_a_level_with_a_root_in_its_rate_reaches_its_guard(name, unit, solver):
     assert arc.status.code == StatusCode.TERMINAL
     assert abs(arc.jumps.t[0] - end) < 5e-5
     assert abs(arc.x[-1, 0]) < 1e-12 * unit
+
+
+HELD = {name: ROOTS[name] for name in ("square root", "cube root", "dry friction", "fourth root")}
+
+
+@each_solver
+@pytest.mark.parametrize("reset", [None, lambda t, x, p: (x.h,)], ids=["marker", "identity"])
+@pytest.mark.parametrize("name", HELD)
+def test_a_state_that_its_field_holds_on_a_guard_arrives_once(name, reset, solver):
+    """Transitions that change nothing do not free the state: the run says that it rests there."""
+    rate, end = HELD[name]
+    for direction in (-1, 0):
+        for unit, tolerance in ((1.0, 1e-9), (1.0, 1e-6), (1e6, 1e-4)):
+            system = HybridSystem(
+                state=("h",),
+                modes=[Mode("m", lambda t, x, p, unit=unit: (unit * rate(x.h / unit),))],
+                transitions=[
+                    Transition(
+                        "m",
+                        "m",
+                        Guard(lambda t, x, p: x.h, direction),
+                        Reset(reset) if reset else None,
+                        name="zero",
+                    )
+                ],
+            )
+            chosen = type(solver)(rtol=1e-6, atol=tolerance)
+            arc = simulate(system, (unit,), (0.0, 3.0), mode="m", solver=chosen)
+            assert arc.status.code == StatusCode.ACCUMULATION
+            assert "'zero'" in arc.status.message
+            # Dry friction may bring the state back once, from beyond the guard.
+            assert len(arc.jumps) <= (2 if name == "dry friction" else 1)
+            assert arc.t[-1] == pytest.approx(end, abs=1e-2)
+
+
+@each_solver
+@pytest.mark.parametrize("name", HELD)
+def test_two_modes_with_such_a_field_do_not_toggle_without_end(name, solver):
+    rate, end = HELD[name]
+    system = HybridSystem(
+        state=("h",),
+        modes=[Mode(mode, lambda t, x, p: (rate(x.h),)) for mode in "uv"],
+        transitions=[Transition(a, b, Guard(lambda t, x, p: x.h), name=a + b) for a, b in ("uv", "vu")],
+    )
+    arc = simulate(system, (1.0,), (0.0, 3.0), mode="u", solver=solver)
+    assert arc.status.code == StatusCode.ACCUMULATION
+    assert [jump.transition for jump in arc.jumps] in (["uv"], ["uv", "vu"])
+    assert arc.t[-1] == pytest.approx(end, abs=1e-4)
+
+
+@each_solver
+def test_a_mode_for_the_rest_takes_over(solver):
+    system = HybridSystem(
+        state=("h", "s"),
+        modes=[
+            Mode("sink", lambda t, x, p: (-np.cbrt(x.h), 0.0)),
+            Mode("rest", lambda t, x, p: (0.0, 1.0)),
+        ],
+        transitions=[
+            Transition("sink", "sink", Guard(lambda t, x, p: x.h), name="zero", accumulates_to="rest")
+        ],
+    )
+    arc = simulate(system, (1.0, 0.0), (0.0, 4.0), mode="sink", solver=solver)
+    assert arc.status.ok
+    assert arc.mode[-1] == "rest"
+    np.testing.assert_allclose(arc.x[-1], [0.0, 2.5], rtol=0, atol=1e-5)
+
+
+@each_solver
+def test_a_smooth_field_that_attracts_to_a_guard_does_not_hold_the_state(solver):
+    """A reset puts the state on the guard ``h``, which both modes watch; the motion along it goes on."""
+    system = HybridSystem(
+        state=("h", "s"),
+        modes=[Mode(mode, lambda t, x, p: (-x.h, 1.0)) for mode in "uv"],
+        transitions=[
+            *(Transition(a, b, Guard(lambda t, x, p: x.h), name=a + b) for a, b in ("uv", "vu")),
+            Transition(
+                "u", "v", Guard(lambda t, x, p: x.s - 1.0), Reset(lambda t, x, p: (0.0, x.s)), name="set"
+            ),
+        ],
+    )
+    arc = simulate(system, (1.0, 0.0), (0.0, 3.0), mode="u", solver=solver)
+    assert arc.status.ok
+    assert arc.x[-1, 1] == pytest.approx(3.0)
