@@ -54,9 +54,14 @@ NEAREST = {
         "simulation/test_ending.py",
         "kernels/events/test_grazing.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
     ),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
-    "hybrid/simulation/initial_mode.py": ("simulation/test_simulate.py", "kernels/jumps/test_instant.py"),
+    "hybrid/simulation/initial_mode.py": (
+        "simulation/test_simulate.py",
+        "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
+    ),
     "hybrid/compiler/bounds/forcing.py": ("compiler/bounds/test_forcing.py",),
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/bounds/program.py": (
@@ -92,23 +97,31 @@ NEAREST = {
     "hybrid/kernels/drive.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
     ),
-    "hybrid/kernels/events/initial_mode.py": ("simulation/test_simulate.py", "kernels/jumps/test_instant.py"),
+    "hybrid/kernels/events/initial_mode.py": (
+        "simulation/test_simulate.py",
+        "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
+    ),
     "hybrid/kernels/steps/forcing.py": ("compiler/bounds/test_forcing.py",),
     "hybrid/kernels/events/guards.py": (
         "kernels/events/test_onset.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_crossings.py",
     ),
     "hybrid/kernels/jumps/jump.py": (
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/jumps/test_locked.py",
     ),
     "hybrid/kernels/events/onset.py": (
         "kernels/events/test_onset.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_proved_crossings.py",
     ),
     "hybrid/kernels/arithmetic/operations.py": ("kernels/events/test_proved_crossings.py",),
@@ -124,6 +137,7 @@ NEAREST = {
     ),
     "hybrid/kernels/events/sides.py": (
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
         "kernels/jumps/test_corner.py",
     ),
