@@ -203,12 +203,11 @@ def _is_silent(node: ast.AST) -> bool:
         return True
     if isinstance(node, ast.FunctionDef) and node.name in ("__repr__", "__getattr__"):
         return True
-    if (
-        isinstance(node, ast.Assign)
-        and isinstance(node.targets[0], ast.Name)
-        and node.targets[0].id.isupper()
-    ):
-        return True
+    if isinstance(node, ast.Assign):
+        [target, *_] = node.targets
+        names = target.elts if isinstance(target, ast.Tuple) else [target]
+        if all(isinstance(each, ast.Name) and each.id.isupper() for each in names):
+            return True
     return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
 
