@@ -99,7 +99,7 @@ def test_an_orbit_that_turns_back_as_slowly_as_rounding_only_touches(side):
 
 
 def test_speeds_along_the_surface_do_not_count():
-    """The first state, in units of its own, is huge; the speed through the surface is that of a real arrival."""
+    """The first state has a unit of its own; the speed through the surface is that of a real arrival."""
     at = surface(lambda t, x, p: (1e300, 1e-3 - t), lambda t, x, p: (-1e300, -1.0))
     assert bool(value(at.arrives_from_below))
 
@@ -125,7 +125,7 @@ class TestOff:
             assert bool(value(at.is_off, x=x)) == off
 
     def test_a_height_that_is_one_state(self, unit, sign):
-        """Near is where the fields, at a speed of 4 in all, arrive before x = 3 has changed at a rate of 2."""
+        """Near is where the fields, at a speed of 4 in all, arrive before x = 3 has changed at rate 2."""
         at = surface(lambda t, x, p: (unit, 2 * unit), lambda t, x, p: (unit, -2 * unit))
         for share, off in ((0.5, False), (2.0, True)):
             height = share * SLIDING_BAND**2 * 4.0 * 3.0 / 2.0
