@@ -111,7 +111,7 @@ def plot_convergence(
         ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
     for i, (label, history) in enumerate(histories.items()):
         at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
-        at = at[at <= len(history)]
+        at = at[(at > 0) & (at <= len(history))]
         width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
         ax.plot(at, history[at - 1], color=colour, label=label, linewidth=width)
         if label in points:
