@@ -120,6 +120,17 @@ def test_three_exponents_of_zero_are_a_torus_too():
     assert found.attrs["flag_meanings"] == "not_known at rest periodic torus chaotic"
 
 
+def test_what_is_known_follows_from_the_first_exponent_and_the_status():
+    """A state that is lost at each jump has an exponent of minus infinity; a run that failed has none."""
+    rows = [[(1.0, -np.inf), (-1.0, -np.inf), (0.0, -np.inf)], [(np.nan, -1.0), (np.inf, -1.0), (1.0, -1.0)]]
+    chart = made(rows, 0.2)
+    chart.status[1, 2] = int(hybrid.StatusCode.MAX_STEPS)
+    assert [[KINDS[i] for i in row] for row in kinds(chart).values] == [
+        ["chaotic", "periodic", "torus"],
+        ["not known"] * 3,
+    ]
+
+
 def test_exponents_are_named_and_have_bands_of_two_standard_errors(line):
     ax = plot_exponents(line, ax=plt.figure().subplots())
     names = [text.get_text() for text in ax.get_legend().get_texts()]
