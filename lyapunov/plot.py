@@ -240,9 +240,9 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
             linewidth=1,
         )
     # The first estimates are far off, so the limits fit the later nine tenths.
-    low, high = (values - errors)[shown], (values + errors)[shown]
     late = spectrum.history[len(spectrum.growths) // 10 :, shown].ravel()
-    bottom, top = min(*low, *late, 0.0, 0.0), max(*high, *late, 0.0, 0.0)
+    inside = [*(values - errors)[shown], *(values + errors)[shown], *late, 0.0]
+    bottom, top = min(inside), max(inside)
     margin = 0.1 * (top - bottom) or 1.0
     ax.set_ylim(bottom - margin, top + margin)
     return ax
