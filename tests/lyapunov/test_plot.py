@@ -109,6 +109,14 @@ def test_signs_tell_the_kinds_of_motion(forced, found):
     assert {text.get_text() for text in ax.get_legend().get_texts()} == {*found[0], *found[1]}
 
 
+def test_two_standard_errors_tell_an_exponent_from_zero():
+    chart = made([[(0.39, -9.0), (0.41, -9.0)], [(-0.39, -9.0), (-0.41, -9.0)]], 0.2)
+    assert [[KINDS[i] for i in row] for row in kinds(chart).values] == [
+        ["torus", "chaotic"],
+        ["torus", "periodic"],
+    ]
+
+
 def test_three_exponents_of_zero_are_a_torus_too():
     rows = [[(0.1, 0.0, -0.1), (0.0, -1.0, -1.0)], [(-1.0, -1.0, -1.0), (-np.inf, -np.inf, -np.inf)]]
     found = kinds(made(rows, 0.2, "no"))

@@ -8,7 +8,7 @@ import pytest
 from hybrid.status import StatusCode
 from hybrid.testing import PropertyError
 from hybrid.testing.case import Case
-from hybrid.testing.invariance import check_order, compare, turned
+from hybrid.testing.invariance import check_cut, check_order, compare, turned
 from models import bouncing_ball, vibroimpact
 
 
@@ -76,3 +76,13 @@ def test_one_transition_has_no_other_order():
 
     with pytest.raises(UnsatisfiedAssumption):
         check_order(Case(bouncing_ball(), dict(bouncing_ball().parameters), "flight", (1.0, 0.0), 0.0, 1.0))
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("fraction", [0.2, 0.7])
+def test_a_flow_is_cut_in_any_units(unit, fraction):
+    """The plane is across the flow; a start is on it if it is so by its share of the sizes of the states."""
+    ball = bouncing_ball()
+    parameters = {"g": 9.81 * unit, "e": 0.8}
+    case = Case(ball, parameters, "flight", (unit, 0.3 * unit), 0.0, 1.2, fraction)
+    check_cut(case)
