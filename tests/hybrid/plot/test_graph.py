@@ -132,7 +132,12 @@ class TestLoops:
             wanted = middle + FAN * (np.arange(count) - (count - 1) / 2)
             for k, angle in enumerate(np.radians(wanted)):
                 away = np.array(label(ax, k).xyann)
-                np.testing.assert_allclose(away / np.hypot(*away), [np.cos(angle), np.sin(angle)], atol=1e-9)
+                out = away / np.hypot(*away)
+                np.testing.assert_allclose(out, [np.cos(angle), np.sin(angle)], atol=1e-9)
+                # The label is aligned so that it lies behind the loop, in both directions.
+                across = "center" if abs(out[0]) < 0.4 else "left" if out[0] > 0 else "right"
+                up = "center" if abs(out[1]) < 0.4 else "bottom" if out[1] > 0 else "top"
+                assert (label(ax, k).get_ha(), label(ax, k).get_va()) == (across, up)
 
     def test_a_loop_leaves_and_enters_the_box_on_its_side(self):
         """Symmetric about its ray, in points; wide enough to see, and its label is at its far end."""
