@@ -170,3 +170,35 @@ class TestSides:
     def test_a_guard_that_may_be_passed(self):
         with pytest.raises(UnsatisfiedAssumption, match="no guard has a direction"):
             self.checked(1e6, passable=("bounce",))
+
+    def test_a_ground_that_moves_fast(self):
+        """Rounding of the time counts, as a share of the stretch: the ground falls by 1000 per unit."""
+        system = HybridSystem(
+            state=("q", "v"),
+            modes=[Mode("up", lambda t, x, p: (x.v, 0.0))],
+            transitions=[
+                Transition(
+                    "up",
+                    "up",
+                    Guard(lambda t, x, p: x.q + 1000.0 * t, -1),
+                    Reset(lambda t, x, p: (x.q, -x.v)),
+                    name="ground",
+                )
+            ],
+        )
+        case = Case(system, {}, "up", (1.0, 1.0), 0.0, 2.0)
+        allowed = 1e-7 * (case.run.scale[0] + 1000.0 * 2.0)
+
+        class Arc:
+            jumps = case.run.arc.jumps
+
+            def __call__(self, t):
+                return np.array([-1000.0 * t - depth, 1.0])
+
+        run = SimpleNamespace(arc=Arc(), t1=2.0, scale=case.run.scale)
+        object.__setattr__(case, "run", run)
+        depth = 0.9 * allowed
+        check_sides(case)
+        depth = 1.1 * allowed
+        with pytest.raises(PropertyError, match="goes below zero"):
+            check_sides(case)
