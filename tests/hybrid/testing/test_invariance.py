@@ -4,11 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis.errors import UnsatisfiedAssumption
 
+from hybrid import Guard, HybridSystem, Mode, Transition
 from hybrid.status import StatusCode
 from hybrid.testing import PropertyError
 from hybrid.testing.case import Case
-from hybrid.testing.invariance import check_cut, check_order, compare, turned
+from hybrid.testing.invariance import check_cut, check_elastic, check_order, compare, turned
 from models import bouncing_ball, vibroimpact
 
 
@@ -71,9 +73,6 @@ def test_time_is_reversed_by_name_or_by_a_function():
 
 
 def test_one_transition_has_no_other_order():
-    pytest.importorskip("hypothesis")
-    from hypothesis.errors import UnsatisfiedAssumption
-
     with pytest.raises(UnsatisfiedAssumption):
         check_order(Case(bouncing_ball(), dict(bouncing_ball().parameters), "flight", (1.0, 0.0), 0.0, 1.0))
 
@@ -86,3 +85,33 @@ def test_a_flow_is_cut_in_any_units(unit, fraction):
     parameters = {"g": 9.81 * unit, "e": 0.8}
     case = Case(ball, parameters, "flight", (unit, 0.3 * unit), 0.0, 1.2, fraction)
     check_cut(case)
+
+
+class TestElastic:
+    """A ball on an elastic floor: above it falls, below it a spring pushes it back."""
+
+    @staticmethod
+    def floor(loss):
+        return HybridSystem(
+            state=("q", "v"),
+            modes=[
+                Mode("above", lambda t, x, p: (x.v, -1.0)),
+                Mode("below", lambda t, x, p: (x.v, -1.0 - 40.0 * x.q - loss * x.v)),
+            ],
+            transitions=[
+                Transition("above", "below", Guard(lambda t, x, p: x.q, -1)),
+                Transition("below", "above", Guard(lambda t, x, p: x.q, +1)),
+            ],
+        )
+
+    # The ball reaches the floor at 1, and stays below it for less than 0.5.
+    @pytest.mark.parametrize("t1", [0.8, 1.2, 2.5, 3.7])
+    def test_it_runs_back_from_either_mode(self, t1):
+        check_elastic(Case(self.floor(0.0), {}, "above", (0.5, 0.0), 0.0, t1), ["v"])
+
+    @pytest.mark.parametrize("t1", [1.2, 2.5])
+    def test_it_does_not_with_damping_or_with_the_wrong_component_turned(self, t1):
+        with pytest.raises(PropertyError, match="runs backwards"):
+            check_elastic(Case(self.floor(0.1), {}, "above", (0.5, 0.0), 0.0, t1), ["v"])
+        with pytest.raises((PropertyError, UnsatisfiedAssumption)):
+            check_elastic(Case(self.floor(0.0), {}, "above", (0.5, 0.0), 0.0, t1), ["q"])
