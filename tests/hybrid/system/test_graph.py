@@ -266,10 +266,8 @@ def test_a_system_that_grows_is_whole_once_nothing_leads_on():
     """A transition without a target ends the run, or leads to a mode that has not been made yet."""
 
     class Growth:
-        written = {}
-
         def __init__(self, *names):
-            self.names = names
+            self.names, self.written = names, {}
 
         def leads_on(self, name):
             return name in self.names
