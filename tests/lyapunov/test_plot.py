@@ -207,6 +207,9 @@ def test_a_figure_of_each_kind(line, grid):
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
     assert len(plot_chart(bare).axes) == 1
+    # One exponent needs no legend.
+    assert bare.sizes["exponent"] == 1
+    assert plot_exponents(bare).get_legend() is None
     with pytest.raises(ArgumentError, match="chart must have section points"):
         plot_bifurcation(bare, ax=plt.figure().subplots())
 
