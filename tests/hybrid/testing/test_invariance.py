@@ -10,8 +10,18 @@ from hybrid import Guard, HybridSystem, Mode, Transition
 from hybrid.status import StatusCode
 from hybrid.testing import PropertyError
 from hybrid.testing.case import Case
-from hybrid.testing.invariance import check_cut, check_elastic, check_order, compare, turned
-from models import bouncing_ball, vibroimpact
+from hybrid.testing.invariance import (
+    check_cut,
+    check_elastic,
+    check_names,
+    check_order,
+    check_samples,
+    check_scale,
+    check_split,
+    compare,
+    turned,
+)
+from models import bouncing_ball, stick_slip, vibroimpact
 
 
 def arc_of(fired, x, *, ok=True):
@@ -115,3 +125,12 @@ class TestElastic:
             check_elastic(Case(self.floor(0.1), {}, "above", (0.5, 0.0), 0.0, t1), ["v"])
         with pytest.raises((PropertyError, UnsatisfiedAssumption)):
             check_elastic(Case(self.floor(0.0), {}, "above", (0.5, 0.0), 0.0, t1), ["q"])
+
+
+@pytest.mark.parametrize(
+    "check", [check_cut, check_names, check_order, check_scale, check_split, check_samples]
+)
+def test_systems_whose_runs_may_end_can_be_checked(check):
+    """A transition without a target has no reset that could be changed."""
+    block = stick_slip()
+    check(Case(block, dict(block.parameters), "sliding", (0.5, 0.2), 0.0, 6.0))
