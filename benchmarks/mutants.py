@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import os
 import random
 import re
 from collections import Counter
@@ -41,8 +42,36 @@ OTHER_COMPARISON = {
 # Most test files to run per fault, and most tests if they are known by their coverage.
 MOST_TESTS = 4
 MOST_COVERING = 30
-# Tests of files that names and imports do not lead to.
+# Tests of files that names and imports do not lead to, beside those of the same name.
 NEAREST = {
+    "hybrid/compiler/propagators/equations.py": ("compiler/taylor/test_series.py",),
+    "hybrid/compiler/propagators/polynomial.py": ("compiler/taylor/test_series.py", "solvers/test_taylor.py"),
+    "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
+    "hybrid/plot/arcs.py": ("plot/test_plot.py",),
+    "hybrid/plot/graph.py": ("plot/test_plot.py",),
+    "hybrid/plot/orbits.py": ("plot/test_arcs.py", "plot/test_plot.py"),
+    "hybrid/plot/style.py": ("plot/test_plot.py", "test_arguments.py"),
+    "hybrid/simulation/memory.py": ("simulation/test_simulate.py",),
+    "hybrid/sweep/job.py": ("sweep/test_sweep.py", "sweep/test_store.py"),
+    "hybrid/sweep/outcome.py": ("sweep/test_sweep.py", "sweep/test_store.py"),
+    "hybrid/sweep/parts.py": ("sweep/test_outcome.py", "sweep/test_store.py"),
+    "hybrid/sweep/rows.py": ("sweep/test_many.py", "../lyapunov/test_chart.py"),
+    "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
+    "hybrid/testing/events.py": ("testing/test_planted_faults.py", "testing/test_check.py"),
+    "hybrid/testing/invariance.py": ("testing/test_planted_faults.py", "testing/test_check.py"),
+    "hybrid/transform/cells.py": ("transform/test_split.py", "transform/test_corners.py"),
+    "hybrid/transform/naming.py": ("transform/test_split.py",),
+    "hybrid/transform/splitter.py": (
+        "transform/test_split.py",
+        "transform/test_split_transitions.py",
+        "transform/test_corners.py",
+    ),
+    "hybrid/transform/surface.py": ("transform/test_filippov.py", "transform/test_two_folds.py"),
+    "lyapunov/kernels.py": ("../lyapunov/test_spectrum.py", "../lyapunov/test_two_orbit.py"),
+    "lyapunov/study/kernels.py": ("../lyapunov/study/test_ode23s.py",),
+    "lyapunov/study/regimes.py": ("../lyapunov/study/test_figures.py",),
+    "lyapunov/study/report.py": ("../lyapunov/test_main.py",),
+    "lyapunov/study/tangents.py": ("../lyapunov/test_main.py",),
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
     "hybrid/compiler/emitted.py": (
         "compiler/bounds/test_forcing.py",
@@ -54,9 +83,14 @@ NEAREST = {
         "simulation/test_ending.py",
         "kernels/events/test_grazing.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
     ),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
-    "hybrid/simulation/initial_mode.py": ("simulation/test_simulate.py", "kernels/jumps/test_instant.py"),
+    "hybrid/simulation/initial_mode.py": (
+        "simulation/test_simulate.py",
+        "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
+    ),
     "hybrid/compiler/bounds/forcing.py": ("compiler/bounds/test_forcing.py",),
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/bounds/program.py": (
@@ -92,23 +126,31 @@ NEAREST = {
     "hybrid/kernels/drive.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
     ),
-    "hybrid/kernels/events/initial_mode.py": ("simulation/test_simulate.py", "kernels/jumps/test_instant.py"),
+    "hybrid/kernels/events/initial_mode.py": (
+        "simulation/test_simulate.py",
+        "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
+    ),
     "hybrid/kernels/steps/forcing.py": ("compiler/bounds/test_forcing.py",),
     "hybrid/kernels/events/guards.py": (
         "kernels/events/test_onset.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_crossings.py",
     ),
     "hybrid/kernels/jumps/jump.py": (
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/jumps/test_locked.py",
     ),
     "hybrid/kernels/events/onset.py": (
         "kernels/events/test_onset.py",
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_proved_crossings.py",
     ),
     "hybrid/kernels/arithmetic/operations.py": ("kernels/events/test_proved_crossings.py",),
@@ -124,6 +166,7 @@ NEAREST = {
     ),
     "hybrid/kernels/events/sides.py": (
         "kernels/jumps/test_instant.py",
+        "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
         "kernels/jumps/test_corner.py",
     ),
@@ -189,12 +232,11 @@ def _is_silent(node: ast.AST) -> bool:
         return True
     if isinstance(node, ast.FunctionDef) and node.name in ("__repr__", "__getattr__"):
         return True
-    if (
-        isinstance(node, ast.Assign)
-        and isinstance(node.targets[0], ast.Name)
-        and node.targets[0].id.isupper()
-    ):
-        return True
+    if isinstance(node, ast.Assign):
+        [target, *_] = node.targets
+        names = target.elts if isinstance(target, ast.Tuple) else [target]
+        if all(isinstance(each, ast.Name) and each.id.isupper() for each in names):
+            return True
     return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
 
@@ -223,7 +265,9 @@ def _changes(node: ast.AST) -> list[Callable[[ast.AST], None]]:
 def nearest_tests(path: Path) -> list[str]:
     """Test files with the name of the module, or that import it, or of modules that import it."""
     if str(path) in NEAREST:
-        return [f"tests/hybrid/{name}" for name in NEAREST[str(path)]]
+        own = [str(p.relative_to(ROOT)) for p in _of_the_same_name(path)]
+        others = [(Path("tests/hybrid") / name).as_posix() for name in NEAREST[str(path)]]
+        return list(dict.fromkeys([*own, *map(os.path.normpath, others)]))
     tests = _own_tests(path)
     if not tests:
         module = re.compile(rf"\b{re.escape('.'.join(path.with_suffix('').parts))}\b")
@@ -234,9 +278,15 @@ def nearest_tests(path: Path) -> list[str]:
     return list(dict.fromkeys(tests))[:MOST_TESTS]
 
 
+def _of_the_same_name(path: Path) -> list[Path]:
+    """Test files with the name of the module; if several have it, those in the same place of the tree."""
+    found = sorted((ROOT / "tests").rglob(f"test_{path.stem}.py"))
+    mirror = ROOT / "tests" / path.with_name(f"test_{path.stem}.py")
+    return [mirror] if mirror in found else found
+
+
 def _own_tests(path: Path) -> list[str]:
-    folder = ROOT / "tests"
-    same = sorted(folder.rglob(f"test_{path.stem}.py"))
+    folder, same = ROOT / "tests", _of_the_same_name(path)
     module = re.compile(rf"\b{re.escape('.'.join(path.with_suffix('').parts))}\b")
     importing = (p for p in sorted(folder.rglob("test_*.py")) if module.search(p.read_text(encoding="utf-8")))
     return [str(p.relative_to(ROOT)) for p in (same or importing)]

@@ -111,7 +111,7 @@ def plot_convergence(
         ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
     for i, (label, history) in enumerate(histories.items()):
         at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
-        at = at[at <= len(history)]
+        at = at[(at > 0) & (at <= len(history))]
         width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
         ax.plot(at, history[at - 1], color=colour, label=label, linewidth=width)
         if label in points:
@@ -240,9 +240,9 @@ def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes
             linewidth=1,
         )
     # The first estimates are far off, so the limits fit the later nine tenths.
-    low, high = (values - errors)[shown], (values + errors)[shown]
     late = spectrum.history[len(spectrum.growths) // 10 :, shown].ravel()
-    bottom, top = min(*low, *late, 0.0, 0.0), max(*high, *late, 0.0, 0.0)
+    inside = [*(values - errors)[shown], *(values + errors)[shown], *late, 0.0]
+    bottom, top = min(inside), max(inside)
     margin = 0.1 * (top - bottom) or 1.0
     ax.set_ylim(bottom - margin, top + margin)
     return ax

@@ -220,7 +220,7 @@ def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:
     row = high[1] - low[1] < 1e-9
     beside = 0.7 if len(places) < CROWD else 0.4
     ax.set_xlim(low[0] - beside, high[0] + beside)
-    above = 1.0 if loops and row else 0.65 if loops or len(places) < CROWD else 0.2
-    ax.set_ylim(low[1] - (0.65 if row else 0.6 if loops or len(places) < CROWD else 0.2), high[1] + above)
+    margin = 0.65 if loops or len(places) < CROWD else 0.2
+    ax.set_ylim(low[1] - margin, high[1] + margin + (0.35 if loops and row else 0.0))
     ax.set_aspect("equal", adjustable="box")
     ax.set_axis_off()

@@ -88,7 +88,8 @@ def plot_work_precision(result: Measurement, quantity: str = "state", *, ax: Axe
     ax.set_xlabel("seconds")
     ax.set_ylabel(f"error of the {quantity}")
     plain(ax)
-    _label_ends(ax, ends)
+    if ends:
+        _label_ends(ax, ends)
     return ax
 
 

@@ -199,5 +199,6 @@ def _freed(
             at_start=transition.guard.at_start,
             gradient=None if gradient is None else scaled_gradient,
         ),
-        reset=None if transition.is_marker else Reset(map_off_guard),
+        # A marker stays one, and where a run ends nothing is reset.
+        reset=None if transition.is_marker or transition.target is None else Reset(map_off_guard),
     )

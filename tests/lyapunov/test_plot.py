@@ -10,7 +10,17 @@ import lyapunov
 import models
 from hybrid import DOP853, ArgumentError
 from lyapunov.maps import KINDS
-from lyapunov.plot import kinds, plot_bifurcation, plot_chart, plot_exponents, plot_kinds, plot_map
+from lyapunov.plot import (
+    kinds,
+    plot_bifurcation,
+    plot_chart,
+    plot_convergence,
+    plot_exponents,
+    plot_kinds,
+    plot_map,
+    plot_phase_portrait,
+    plot_spectrum,
+)
 
 SHORT = {"intervals": 20, "transient": 5, "solver": DOP853(rtol=1e-6, atol=1e-8)}
 
@@ -99,6 +109,14 @@ def test_signs_tell_the_kinds_of_motion(forced, found):
     assert {text.get_text() for text in ax.get_legend().get_texts()} == {*found[0], *found[1]}
 
 
+def test_two_standard_errors_tell_an_exponent_from_zero():
+    chart = made([[(0.39, -9.0), (0.41, -9.0)], [(-0.39, -9.0), (-0.41, -9.0)]], 0.2)
+    assert [[KINDS[i] for i in row] for row in kinds(chart).values] == [
+        ["torus", "chaotic"],
+        ["torus", "periodic"],
+    ]
+
+
 def test_three_exponents_of_zero_are_a_torus_too():
     rows = [[(0.1, 0.0, -0.1), (0.0, -1.0, -1.0)], [(-1.0, -1.0, -1.0), (-np.inf, -np.inf, -np.inf)]]
     found = kinds(made(rows, 0.2, "no"))
@@ -108,6 +126,17 @@ def test_three_exponents_of_zero_are_a_torus_too():
     ]
     assert found.attrs["flag_values"] == [0, 1, 2, 3, 4]
     assert found.attrs["flag_meanings"] == "not_known at rest periodic torus chaotic"
+
+
+def test_what_is_known_follows_from_the_first_exponent_and_the_status():
+    """A state that is lost at each jump has an exponent of minus infinity; a run that failed has none."""
+    rows = [[(1.0, -np.inf), (-1.0, -np.inf), (0.0, -np.inf)], [(np.nan, -1.0), (np.inf, -1.0), (1.0, -1.0)]]
+    chart = made(rows, 0.2)
+    chart.status[1, 2] = int(hybrid.StatusCode.MAX_STEPS)
+    assert [[KINDS[i] for i in row] for row in kinds(chart).values] == [
+        ["chaotic", "periodic", "torus"],
+        ["not known"] * 3,
+    ]
 
 
 def test_exponents_are_named_and_have_bands_of_two_standard_errors(line):
@@ -178,6 +207,9 @@ def test_a_figure_of_each_kind(line, grid):
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
     assert len(plot_chart(bare).axes) == 1
+    # One exponent needs no legend.
+    assert bare.sizes["exponent"] == 1
+    assert plot_exponents(bare).get_legend() is None
     with pytest.raises(ArgumentError, match="chart must have section points"):
         plot_bifurcation(bare, ax=plt.figure().subplots())
 
@@ -188,3 +220,90 @@ def test_lines_and_maps_want_their_kind_of_chart(line, grid):
         plot_exponents(grid, ax=ax)
     with pytest.raises(ArgumentError, match="chart must be over two parameters"):
         plot_map(line, ax=ax)
+
+
+class TestConvergence:
+    def test_long_histories_are_thinned_and_keep_both_ends(self):
+        for length in (1, 2, 10, 1499, 5000, 100_000):
+            history = 1.0 / np.arange(1.0, length + 1)
+            [line] = plot_convergence({"a": history}).lines
+            at, shown = line.get_xdata(), line.get_ydata()
+            np.testing.assert_array_equal(shown, history[at - 1])
+            assert (at[0], at[-1]) == (1, length)
+            # Each interval at first, and later a fixed number of points per decade.
+            assert np.all(np.diff(at) > 0)
+            assert np.all(np.diff(at) <= 1 + 0.02 * at[:-1])
+            assert len(at) <= 1500
+
+    def test_lines_points_and_truth_have_their_labels_and_colours(self):
+        points = {"b": ([1, 3], [0.5, 0.25])}
+        ax = plot_convergence(
+            {"a": [1.0, 2.0], "b": [3.0, 4.0]},
+            points=points,
+            points_label="seen",
+            truth=0.1,
+            truth_label="known",
+        )
+        truth, a, b, marks, sample = ax.lines
+        assert [line.get_label() for line in (truth, a, b, sample)] == ["known", "a", "b", "seen"]
+        assert set(truth.get_ydata()) == {0.1}
+        np.testing.assert_array_equal(marks.get_xydata(), [[1, 0.5], [3, 0.25]])
+        assert marks.get_color() == b.get_color() != a.get_color()
+        assert a.get_linewidth() > b.get_linewidth()
+        assert [text.get_text() for text in ax.get_legend().get_texts()] == ["known", "a", "b", "seen"]
+        assert (ax.get_xscale(), ax.get_xlabel()) == ("log", "intervals $M$")
+        assert len(plot_convergence({"a": [1.0, 2.0]}).lines) == 1
+
+    def test_a_history_without_intervals_is_an_empty_line(self):
+        [line] = plot_convergence({"a": []}).lines
+        assert len(line.get_xdata()) == 0
+
+    def test_further_lines_go_through_the_colours(self):
+        lines = plot_convergence({str(k): [1.0] for k in range(8)}).lines
+        colours = [line.get_color() for line in lines]
+        assert len(set(colours[:7])) == 7
+        assert colours[7] == colours[0]
+
+
+class TestPhasePortrait:
+    def test_the_orbit_is_in_order_with_both_sides_of_each_jump(self):
+        arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
+        [line] = plot_phase_portrait(arc, "v", "q").lines
+        v, q = line.get_xydata().T
+        assert (v[0], q[0]) == (0.0, 1.0)
+        assert (v[-1], q[-1]) == (arc.x[-1, 1], arc.x[-1, 0])
+        up = np.flatnonzero(np.diff(v) > 1.0)
+        np.testing.assert_array_equal(v[up], arc.jumps.x_minus[:, 1])
+        np.testing.assert_array_equal(v[up + 1], arc.jumps.x_plus[:, 1])
+        # Between jumps the ball falls, in small steps, and keeps its energy.
+        falling = np.delete(np.diff(v), up)
+        assert np.all(falling <= 0.0)
+        assert falling.min() > -1e-3
+        for piece in np.split(v**2 / 2 + 9.81 * q, up + 1):
+            np.testing.assert_allclose(piece, piece[0], rtol=1e-9)
+
+    @pytest.mark.parametrize("spread", [0.0, 0.9e-6, 1.1e-6, 1.0])
+    def test_a_fixed_point_is_a_large_dot(self, spread):
+        arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 0.1))
+        section = np.array([[0.0, 0.0], [0.0, spread]])
+        ax = plot_phase_portrait(arc, "q", "v", section=section, labels=("a", "b"))
+        [dots] = ax.collections
+        np.testing.assert_array_equal(dots.get_offsets(), section)
+        assert (dots.get_sizes()[0] > 10.0) == (spread < 1e-6)
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "b")
+
+
+def test_a_spectrum_has_bars_of_two_standard_errors_inside_of_its_limits():
+    options = {"intervals": 40, "transient": 5}
+    spectrum = lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.3, 0.1), **options)
+    ax = plot_spectrum(spectrum)
+    values, errors = spectrum.exponents, 2 * spectrum.standard_error
+    for container, value, error in zip(ax.containers, values, errors, strict=True):
+        [bar] = container.lines[2]
+        np.testing.assert_allclose(bar.get_segments()[0], [[40, value - error], [40, value + error]])
+    labels = [f"$\\lambda_{{{i}}}$ = {value:.5g}" for i, value in enumerate(values, 1)]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["zero", *labels]
+    shown = [0.0, *(values - errors), *(values + errors), *spectrum.history[4:].ravel()]
+    bottom, top = min(shown), max(shown)
+    margin = 0.1 * (top - bottom)
+    np.testing.assert_allclose(ax.get_ylim(), [bottom - margin, top + margin])

@@ -432,3 +432,25 @@ def test_speeds_in_units_far_from_those_of_places(unit):
     )
     assert spectrum.status.ok
     np.testing.assert_allclose(spectrum.exponents, [-0.1, -0.2, -0.3, -0.4], atol=1e-6)
+
+
+@pytest.mark.parametrize("transient", [0, 100])
+def test_steps_and_jumps_of_the_transient_are_not_counted(transient):
+    """A saw with two teeth per period: three exact steps."""
+    saw = hybrid.HybridSystem(
+        state=("x",),
+        modes=[hybrid.Mode("rise", lambda t, x, p: (1.0,))],
+        transitions=[
+            hybrid.Transition(
+                "rise",
+                "rise",
+                hybrid.Guard(lambda t, x, p: x.x - 0.5, +1),
+                hybrid.Reset(lambda t, x, p: (x.x - 0.5,)),
+            )
+        ],
+        period=1.0,
+    )
+    spectrum = lyapunov.lyapunov_spectrum(saw, (0.25,), intervals=10, transient=transient)
+    assert spectrum.jumps_per_interval == 2.0
+    # The start of a run may cost a step.
+    assert 3.0 <= spectrum.steps_per_interval <= 3.1

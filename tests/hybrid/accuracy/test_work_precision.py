@@ -167,6 +167,32 @@ def test_times_are_the_median_of_the_later_runs_and_the_first_apart():
     assert found.compile_seconds.tolist() == [8.0, 8.0]
 
 
+@pytest.mark.parametrize(
+    ("repeats", "seconds", "calls"),
+    [
+        # One run to compile, and those that are measured.
+        (1, 1e-3, 2),
+        (1, 1.0, 2),
+        (3, 1.0, 4),
+        (3, 1.0 / 64, 5),
+        (3, 1.0 / 1024, 53),
+        (3, 0.0, 1001),
+        (2000, 0.0, 2001),
+    ],
+)
+def test_short_runs_are_repeated_until_their_times_add_up(repeats, seconds, calls):
+    clock, made = Clock(), []
+
+    def method(tolerance):
+        made.append(tolerance)
+        clock.now += seconds
+        return EXACT
+
+    options = {"reference": EXACT, "tolerances": [1e-3], "repeats": repeats, "clock": clock}
+    work_precision(*FALL, methods={"m": method}, **options)
+    assert len(made) == calls
+
+
 def test_a_method_may_bring_its_own_time():
     methods = {"m": lambda tolerance: Answer(EXACT, seconds=3.0)}
     found = work_precision(*FALL, methods=methods, reference=EXACT, tolerances=[1e-3])

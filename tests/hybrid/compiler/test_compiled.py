@@ -126,3 +126,20 @@ def test_a_function_that_cannot_be_compiled():
         hybrid.ModelError, match=r"Mode 'a': field cannot be .*use np.sin in place of math.sin"
     ):
         compile_system(sine)
+
+
+def test_modes_whose_field_or_guard_depends_on_time_are_timed():
+    """A guard makes the mode timed that it is in, not the others."""
+    fields = {"still": lambda t, x, p: (1.0,), "driven": lambda t, x, p: (np.cos(t),)}
+    guards = {"place": lambda t, x, p: x.x - 1.0, "moment": lambda t, x, p: t - 1.0}
+    names = [f"{field} {guard}" for field in fields for guard in guards]
+    following = dict(zip(names, [*names[1:], names[0]], strict=True))
+    system = HybridSystem(
+        state=("x",),
+        modes=[Mode(name, fields[name.split()[0]]) for name in names],
+        transitions=[
+            Transition(name, following[name], Guard(guards[name.split()[1]], +1), name=f"leave {name}")
+            for name in reversed(names)
+        ],
+    )
+    assert compile_system(system).model().timed.tolist() == [0, 1, 1, 1]

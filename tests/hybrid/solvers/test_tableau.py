@@ -232,3 +232,16 @@ def test_bad_tolerances(solver):
         solver(max_step=0.0)
     with pytest.raises(hybrid.ArgumentError, match="rtol must be positive; got nan"):
         solver(rtol=float("nan"))
+
+
+@pytest.mark.parametrize("solver", [hybrid.DOP853, hybrid.Tsit5, hybrid.RadauIIA])
+def test_nodes_are_the_ends_and_the_places_of_stages_that_count(solver):
+    """A stage counts if the end or one of both estimates of the error has a part of it."""
+    tableau = solver().tableau
+    weights = [tableau.quadrature, tableau.error, tableau.second_error]
+    counted = {
+        float(place)
+        for place, *parts in zip(tableau.c[: len(weights[0])], *weights, strict=False)
+        if any(parts)
+    }
+    assert tableau.nodes.tolist() == sorted({0.0, 1.0} | counted)

@@ -143,6 +143,10 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
         sweep(task, GRID, store=3)
 
 
+def test_an_empty_folder_becomes_a_store(tmp_path):
+    assert same(sweep(task, GRID, store=tmp_path), hybrid.open(tmp_path).load())
+
+
 def test_an_interrupted_sweep_goes_on(tmp_path, monkeypatch):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     over = {"a": np.arange(10.0), "b": [0.1]}

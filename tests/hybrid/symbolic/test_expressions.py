@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sympy
 
+from hybrid.symbolic import expressions
 from hybrid.symbolic.expressions import (
     ONE,
     ZERO,
@@ -173,3 +174,15 @@ def test_products_are_zero_where_a_factor_switches_them_off():
     assert close_gates(1 + Step(x) * steep) == 1 + Gate(x, steep)
     plain = x * y
     assert close_gates(plain) is plain
+
+
+def test_all_functions_are_real():
+    """Roots of their squares, say, are their absolute values, not complex numbers."""
+    found = [each for each in vars(expressions).values() if isinstance(each, type)]
+    classes = [each for each in found if issubclass(each, expressions.RealFunction)]
+    assert len(classes) > 15
+    for each in classes:
+        assert each.is_real, each
+    for each in (Absolute(x), Maximum(x, y), Floor(x), Select(x, y, x), Less(x, y)):
+        assert each.is_real
+        assert not each.is_zero

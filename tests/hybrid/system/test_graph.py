@@ -260,3 +260,25 @@ def test_a_table_shows_conditions_ends_and_limits():
 
 def test_a_smooth_system_has_no_transitions_to_show():
     assert repr(HybridSystem(state=1, modes=[Mode("a", lambda t, x, p: -x)])).endswith("no transitions")
+
+
+def test_a_system_that_grows_is_whole_once_nothing_leads_on():
+    """A transition without a target ends the run, or leads to a mode that has not been made yet."""
+
+    class Growth:
+        def __init__(self, *names):
+            self.names, self.written = names, {}
+
+        def leads_on(self, name):
+            return name in self.names
+
+    whole = HybridSystem(
+        state=("q",),
+        modes=[Mode("a", lambda t, x, p: (1.0,)), Mode("b", lambda t, x, p: (1.0,))],
+        transitions=[
+            Transition("a", "b", Guard(lambda t, x, p: x.q - 1, +1), name="on"),
+            Transition("b", None, Guard(lambda t, x, p: x.q - 2, +1), name="end"),
+        ],
+    )
+    for growth, is_whole in ((None, True), (Growth(), True), (Growth("on"), True), (Growth("end"), False)):
+        assert attrs.evolve(whole, growth=growth).is_whole == is_whole

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lyapunov.study.runs import Regime
+from hybrid import DOP853, Taylor
+from lyapunov.study.runs import Regime, Settings
 
 SPREAD = np.array([[0.0, 1.0], [0.5, 1.0], [0.2, 1.5]])
 
@@ -38,3 +39,24 @@ def regime(exponent, error, points):
 )
 def test_kind_of_motion(exponent, error, points, kind):
     assert regime(exponent, error, points).kind == kind
+
+
+@pytest.mark.parametrize(
+    ("solver", "tight"),
+    [
+        (Taylor(rtol=1e-9, atol=1e-11), Taylor(rtol=1e-12, atol=1e-14)),
+        (DOP853(rtol=1e-6, atol=1e-8), DOP853(rtol=1e-9, atol=1e-11)),
+        # A solver cannot do better than rounding.
+        (DOP853(rtol=1e-12, atol=1e-14), DOP853(rtol=1e-13, atol=1e-16)),
+    ],
+)
+def test_neighbouring_orbits_have_a_tighter_solver(solver, tight):
+    found = Settings(solver=solver).two_orbit_solver
+    assert type(found) is type(tight)
+    assert found.rtol == pytest.approx(tight.rtol, rel=1e-12)
+    assert found.atol == pytest.approx(tight.atol, rel=1e-12)
+
+
+def test_an_impact_is_two_jumps():
+    spectra = tuple(SimpleNamespace(jumps_per_interval=each) for each in (2.0, 1.0, 0.5))
+    assert Regime(7.4, spectra, None, None, None, None).impacts_per_period == (1.0, 0.5, 0.25)

@@ -5,6 +5,7 @@ from functools import cache
 import attrs
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,6 +23,9 @@ from hybrid import (
     simulate,
     stroboscopic_section,
 )
+from hybrid.compiler.bounds.forcing import OF_STATE, Forcing, forcings
+from hybrid.symbolic.expressions import Absolute, Maximum
+from hybrid.symbolic.tracing import model_symbols
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 # Pulses as functions of time, with a height ``A``, a place ``a`` and a width ``w``.
@@ -414,3 +418,30 @@ def test_forcing_that_rounding_of_time_hides_is_reported(w, factor, solver):
     # Half a pulse at the start, and pulses at pi, 2 pi and 3 pi.
     area = 10.0 * 3.5 * np.sqrt(np.pi * 1e-4)
     assert arc.x[-1, 0] == pytest.approx(np.exp(-area) if factor else 1.0 + area, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("field", "saturates"),
+    [
+        (lambda x, y: sympy.tanh(x / 1e-4), True),
+        (lambda x, y: y * sympy.exp(9 * x), True),
+        (lambda x, y: 2**x, True),
+        (lambda x, y: (x / 5) ** 40, True),
+        (lambda x, y: (x * y) ** -9, True),
+        (lambda x, y: x / sympy.sqrt(x**2 + sympy.Float(1e-16)), True),
+        (lambda x, y: sympy.sqrt(sympy.sin(x)), True),
+        (lambda x, y: sympy.sqrt(Maximum(x**2, y)), True),
+        # These vary wherever they are, or their series shows where they do.
+        (lambda x, y: sympy.sqrt(x - 2 * y), False),
+        (lambda x, y: sympy.sqrt(Maximum(x, y)), False),
+        (lambda x, y: Absolute(x) ** sympy.Rational(3, 2), False),
+        (lambda x, y: x**3 + x * y, False),
+        (lambda x, y: sympy.sin(x) * y, False),
+        (lambda x, y: y / (1 + x**2), False),
+    ],
+)
+def test_what_saturates_in_the_state_or_is_flat_at_first(field, saturates):
+    symbols = model_symbols(2, 1)
+    wanted = (Forcing(None, OF_STATE),) if saturates else ()
+    assert forcings([symbols.x[1], field(*symbols.x)], symbols) == wanted
+    assert forcings([field(symbols.p[0], 2 * symbols.p[0])], symbols) == ()

@@ -1,0 +1,57 @@
+"""Methods of results and systems: valid calls, and what each argument must refuse."""
+
+import math
+
+import hybrid
+import lyapunov
+from hybrid import HybridSystem
+from models import contact
+from tests.hybrid.arguments.values import (
+    AXES,
+    BALL,
+    COUNT,
+    LIMIT,
+    NAME,
+    NUMBERS,
+    OF_BALL,
+    OSCILLATOR,
+    PARAMETERS,
+    POSITIVE,
+    SOLVER,
+    call,
+)
+
+
+def methods(made):
+    arc = made["arc"]
+    return [
+        (call(contact.Hertz.duration, contact.Hertz(1e8), 90.0, 0.4), {"mass": POSITIVE, "speed": POSITIVE}),
+        (call(hybrid.HybridArc.__call__, arc, 0.5), {"t": [*NUMBERS, math.nan, -1.0, 2.0, [0.5, math.nan]]}),
+        (call(hybrid.PeriodicOrbit.arc, made["orbit"]), {"solver": SOLVER}),
+        (call(hybrid.Solver.tightened, hybrid.DOP853(), 10.0), {"factor": POSITIVE}),
+        (call(HybridSystem.mode_index, BALL, "flight"), {"name": [None, *NAME]}),
+        (call(HybridSystem.parts_of, BALL, "flight"), {"name": [None, *NAME]}),
+        (call(HybridSystem.copies_of, BALL, "bounce"), {"name": [None, *NAME]}),
+        (call(HybridSystem.transition_index, BALL, "bounce"), {"name": [None, *NAME]}),
+        (call(HybridSystem.parameter_values, BALL), {"overrides": OF_BALL}),
+        (call(HybridSystem.forcing_period, OSCILLATOR), {"overrides": PARAMETERS}),
+        (call(hybrid.CompiledSystem.model, hybrid.compile_system(BALL)), {"parameters": OF_BALL}),
+        (call(hybrid.CompiledSystem.series_columns, hybrid.compile_system(BALL), 1), {"tangents": COUNT}),
+        (call(hybrid.WorkPrecision.rows_of, made["work"], "T"), {"method": [None, *NAME]}),
+        (call(hybrid.WorkPrecision.error_of, made["work"], "state"), {"quantity": [None, *NAME]}),
+        (
+            call(hybrid.WorkPrecision.seconds_at, made["work"], "T", 1e-3),
+            {
+                "method": [None, *NAME],
+                "error": POSITIVE,
+                "quantity": [None, *NAME],
+            },
+        ),
+        (call(hybrid.WorkPrecision.plot, made["work"]), {"ax": AXES, "quantity": [None, *NAME]}),
+        (call(lyapunov.ModelComparison.cost, made["comparison"], "a"), {"name": [None, *NAME]}),
+        (call(lyapunov.ModelComparison.distance, made["comparison"], "a"), {"name": [None, *NAME]}),
+        *(
+            (call(method, made["comparison"], 0.1), {"tolerance": LIMIT[:-1]})
+            for method in (lyapunov.ModelComparison.within, lyapunov.ModelComparison.cheapest)
+        ),
+    ]

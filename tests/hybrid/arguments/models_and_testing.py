@@ -1,0 +1,130 @@
+"""Models, contact laws and tests of systems: valid calls, and what each argument must refuse."""
+
+import hybrid
+import hybrid.testing
+import models
+from models import contact
+from models.dry_friction_oscillator import den_hartog_amplitude
+from models.one_impact import one_impact_orbits
+from models.vibroimpact import hertz_stiffness
+from tests.hybrid.arguments.values import (
+    BALL,
+    COUNT,
+    NAME,
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    RANGES,
+    SOLVER,
+    SPAN,
+    SYSTEM,
+    Odd,
+    call,
+)
+
+
+def checks():
+    case = hybrid.testing.Case(BALL, dict(BALL.parameters), "flight", (1.0, 0.0), 0.0, 0.3)
+    return [
+        (call(hybrid.testing.states, BALL), {"system": SYSTEM, "ranges": RANGES}),
+        (
+            call(hybrid.testing.parameters, BALL),
+            {"system": SYSTEM, "ranges": [*RANGES[:4], {"g": "a"}, {"g": (2, 1)}]},
+        ),
+        *(
+            (
+                call(function, BALL),
+                {
+                    "system": SYSTEM,
+                    "states": RANGES,
+                    "parameters": [*RANGES[:4], {"g": "a"}, {"g": True}],
+                    "t_span": [*SPAN[1:], (1.0, 1.0)],
+                    "mode": NAME,
+                    "solver": SOLVER,
+                    "engine": [None, "a", 3, Odd()],
+                    "passable": [None, 3, ["nope"], "nope", [3]],
+                    **(
+                        {}
+                        if function is hybrid.testing.cases
+                        else {
+                            "examples": [0, *COUNT],
+                            "elastic": ["nope", 3, ["nope"], [3], [None]],
+                        }
+                    ),
+                },
+            )
+            for function in (hybrid.testing.cases, hybrid.testing.check_system)
+        ),
+        (call(hybrid.testing.small_systems), {}),
+        (
+            call(hybrid.testing.piecewise_affine_fields),
+            {name: [None, 3, "ab", (1,), (0, 1), (2, 1), (1.5, 2)] for name in ("dimensions", "switches")},
+        ),
+        *(
+            (call(getattr(hybrid.testing, name), None), {"case": [None, "a", 3, BALL]})
+            for name in hybrid.testing.__all__
+            if name.startswith("check_") and name not in ("check_system", "check_elastic")
+        ),
+        (
+            call(hybrid.testing.check_elastic, case, ["v"]),
+            {
+                "case": [None, "a", 3, BALL],
+                "flip": [None, "v", 3, ["nope"], [3], [None]],
+            },
+        ),
+    ]
+
+
+def laws():
+    return [
+        (call(models.vibroimpact), {"contact": ["a", 3, 0, False, contact.Rigid, Odd()]}),
+        (
+            call(hertz_stiffness),
+            {
+                "E": POSITIVE,
+                "nu": [*NUMBER, 1.0, -1.0],
+                "A": POSITIVE,
+                "B": POSITIVE,
+                "q": POSITIVE,
+            },
+        ),
+        (
+            call(one_impact_orbits, 1.0, 0.1, 0.5, 0.8, 1.0, 0.7),
+            {
+                **dict.fromkeys("kcAd", NUMBER),
+                "w": POSITIVE,
+                "r": NOT_NEGATIVE,
+                "n": [0, *COUNT],
+            },
+        ),
+        (call(den_hartog_amplitude, 0.1, 1.0, 0.5), {"f": NOT_NEGATIVE, "A": NUMBER, "w": POSITIVE}),
+        (call(contact.Rigid), {"e": NOT_NEGATIVE}),
+        (call(contact.Hertz, 1e8), {"K": POSITIVE}),
+        (call(contact.HuntCrossley, 1e8, 0.1), {"K": POSITIVE, "alpha": NOT_NEGATIVE}),
+        (call(contact.KelvinVoigt, 1e8, 0.1), {"k": POSITIVE, "c": NOT_NEGATIVE}),
+        (
+            call(contact.HuntCrossley.from_restitution, 0.8, 1e8, 0.4),
+            {
+                "e": [*POSITIVE, 1.1],
+                "K": POSITIVE,
+                "speed": POSITIVE,
+            },
+        ),
+        (
+            call(contact.KelvinVoigt.from_restitution, 0.8, 90.0, 0.01),
+            {
+                "e": [*POSITIVE, 1.1],
+                "mass": POSITIVE,
+                "duration": POSITIVE,
+            },
+        ),
+        (
+            call(contact.matched_laws, 1e8, 90.0, 0.4),
+            {
+                "e": [*POSITIVE, 1.1],
+                "K": POSITIVE,
+                "mass": POSITIVE,
+                "speed": POSITIVE,
+            },
+        ),
+    ]

@@ -1,0 +1,122 @@
+"""Figures: valid calls, and what each argument must refuse."""
+
+import numpy as np
+
+import hybrid
+import hybrid.plot
+import lyapunov
+import lyapunov.plot
+import lyapunov.study.regimes
+from tests.hybrid.arguments.values import (
+    AXES,
+    BALL,
+    COMPONENT,
+    COUNT,
+    LABELS,
+    NAME,
+    OPTIONAL_NUMBER,
+    SYSTEM,
+    TEXT,
+    call,
+)
+
+
+def plots(made):
+    arc, chart = made["arc"], made["chart"]
+    return [
+        (
+            call(hybrid.plot.plot_arc, arc),
+            {
+                "arc": [None, "a", 3, BALL],
+                "components": [["nope"], "nope", 3, [2], [1.5], [None], [True]],
+                "ax": AXES,
+            },
+        ),
+        (
+            call(hybrid.plot.plot_phase, arc, "q", "v"),
+            {
+                "arc": [None, "a", 3, BALL],
+                "x": COMPONENT,
+                "y": COMPONENT,
+                "ax": AXES,
+            },
+        ),
+        (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, "ax": AXES}),
+        (call(hybrid.plot.plot, BALL), {"result": [None, "a", 3]}),
+        (
+            call(hybrid.plot.plot_section, made["section"]),
+            {"section": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES},
+        ),
+        (
+            call(hybrid.plot.plot_orbit, made["orbit"]),
+            {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES},
+        ),
+        (
+            call(hybrid.plot.plot_work_precision, made["work"]),
+            {
+                "result": [None, "a", 3, BALL],
+                "ax": AXES,
+                "quantity": [None, *NAME],
+            },
+        ),
+        (
+            call(lyapunov.plot.plot_convergence, {"a": [1.0, 2.0]}),
+            {
+                "ax": AXES,
+                "estimates": [[1], "a", {"a": "b"}, {"a": 1.0}, {"a": [[1.0]]}, {"a": [True]}],
+                "points": [[1], "a", {"a": 1.0}, {"a": ([1.0], [1.0, 2.0])}, {"a": ("a", "b")}],
+                "points_label": TEXT,
+                "truth": OPTIONAL_NUMBER,
+                "truth_label": TEXT,
+            },
+        ),
+        (
+            call(lyapunov.plot.plot_phase_portrait, arc, "q", "v"),
+            {
+                "ax": AXES,
+                "arc": [None, "a", 3, BALL],
+                "x": COMPONENT,
+                "y": COMPONENT,
+                "section": ["a", [1.0], [[True, False]], [["a", "b"]], 3.0],
+                "labels": LABELS,
+            },
+        ),
+        (
+            call(
+                lyapunov.study.regimes.plot_regimes,
+                [lyapunov.study.regimes.Panel("a", arc, arc.x, np.ones(3), 1.0)],
+                "q",
+                "v",
+            ),
+            {
+                "panels": [None, "a", 3, [1], [arc]],
+                "x": COMPONENT,
+                "y": COMPONENT,
+                "labels": LABELS,
+            },
+        ),
+        (call(lyapunov.plot.plot_exponents, chart), {"ax": AXES, "chart": [None, "a", 3, arc]}),
+        (
+            call(lyapunov.plot.plot_bifurcation, chart),
+            {
+                "ax": AXES,
+                "chart": [None, "a", 3, arc],
+                "component": COMPONENT,
+            },
+        ),
+        (
+            call(lyapunov.plot.plot_kinds, chart),
+            {"ax": AXES, "chart": [None, "a", 3, arc, chart]},
+        ),
+        (
+            call(lyapunov.plot.plot_map, chart),
+            {
+                "ax": AXES,
+                "chart": [None, "a", 3, arc],
+                "exponent": [1, *COUNT],
+            },
+        ),
+        (call(lyapunov.plot.plot_chart, chart), {"chart": [None, "a", 3, arc], "component": COMPONENT}),
+        (call(lyapunov.plot.plot_spectrum, made["spectrum"]), {"spectrum": [None, "a", 3, arc], "ax": AXES}),
+        (call(lyapunov.plot.style), {}),
+    ]

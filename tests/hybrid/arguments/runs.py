@@ -1,0 +1,231 @@
+"""Runs, solvers, orbits, sections, sweeps and exponents: valid calls, and what each argument must refuse."""
+
+import math
+
+import hybrid
+import lyapunov
+from hybrid import Guard
+from tests.hybrid.arguments.values import (
+    BALL,
+    BIG_TIMES,
+    COUNT,
+    EXECUTOR,
+    EXPONENTS,
+    FLAG,
+    FUNCTION,
+    GUARD,
+    LIMIT,
+    NAME,
+    NOT_NEGATIVE,
+    NUMBER,
+    NUMBERS,
+    OF_BALL,
+    OPTIONAL_NUMBER,
+    OPTIONAL_POSITIVE,
+    OSCILLATOR,
+    POSITIVE,
+    RUN,
+    SAMPLES,
+    SPAN,
+    STATE,
+    SYSTEM,
+    TANGENT,
+    Odd,
+    call,
+)
+
+
+def runs(made):
+    start = (OSCILLATOR, (0.0, 0.0))
+    ball = (BALL, (1.0, 0.0))
+    section = Guard(lambda t, x, p: x.v, -1)
+    solvers = {"rtol": [*POSITIVE, 1e-16, 1e300], "atol": POSITIVE, "max_steps": [0, *COUNT]}
+    solvers["max_step"] = LIMIT
+    exponents = {**EXPONENTS, "k": [0, 3, *COUNT[1:]], "history": FLAG}
+    return [
+        (
+            call(hybrid.simulate, *start, (0.0, 1.0)),
+            {
+                **RUN,
+                "t_span": [*SPAN, (0.0, 1e300), (-1e300, 0.0)],
+                "tangent": TANGENT,
+                "samples": SAMPLES,
+                "max_jumps": COUNT,
+            },
+        ),
+        (
+            call(hybrid.simulate_many, OSCILLATOR, [(0.0, 0.0)], (0.0, 1.0)),
+            {
+                **RUN,
+                "x0": [
+                    *NUMBERS[:4],
+                    (0.5, 0.0),
+                    0.5,
+                    [[0.5]],
+                    [(math.nan, 0.0)],
+                    {"x": 1.0},
+                    {3: 1.0},
+                    Odd(),
+                ],
+                "t_span": [*SPAN, (0.0, 1e300), (-1e300, 0.0)],
+                "samples": SAMPLES,
+                "max_jumps": COUNT,
+                "executor": EXECUTOR[:-2],
+            },
+        ),
+        (call(hybrid.global_error, *start, (0.0, 1.0)), {**RUN, "t_span": SPAN, "max_jumps": COUNT}),
+        (
+            call(hybrid.work_precision, *ball, (0.0, 0.1), tolerances=[1e-4], repeats=1),
+            {
+                "system": SYSTEM,
+                "x0": STATE,
+                "t_span": SPAN,
+                "mode": NAME,
+                "parameters": OF_BALL,
+                "methods": [None, [], {}, "a", 3, {"T": 3}, {"T": "Taylor"}, {"T": None}],
+                "tolerances": [None, [], "a", ["1"], [0.0], [-1.0], [math.nan], [True], 1e-3, [[1e-3]]],
+                "reference": [*NUMBERS[1:], (1.0,), BALL, (math.nan, 0.0), (math.inf, 0.0)],
+                "reference_error": [
+                    [1],
+                    "a",
+                    {"nope": 1.0},
+                    {"state": "a"},
+                    {"state": -1.0},
+                    {"state": True},
+                ],
+                "tangent": FLAG,
+                "repeats": [0, *COUNT],
+                "longest": LIMIT,
+                "clock": [None, *FUNCTION],
+            },
+        ),
+        (
+            call(hybrid.periodic_orbit, *start),
+            {
+                **RUN,
+                "t0": [*NUMBER, *BIG_TIMES],
+                "periods": [0, *COUNT],
+                "period": OPTIONAL_NUMBER,
+                "tolerance": [*POSITIVE, 1.0, 10],
+                "max_iterations": COUNT,
+            },
+        ),
+        (
+            call(hybrid.periodic_orbit, *ball, period=1.0),
+            {**RUN, "parameters": OF_BALL, "period": POSITIVE[1:]},
+        ),
+        (
+            call(hybrid.stroboscopic_section, *start, periods=3),
+            {
+                **RUN,
+                "periods": [0, *COUNT],
+                "transient": COUNT,
+                "t0": [*NUMBER, *BIG_TIMES],
+                "progress": FLAG,
+            },
+        ),
+        (
+            call(hybrid.poincare_section, *start, section, points=3),
+            {
+                **RUN,
+                "section": GUARD,
+                "points": [0, *COUNT],
+                "transient": COUNT,
+                "t0": [*NUMBER, *BIG_TIMES],
+                "progress": FLAG,
+            },
+        ),
+        (
+            call(hybrid.saltation_matrix, BALL, "bounce", 0.0, (0.0, -1.0)),
+            {
+                "system": SYSTEM,
+                "transition": [None, *NAME],
+                "t": NUMBER,
+                "x": STATE,
+                "parameters": OF_BALL,
+            },
+        ),
+        (
+            call(hybrid.Answer, (1.0,)),
+            {
+                "state": NUMBERS,
+                "times": NUMBERS[1:],
+                "saltation": NUMBERS[1:],
+                "fundamental": NUMBERS[1:],
+                "exponents": NUMBERS[1:],
+                "steps": COUNT[1:],
+                "seconds": NOT_NEGATIVE[1:],
+            },
+        ),
+        *(
+            (call(solver), solvers)
+            for solver in (hybrid.Solver, hybrid.DOP853, hybrid.Tsit5, hybrid.Taylor, hybrid.RadauIIA)
+        ),
+        (call(lyapunov.lyapunov_spectrum, *start), exponents),
+        (
+            call(lyapunov.two_orbit_exponents, *start),
+            {
+                **EXPONENTS,
+                "separation": POSITIVE,
+                "direction": [*STATE[1:], (0.0, 0.0)],
+            },
+        ),
+        (
+            call(lyapunov.chart, OSCILLATOR, {"c": [0.1]}, (0.0, 0.0)),
+            {
+                **EXPONENTS,
+                "k": [0, 3, *COUNT[1:]],
+                # A value that does not fit a single row is reported in the row's status.
+                "interval": OPTIONAL_POSITIVE,
+                "t0": NUMBER,
+                "over": [
+                    None,
+                    [1],
+                    "a",
+                    {},
+                    {"nope": [1.0]},
+                    {3: [1.0]},
+                    *({"c": bad} for bad in ("abc", None, 1.0, [], ["1"], [True], [math.nan], [[1.0]], [1j])),
+                ],
+                "section": COUNT,
+                "continue_from": ["next", 1, True, math.nan, Odd()],
+                "at": ["apex", 3, True, math.nan, Odd()],
+                "store": [3, "", True, Odd()],
+                "executor": EXECUTOR,
+                "progress": FLAG[1:],
+            },
+        ),
+        (
+            call(hybrid.sweep, lambda p: {"y": p["a"]}, {"a": [1.0]}),
+            {
+                "task": [None, "a", 3],
+                "over": [
+                    None,
+                    "a",
+                    {},
+                    [],
+                    [1.0],
+                    {3: [1.0]},
+                    *({"a": bad} for bad in ("abc", None, 1.0, [], ["1"], [True], [math.nan], [[1.0]], [1j])),
+                ],
+                "store": [3, "", True, Odd()],
+                "executor": EXECUTOR,
+                "progress": FLAG[1:],
+            },
+        ),
+        (call(hybrid.open, "run.zarr"), {"path": [None, 3, "", "no such store", Odd()]}),
+        (
+            call(lyapunov.compare_models, {"a": OSCILLATOR}, (0.0, 0.0), reference="a"),
+            {
+                **{
+                    name: EXPONENTS[name]
+                    for name in ("x0", "mode", "intervals", "interval", "transient", "solver", "progress")
+                },
+                "k": [0, 3, *COUNT[1:]],
+                "systems": [None, [1], "a", {}, {"a": 3}, {"a": None}],
+                "reference": [None, *NAME],
+                "points": [None, "a", 3, [], [1], ["a"], [{"nope": 1.0}], [{"c": "1"}]],
+            },
+        ),
+        (call(lyapunov.floquet_exponents, made["orbit"]), {"orbit": [None, "a", 3, OSCILLATOR, Odd()]}),
+    ]

@@ -1,0 +1,130 @@
+"""Systems, their parts, and systems made from others: valid calls, and what each argument must refuse."""
+
+import math
+
+import numpy as np
+
+import hybrid
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from tests.hybrid.arguments.values import (
+    BALL,
+    FLAG,
+    FUNCTION,
+    GUARD,
+    LIMIT,
+    LIST,
+    SYSTEM,
+    TEXT,
+    UNITS,
+    Odd,
+    call,
+)
+
+
+def systems():
+    return [
+        (call(hybrid.compile_system, BALL), {"system": SYSTEM}),
+        (call(hybrid.split, BALL), {"system": SYSTEM}),
+        (
+            call(hybrid.from_equations, lambda t, x, p: (x.v, -np.abs(x.q)), state=("q", "v")),
+            {
+                "field": [None, *FUNCTION],
+                "state": [None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), {"q", "v"}, math.nan, Odd()],
+                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "period": [*LIMIT[1:], math.inf],
+                "name": TEXT,
+                "units": UNITS,
+            },
+        ),
+        (
+            call(
+                hybrid.filippov,
+                ("q", "v"),
+                {"e": 1.0},
+                lambda t, x, p: (x.v, 1.0),
+                lambda t, x, p: (x.v, -1.0),
+                lambda t, x, p: x.q,
+            ),
+            {
+                "state": [None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), {"q", "v"}, math.nan, Odd()],
+                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "below": [None, *FUNCTION],
+                "above": [None, *FUNCTION],
+                "switching": [None, *FUNCTION],
+                "period": [*LIMIT[1:], math.inf],
+                "name": TEXT,
+                "units": UNITS,
+            },
+        ),
+        (
+            call(
+                HybridSystem, state=("q",), parameters={"e": 1.0}, modes=[Mode("a", lambda t, x, p: (1.0,))]
+            ),
+            {
+                "state": [
+                    None,
+                    "q",
+                    0,
+                    -1,
+                    1.5,
+                    True,
+                    (),
+                    ("1q",),
+                    (1,),
+                    {"q"},
+                    {"q": 1},
+                    math.nan,
+                    [["q"]],
+                    Odd(),
+                ],
+                "parameters": [
+                    [1],
+                    "a",
+                    3,
+                    {"e": "1"},
+                    {"e": math.nan},
+                    {"e": True},
+                    {"1": 1.0},
+                    {3: 1.0},
+                    {"e": 1j},
+                ],
+                "modes": [*LIST, [], [1], ["a"]],
+                "transitions": [*LIST, [1], ["a"]],
+                "period": [*LIMIT[1:], math.inf],
+                "name": TEXT,
+                "units": UNITS,
+            },
+        ),
+        (
+            call(Mode, "a", lambda t, x, p: (1.0,)),
+            {
+                "name": [*TEXT, ""],
+                "field": [None, *FUNCTION],
+                "jacobian": FUNCTION,
+                "part_of": [*TEXT[1:], ""],
+            },
+        ),
+        (
+            call(Guard, lambda t, x, p: x.q),
+            {
+                "function": [None, *FUNCTION],
+                "direction": [None, "up", 2, 0.5, True, False, math.nan, [1], 1j],
+                "at_start": FLAG,
+                "gradient": FUNCTION,
+                "when": FUNCTION,
+            },
+        ),
+        (call(Reset, lambda t, x, p: x), {"function": [None, *FUNCTION], "jacobian": FUNCTION}),
+        (
+            call(Transition, "a", "a", Guard(lambda t, x, p: x.q)),
+            {
+                "source": [*TEXT, ""],
+                "target": [*TEXT[1:], ""],
+                "guard": [*GUARD, 3],
+                "reset": ["a", 3, lambda t, x, p: x],
+                "accumulates_to": [*TEXT[1:], ""],
+                "name": [*TEXT, ""],
+                "part_of": [*TEXT[1:], ""],
+            },
+        ),
+    ]

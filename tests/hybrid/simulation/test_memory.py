@@ -1,0 +1,121 @@
+"""The memory of a run is as large as its description says: kernels write to it unchecked."""
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.kernels.types import codes
+from hybrid.kernels.types.layout import COUNTERS, NUMBERS
+from hybrid.simulation import memory
+from hybrid.simulation.plan import kernel_method
+
+# States, tangent vectors, columns of series and rows of programs.
+N, K, COLUMNS, ROWS = 3, 2, 11, 7
+LENGTH = N * (1 + K)
+
+
+@pytest.fixture
+def shapes(monkeypatch):
+    """The layouts as plain shapes."""
+    monkeypatch.setattr(memory, "Layout", lambda kind, shapes: shapes)
+    return lambda layout, *sizes: layout.__wrapped__(*sizes)
+
+
+@pytest.mark.parametrize(
+    ("solver", "stages", "degree", "coupled", "order", "nodes"),
+    [
+        # Stages with those of the interpolant, its degree, coupled stages, order of the series, nodes.
+        (hybrid.DOP853(), 16, 7, 0, 0, 8),
+        (hybrid.Tsit5(), 7, 4, 0, 0, 6),
+        (hybrid.Taylor(rtol=1e-9), 16, 7, 0, None, 8),
+        (hybrid.RadauIIA(), 4, 3, 3, 0, 6),
+    ],
+)
+def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes):
+    method = kernel_method(solver)
+    order = method.order if order is None else order
+    # Whole registers of eight columns; three more rows than the order for the error and two of scratch.
+    series = (codes.HIGHEST_ORDER + 3, 16) if order else (0, 0)
+    width = (max(degree, codes.HIGHEST_ORDER) if order else degree) + 4
+    assert shapes(memory.work_layout, method, N, K, COLUMNS, ROWS) == {
+        "stages": (stages, LENGTH + 1),
+        "speeds": (stages,),
+        **dict.fromkeys(("trial", "new", "error", "second_error"), (LENGTH,)),
+        **dict.fromkeys(("jacobian", "reset_jacobian"), (N, N + 1)),
+        "gradient": (N + 1,),
+        "scalar": (1,),
+        **dict.fromkeys(("field", "field_after", "state", "settled"), (N,)),
+        **dict.fromkeys(("saltation", "sizes"), (N, N)),
+        "rounding": (4, N),
+        "path": (degree + 1, N),
+        "polynomial": (width,),
+        "stack": (64, width),
+        "intervals": (64, 2),
+        # The matrix of the stages, that of the filter, the right-hand side, and the last step with four more.
+        "systems": (N + coupled * N + coupled + 4, coupled * N),
+        "pivots": ((coupled + 1) * N,),
+        "series": series,
+        "weights": (1, 16),
+        "registers": (ROWS, 6),
+        "samples": (nodes + 1, 2 * ROWS),
+    }
+
+
+def test_a_record(shapes):
+    assert shapes(memory.record_layout, N, 7, 11, 13) == {
+        "used": (4,),
+        **dict.fromkeys(("step_time", "step_place"), (11, 3)),
+        "step_coefficients": (11, 8, N + 1),
+        "jump_time": (13, 2),
+        "jump_place": (13, 4),
+        "jump_states": (13, 2, N),
+        "jump_saltation": (13, N, N),
+        **dict.fromkeys(("grazing_time", "grazing_place"), (13, 3)),
+        "grazing_state": (13, N),
+    }
+
+
+def test_a_run(shapes):
+    assert shapes(memory.run_layout, N, K, 4, 5) == {
+        "counters": (len(COUNTERS),),
+        "numbers": (len(NUMBERS),),
+        "y": (LENGTH,),
+        **dict.fromkeys(("side", "on_guard", "due"), (5,)),
+        "recent": (64,),
+        "rehearsal": (4, 5),
+        "visits": (64, N + 2),
+        **dict.fromkeys(("first_step", "stay"), (4,)),
+        "scale": (N,),
+        **dict.fromkeys(("growth", "growth_before"), (K,)),
+        "trail": (3, N + 1),
+        "before": (N * K,),
+        "instant": (N * (1 + N),),
+    }
+
+
+def test_a_fresh_run_is_in_no_mode_and_has_not_jumped():
+    system = hybrid.compile_system(hybrid.HybridSystem(
+        state=("x", "y"), modes=[hybrid.Mode("m", lambda t, x, p: (0.0, 0.0))], period=2.0
+    ))  # fmt: skip
+    tangent = np.array([[1.0, 2.0], [3.0, 4.0]])
+    layout = memory.run_layout(2, 2, 1, 0)
+    run, phase = memory.fresh_run(layout, system.model(), np.array([5.0, -6.0]), tangent, 7.0)
+    assert (run.cycle, run.phase, phase) == (3, 1.0, 1.0)
+    # State, then one tangent vector after the other.
+    assert run.y.tolist() == [5.0, -6.0, 1.0, 3.0, 2.0, 4.0]
+    assert run.scale.tolist() == [5.0, 6.0]
+    assert (run.stage, run.last_fired, run.pending, run.previous_mode) == (
+        codes.ENTERING,
+        codes.NO_TRANSITION,
+        codes.NO_TRANSITION,
+        codes.NO_MODE,
+    )
+    assert np.isnan(run.last_jump_phase)
+    assert (run.steps, run.jumps) == (0, 0)
+
+
+def test_records_keep_nothing_at_first_and_implicit_methods_have_no_last_step():
+    assert memory.empty_record(2, 7, 5, 3).used.tolist() == [0, 0, 0, 0]
+    for solver, last in ((hybrid.RadauIIA(), -1.0), (hybrid.DOP853(), None)):
+        work = memory.workspace(kernel_method(solver), 2, 0, 8)
+        assert work.systems[-1].tolist() == ([] if last is None else [last] * 6)

@@ -1,0 +1,136 @@
+"""What counts as the same run: events, final mode, final state and status."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis.errors import UnsatisfiedAssumption
+
+from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid.status import StatusCode
+from hybrid.testing import PropertyError
+from hybrid.testing.case import Case
+from hybrid.testing.invariance import (
+    check_cut,
+    check_elastic,
+    check_names,
+    check_order,
+    check_samples,
+    check_scale,
+    check_split,
+    compare,
+    turned,
+)
+from models import bouncing_ball, stick_slip, vibroimpact
+
+
+def arc_of(fired, x, *, ok=True):
+    """An arc that changes its mode at its end."""
+    code = StatusCode.SUCCESS if ok else StatusCode.MAX_STEPS
+    return SimpleNamespace(
+        jumps=[SimpleNamespace(transition=name) for name in fired],
+        mode=np.array(["flight", "rest"]),
+        x=np.array([[7.0, 7.0], x]),
+        status=SimpleNamespace(ok=ok, code=code),
+    )
+
+
+def fail(property_name, *lines, hint):
+    raise PropertyError("; ".join([property_name, *lines, hint]))
+
+
+def compared(arc, fired, mode):
+    run = SimpleNamespace(arc=arc_of(["a", "b", "a"], [1.0, -2.0]), tolerance=np.array([1e-6, 1e-3]))
+    case = SimpleNamespace(run=run, fail=fail, state_told=lambda x: f"x = {list(map(float, x))}")
+    compare(case, "the property", arc, fired, mode, "the hint")
+
+
+def test_runs_that_differ_within_the_tolerance_and_in_the_order_of_events_are_the_same():
+    for x in ([1.0, -2.0], [1.0 + 0.9e-6, -2.0 - 0.9e-3], [1.0 - 0.9e-6, -2.0 + 0.9e-3]):
+        compared(arc_of([], x), ["b", "a", "a"], "rest")
+
+
+@pytest.mark.parametrize(
+    ("arc", "fired", "mode"),
+    [
+        (arc_of([], [1.0, -2.0]), ["a", "b"], "rest"),
+        (arc_of([], [1.0, -2.0]), ["a", "b", "b"], "rest"),
+        (arc_of([], [1.0, -2.0]), ["a", "b", "a"], "flight"),
+        (arc_of([], [1.0, -2.0], ok=False), ["a", "b", "a"], "rest"),
+        (arc_of([], [1.0 + 1.1e-6, -2.0]), ["a", "b", "a"], "rest"),
+        (arc_of([], [1.0, -2.0 - 1.1e-3]), ["a", "b", "a"], "rest"),
+        (arc_of([], [np.nan, -2.0]), ["a", "b", "a"], "rest"),
+    ],
+)
+def test_each_difference_is_said(arc, fired, mode):
+    with pytest.raises(PropertyError) as caught:
+        compared(arc, fired, mode)
+    assert str(caught.value).split("; ") == [
+        "the property",
+        "wanted x = [1.0, -2.0] in mode 'rest' after a, b, a",
+        f"got x = {list(map(float, arc.x[-1]))} in mode {mode!r} after {', '.join(fired)}",
+        arc.status.code.name,
+        "the hint",
+    ]
+
+
+def test_time_is_reversed_by_name_or_by_a_function():
+    system = vibroimpact()
+    turn = turned("flip", system, ["v1", "v2"])
+    np.testing.assert_array_equal(turn(np.array([1.0, 2.0, 3.0, 4.0])), [1.0, 2.0, -3.0, -4.0])
+    own = np.negative
+    assert turned("flip", system, own) is own
+
+
+def test_one_transition_has_no_other_order():
+    with pytest.raises(UnsatisfiedAssumption):
+        check_order(Case(bouncing_ball(), dict(bouncing_ball().parameters), "flight", (1.0, 0.0), 0.0, 1.0))
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("fraction", [0.2, 0.7])
+def test_a_flow_is_cut_in_any_units(unit, fraction):
+    """The plane is across the flow; a start is on it if it is so by its share of the sizes of the states."""
+    ball = bouncing_ball()
+    parameters = {"g": 9.81 * unit, "e": 0.8}
+    case = Case(ball, parameters, "flight", (unit, 0.3 * unit), 0.0, 1.2, fraction)
+    check_cut(case)
+
+
+class TestElastic:
+    """A ball on an elastic floor: above it falls, below it a spring pushes it back."""
+
+    @staticmethod
+    def floor(loss):
+        return HybridSystem(
+            state=("q", "v"),
+            modes=[
+                Mode("above", lambda t, x, p: (x.v, -1.0)),
+                Mode("below", lambda t, x, p: (x.v, -1.0 - 40.0 * x.q - loss * x.v)),
+            ],
+            transitions=[
+                Transition("above", "below", Guard(lambda t, x, p: x.q, -1)),
+                Transition("below", "above", Guard(lambda t, x, p: x.q, +1)),
+            ],
+        )
+
+    # The ball reaches the floor at 1, and stays below it for less than 0.5.
+    @pytest.mark.parametrize("t1", [0.8, 1.2, 2.5, 3.7])
+    def test_it_runs_back_from_either_mode(self, t1):
+        check_elastic(Case(self.floor(0.0), {}, "above", (0.5, 0.0), 0.0, t1), ["v"])
+
+    @pytest.mark.parametrize("t1", [1.2, 2.5])
+    def test_it_does_not_with_damping_or_with_the_wrong_component_turned(self, t1):
+        with pytest.raises(PropertyError, match="runs backwards"):
+            check_elastic(Case(self.floor(0.1), {}, "above", (0.5, 0.0), 0.0, t1), ["v"])
+        with pytest.raises((PropertyError, UnsatisfiedAssumption)):
+            check_elastic(Case(self.floor(0.0), {}, "above", (0.5, 0.0), 0.0, t1), ["q"])
+
+
+@pytest.mark.parametrize(
+    "check", [check_cut, check_names, check_order, check_scale, check_split, check_samples]
+)
+def test_systems_whose_runs_may_end_can_be_checked(check):
+    """A transition without a target has no reset that could be changed."""
+    block = stick_slip()
+    check(Case(block, dict(block.parameters), "sliding", (0.5, 0.2), 0.0, 6.0))
