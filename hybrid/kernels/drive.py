@@ -42,7 +42,7 @@ from hybrid.kernels.types.layout import Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
 
 # More jumps than this at one instant, in total or per transition, count as endless.
-MOST_JUMPS_AT_ONCE = 300
+MOST_JUMPS_AT_ONCE = 1000
 MOST_JUMPS_EACH = 100
 # A landing may be this many times as far from its guard as the rounding of the state.
 MOST_ROUNDING = 64.0

@@ -34,7 +34,7 @@ PAIRS = {
     sympy.cosh: (sympy.sinh, sympy.cosh, ""),
 }
 # ``y' = (1 -+ y^2) u'``.
-OWN_SQUARE = {sympy.tanh: "-", sympy.tan: ""}
+OWN_SQUARE = {sympy.tanh: -1, sympy.tan: 1}
 
 # Longer inner sums are not expanded, since other expressions may need them too.
 MOST_TERMS = 4
@@ -468,10 +468,10 @@ class Recurrences:
         return self.variables[expression]
 
     def _own_square(self, expression: sympy.Expr) -> str:
-        sign = OWN_SQUARE[expression.func] or "+"
+        sign = OWN_SQUARE[expression.func]
         (u,) = expression.args
         argument, rate = self.coefficient(u), self._slope(u)
-        slope = 1 - expression**2 if sign == "-" else 1 + expression**2
+        slope = 1 + sign * expression**2
         moving, slope_column = self._place(rate, slope)
         name, row = self._kept(expression)
         slope_name, _ = self._kept(slope, slope_column)
@@ -480,8 +480,8 @@ class Recurrences:
         self.higher.append(f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])*shrink")
         self._store(expression)
         self._enter(row, expression, copy, name)
-        self.first.append(f"{slope_name} = 1.0 {sign} {name}*{name}")
-        self.higher.append(f"{slope_name} = {sign}({inner} + 2.0*out[0, {row}]*{name})")
+        self.first.append(f"{slope_name} = 1.0 + {sign}.0*{name}*{name}")
+        self.higher.append(f"{slope_name} = {sign}.0*({inner} + 2.0*out[0, {row}]*{name})")
         self._enter(rate, slope, slope_column, slope_name)
         return name
 

@@ -6,18 +6,28 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.slopes import change_of_rate, spread_of_rate, whole_jacobian
-from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
+from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
+    guard_acceleration,
+    guard_speed,
+    guard_value,
+    rounding_band,
+)
 from hybrid.kernels.jumps.rounds import fired_before
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Rows of Run.trail, written by the previous jump. The last column holds a time or a speed.
+# Rows of Run.trail, written by the previous jump. The last column holds a time or a speed; the first row
+# begins with the speed after the first jump.
 BEFORE = 0
 LIMIT = 1
 IMPULSE = 2
 # No limit is taken before this many jumps, so that the visible jumps are in the arc.
 FEWEST_JUMPS = 16
-# The limit is taken earlier if a flight is no higher than this many times rounding: the rounding error of its
+# The limit is taken earlier if the speed is below this share of that after the first jump: such jumps are not
+# visible, and the rounding errors of tangent vectors grow like the reciprocal of the speed.
+INVISIBLE = 1e-6
+# It is also taken earlier if a flight is no higher than this many times rounding: the rounding error of its
 # duration grows like the reciprocal of its speed and would spoil the limit.
 SHALLOW = 1e6
 # Change of the Jacobian over the remaining time that counts as none: what it adds to a state, as a share.
@@ -152,7 +162,8 @@ def accumulation(model, method, run, transition, since_last, work):
         # A flight whose height v^2 / 2 a is at the level of rounding cannot be followed.
         height = 0.25 * speed * span * (1.0 - ratio)
         drowned = steady and height <= band
-        shallow = height <= SHALLOW * band or run.chattering >= FEWEST_JUMPS
+        seen = run.chattering >= FEWEST_JUMPS or speed <= INVISIBLE * run.trail[BEFORE, 0]
+        shallow = height <= SHALLOW * band or seen
         shift = span - (run.trail[LIMIT, n] - since_last)
         # The change is of second order in the speed, which each jump multiplies by the ratio.
         gain = ratio * ratio / (1.0 - ratio * ratio)
@@ -172,6 +183,7 @@ def accumulation(model, method, run, transition, since_last, work):
         run.chattering += 1
     else:
         run.chattering = 1
+        run.trail[BEFORE, 0] = speed
         run.trail[LIMIT, 0], run.trail[IMPULSE, n] = math.inf, math.inf
     run.trail[LIMIT, n], run.trail[BEFORE, n] = span, speed
     run.chatter_jumps = run.jumps
@@ -298,6 +310,74 @@ def drift_with_mean(model, run, transition, span, work):
 
 
 @njit(**KERNEL)
+def impact(model, run, transition, t, x, after, work):
+    """Restitution of an impact from ``x (n,)`` to ``after (n,)``, and the change of the guard's speed."""
+    model.field(run.mode, t, x, model.parameters, work.field)
+    before = guard_speed(model, transition, t, x, work.field, work.gradient)
+    model.reset(transition, t, x, model.parameters, after)
+    model.field(run.mode, t, after, model.parameters, work.field)
+    later = guard_speed(model, transition, t, after, work.field, work.gradient)
+    return -later / before, later - before
+
+
+@njit(**KERNEL)
+def changed(up, down, noise):
+    """``up - down``, or zero if that may be rounding."""
+    return up - down if abs(up - down) > 64.0 * EPSILON * (abs(up) + abs(down)) + noise else 0.0
+
+
+@njit(**KERNEL)
+def add_change_of_impacts(model, run, transition, t, speed, span, work):
+    """Add the effect of a change of the impulse to ``work.saltation``, which holds the chatter matrix.
+
+    The impulse takes out the guard's ``speed``, and what the pull adds in the time ``span`` to the limit.
+    Acceleration, restitution and impulse of the remaining impacts are those at the limit. Their derivatives
+    along the columns of the matrix are central differences; those of acceleration and restitution go to the
+    first two rows of ``work.rounding``. The speed has its sign.
+    """
+    n, impulse, place, after = model.dimension, run.trail[IMPULSE], work.new, work.second_error
+    bends, ratios, up = work.rounding[0], work.rounding[1], work.rounding[2]
+    for j in range(n):
+        step = math.inf
+        for i in range(n):
+            size = max(abs(work.settled[i]), run.scale[i])
+            if size > 0.0 and work.saltation[i, j] != 0.0:
+                step = min(step, 6e-6 * size / abs(work.saltation[i, j]))
+        bends[j], ratios[j] = 0.0, 0.0
+        for i in range(n):
+            work.sizes[i, j] = 0.0
+        if step == math.inf:
+            continue
+        bend, ratio = 0.0, 0.0
+        for part in range(2):
+            for i in range(n):
+                place[i] = work.settled[i] + (step if part == 0 else -step) * work.saltation[i, j]
+            model.field(run.mode, t, place, model.parameters, work.field)
+            guard_speed(model, transition, t, place, work.field, work.gradient)
+            bent = guard_acceleration(model, run, transition, run.mode, t, place, work)
+            for i in range(n):
+                place[i] -= speed * impulse[i]
+            share, change = impact(model, run, transition, t, place, after, work)
+            for i in range(n):
+                here = (after[i] - place[i]) / change
+                if part == 0:
+                    up[i] = here
+                else:
+                    noise = ROUNDING_OF_STATE * EPSILON * run.scale[i] / abs(change)
+                    work.sizes[i, j] = changed(up[i], here, noise) / (2.0 * step)
+            if part == 0:
+                bend, ratio = bent, share
+            else:
+                bends[j] = changed(bend, bent, 0.0) / (2.0 * step)
+                ratios[j] = changed(ratio, share, 0.0) / (2.0 * step)
+                for i in range(n):
+                    work.sizes[i, j] *= speed + 0.5 * (bend + bent) * span
+    for i in range(n):
+        for j in range(n):
+            work.saltation[i, j] -= work.sizes[i, j]
+
+
+@njit(**KERNEL)
 def add_change_of_duration(model, method, run, target, span, work):
     """Add the effect of a change of the chatter's duration to ``work.saltation``; whether there is one.
 
@@ -305,13 +385,14 @@ def add_change_of_duration(model, method, run, target, span, work):
     the limit mode; where the two agree, up to what the error of the limit makes of them, nothing is added.
     Where they do not, the matrix is made that of the whole chatter, from its beginning to its end.
     The duration ``2 v / (a (1 - r))`` after a jump at speed ``v`` changes with the speed, and with the height
-    through its energy; its derivative, that of the instant of the limit, goes to ``run.instant``. To be
-    called after ``chatter_matrix``, whose slope and gradient it uses.
+    through its energy, and with what changes the acceleration or the restitution; its derivative, that of the
+    instant of the limit, goes to ``run.instant``. To be called after ``chatter_matrix``, whose slope it uses.
     """
     n, transition = model.dimension, run.last_fired
     ratio, speed = run.restitution, run.trail[BEFORE, n]
     limit, side = run.phase + span, -far_side(model, run, transition)
     mean = work.trial
+    add_change_of_impacts(model, run, transition, limit, side * speed, span, work)
     pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
     model.field(target, limit, work.settled, model.parameters, work.field_after)
     model.field_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
@@ -319,7 +400,8 @@ def add_change_of_duration(model, method, run, target, span, work):
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
     for j in range(n):
         run.instant[j] = by_speed * work.error[j] + by_height * work.gradient[j]
-    apart, excess, tolerances = False, work.field_after, work.rounding[0]
+        run.instant[j] += span * (side * work.rounding[0, j] / pull + work.rounding[1, j] / (1.0 - ratio))
+    apart, excess, tolerances = False, work.field_after, work.rounding[2]
     for j in range(n):
         tolerances[j] = method.atol + method.rtol * run.scale[j]
     for i in range(n):

@@ -29,6 +29,7 @@ from hybrid.kernels.jumps.chatter import (
     feedback,
     remember_impulse,
 )
+from hybrid.kernels.jumps.collapse import UNTIL_NEXT_LOOK, limit_at_once
 from hybrid.kernels.jumps.locked import (
     begin_at_start,
     begin_instant,
@@ -389,11 +390,24 @@ def follow_rounds(task, remaining):
 def follow_to_rest(task):
     """``finish_chatter`` for jumps without a steady ratio, once the state has come to rest at one instant."""
     _, model, _, run, _, work = task_of(task)
-    if run.jumps_here < MANY_AT_ONCE or not has_come_to_rest(model, run, work):
+    if run.jumps_here < MANY_AT_ONCE:
         return False
+    turn = jumps_in_turn(run)
     for i in range(model.dimension):
         work.settled[i] = run.y[i]
-    return go_to_limit(task, jumps_in_turn(run), 0.0)
+    return has_come_to_rest(model, run, turn, work.settled, 1.0, work) and go_to_limit(task, turn, 0.0)
+
+
+@njit(**KERNEL)
+def follow_collapse(task):
+    """``finish_chatter`` for jumps at one instant that shrink the speeds by a steady ratio."""
+    _, model, method, run, _, work = task_of(task)
+    if run.jumps_here < MANY_AT_ONCE or (run.jumps_here - MANY_AT_ONCE) % UNTIL_NEXT_LOOK != 0:
+        return False
+    turn, rounds = limit_at_once(model, run, work)
+    if turn == 0 or not has_come_to_rest(model, run, turn, work.settled, rounds, work):
+        return False
+    return way_is_free(model, method, run, turn, 0.0, work) and go_to_limit(task, turn, 0.0)
 
 
 @njit(**KERNEL)
@@ -437,7 +451,7 @@ def finish_chatter(task, transition, remaining):
     """
     if follow_impacts(task, transition, remaining) or follow_rounds(task, remaining):
         return True
-    return follow_to_rest(task)
+    return follow_to_rest(task) or follow_collapse(task)
 
 
 @njit(**KERNEL)

@@ -67,31 +67,32 @@ def way_is_free(model, method, run, turn, span, work):
 
 
 @njit(**KERNEL)
-def has_come_to_rest(model, run, work):
-    """Whether the state rests on the guards of the last jumps, and none of their resets moves it.
+def has_come_to_rest(model, run, turn, x, rounds, work):
+    """Whether a state ``x (n,)`` rests on the guards of the last ``turn`` jumps, and no reset moves it.
 
     So ends a chatter whose flights shorten without a steady ratio, such as that of two balls on a floor that
-    take turns in varying order: its last jumps happen within the rounding of time.
+    take turns in varying order: its last jumps happen within the rounding of time. Speeds may have the
+    rounding errors of so many ``rounds`` of jumps.
     """
     n, mode, t = model.dimension, run.mode, run.phase
     share, clock, moved = AT_REST * ROUNDING_OF_STATE * EPSILON, size_of_time(model, t), work.trial
-    model.field(mode, t, run.y, model.parameters, work.field)
+    model.field(mode, t, x, model.parameters, work.field)
     for i in range(n):
         moved[i] = share * (run.scale[i] + clock * abs(work.field[i]))
-    for back in range(min(run.jumps, run.recent.shape[0])):
+    for back in range(turn):
         transition = fired_before(run, back)
-        value = guard_value(model, transition, t, run.y, work.scalar)
-        speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-        height = AT_REST * rounding_band(model, run, transition, t, run.y, work)
-        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, run.y, work)
+        value = guard_value(model, transition, t, x, work.scalar)
+        speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+        height = AT_REST * rounding_band(model, run, transition, t, x, work)
+        fastest = AT_REST * speed_rounding(model, run, transition, mode, t, x, work)
         for i in range(n):
             height += abs(work.gradient[i]) * moved[i]
             fastest += abs(work.gradient[i]) * spread_of_rate(model, mode, i, work.jacobian, moved)
-        if not (abs(value) <= height and abs(speed) <= fastest):
+        if not (abs(value) <= height and abs(speed) <= rounds * fastest):
             return False
-        model.reset(transition, t, run.y, model.parameters, work.state)
+        model.reset(transition, t, x, model.parameters, work.state)
         for i in range(n):
-            if not abs(work.state[i] - run.y[i]) <= 2.0 * moved[i]:
+            if not abs(work.state[i] - x[i]) <= 2.0 * rounds * moved[i]:
                 return False
     return True
 

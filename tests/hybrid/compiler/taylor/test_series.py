@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sympy
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Mode, Transition, simulate
 from hybrid.compiler.emit import emit
 from hybrid.compiler.parts import PARTS, SERIES, TANGENT_SERIES
 from hybrid.compiler.taylor import pairs
@@ -120,6 +120,20 @@ def test_functions_of_time(name):
     with mp.workdps(40):
         expected = [0.0, *(float(c / (k + 1)) for k, c in enumerate(mp.taylor(exact, mp.mpf(A), ORDER - 1)))]
     np.testing.assert_allclose(out[:, 0], expected, rtol=1e-12, atol=1e-15)
+
+
+def test_all_functions_become_machine_code():
+    """A run has machine code of every series, also with tangent vectors: ``y' = F(x)`` and ``x' = 1``."""
+    names = [name for name in FUNCTIONS if name not in FRACTIONAL]
+    functions = [FUNCTIONS[name][0] for name in names]
+    system = system_of(lambda t, x, p: (1.0, *(each(x[0]) for each in functions)), state=1 + len(names))
+    assert RUNGE_KUTTA not in kinds(system)
+    arc = simulate(system, [A, *[0.0] * len(names)], (0.0, 0.125), tangent=True)
+    with mp.workdps(20):
+        integrals = [float(mp.quad(FUNCTIONS[name][1], [A, A + 0.125])) for name in names]
+        changes = [float(FUNCTIONS[name][1](A + 0.125) - FUNCTIONS[name][1](mp.mpf(A))) for name in names]
+    np.testing.assert_allclose(arc.x[-1, 1:], integrals, rtol=1e-10)
+    np.testing.assert_allclose(arc.fundamental[1:, 0], changes, rtol=1e-9)
 
 
 def test_guards_that_are_polynomials_have_series_of_their_own():

@@ -182,3 +182,24 @@ def test_a_root_to_rounding():
     """The cosine as a series of the length that exact modes use."""
     powers = np.array([0.0 if k % 2 else (-1.0) ** (k // 2) / math.factorial(k) for k in range(ORDER + 1)])
     assert _root(powers, 0, 1.0, 2.0) == pytest.approx(math.pi / 2, abs=2.3e-16)
+
+
+@njit
+def _root_with_ends(powers, low, high, left, right):
+    return _root_between(powers.reshape((-1, 1)), 0, len(powers) - 1, 0, 1.0, low, high, left, right)
+
+
+def test_a_root_that_rounding_puts_on_the_other_side_of_an_end():
+    """The signs at the ends come from sums with other rounding errors than those of the series itself.
+
+    The root is then just outside of the bracket as the series has it: it is at the end, to rounding.
+    """
+    orders = np.arange(ORDER + 1)
+    sizes = np.array([(-1.0) ** (k // 2) * 1.3**k / math.factorial(k) for k in orders])
+    cosine, sine = np.where(orders % 2 == 0, sizes, 0.0), np.where(orders % 2 == 1, sizes, 0.0)
+    for beyond in (-1e-16, 0.0, 1e-17, 1e-16, 1e-15, 1e-12):
+        for end, ends in ((1.0, (-1.0, 1e-17)), (0.5, (-1e-17, 1.0))):
+            root = end + beyond if end == 1.0 else end - beyond
+            powers = math.cos(1.3 * root) * sine - math.sin(1.3 * root) * cosine
+            found = _root_with_ends(powers, 0.5, 1.0, *ends)
+            assert found == pytest.approx(end, abs=max(4e-16, abs(beyond)))

@@ -1,0 +1,207 @@
+"""Limits of jumps at one instant: light balls that heavy ones press to the floor, or to each other."""
+
+import math
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    StatusCode,
+    Taylor,
+    Transition,
+    simulate,
+)
+
+SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
+METHODS = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+
+
+def collide(i, count):
+    """The collision of the balls ``i`` and ``i + 1``, with the restitution ``e`` of parameter ``i + 1``."""
+
+    def reset(t, x, p):
+        m, M, e = p[i], p[i + 1], p[count + i + 1]
+        v, w = x[count + i], x[count + i + 1]
+        common, apart = (m * v + M * w) / (m + M), e * (v - w)
+        after = list(x)
+        after[i + 1] = x[i]
+        after[count + i] = common - M / (m + M) * apart
+        after[count + i + 1] = common + m / (m + M) * apart
+        return tuple(after)
+
+    return reset
+
+
+def land(count):
+    def reset(t, x, p):
+        return (0.0, *x[1:count], -p[count] * x[count], *x[count + 1 :])
+
+    return reset
+
+
+@cache
+def column(count, at_rest=False):
+    """Balls above each other on a floor: heights, then speeds; ``p`` has masses, then restitutions."""
+
+    def between(i):
+        return lambda t, x, p: x[i + 1] - x[i]
+
+    names = [f"{letter}{i}" for letter in "me" for i in range(count)]
+    return HybridSystem(
+        state=2 * count,
+        parameters=dict.fromkeys(names, 1.0),
+        modes=[
+            Mode("fly", lambda t, x, p: (*x[count:], *[-1.0] * count)),
+            *([Mode("rest", lambda t, x, p: (0.0,) * (2 * count))] if at_rest else []),
+        ],
+        transitions=[
+            Transition(
+                "fly",
+                "fly",
+                Guard(lambda t, x, p: x[0], -1),
+                Reset(land(count)),
+                name="floor",
+                accumulates_to="rest" if at_rest else None,
+            ),
+            *(
+                Transition("fly", "fly", Guard(between(i), -1), Reset(collide(i, count)), name=f"hit {i}")
+                for i in range(count - 1)
+            ),
+        ],
+    )
+
+
+def run(m, e, q, v, t1, solver=None, at_rest=False):
+    count = len(m)
+    parameters = {f"m{i}": m[i] for i in range(count)} | {f"e{i}": e[i] for i in range(count)}
+    mode = "fly" if at_rest else None
+    return simulate(
+        column(count, at_rest), (*q, *v), (0.0, t1), parameters=parameters, solver=solver, mode=mode
+    )
+
+
+def time_of_collapse(m, e, q, v):
+    """When jumps follow each other without time between them, flight by flight in closed form."""
+    q, v, count = list(q), list(v), len(m)
+    p, t, spans = (*m, *e), 0.0, [1.0] * 30
+    while max(spans[-30:]) > 1e-17:
+        spans_to = [v[0] + math.sqrt(v[0] * v[0] + 2.0 * q[0])]
+        for (low, high), (v_low, v_high) in zip(pairwise(q), pairwise(v), strict=True):
+            spans_to.append((high - low) / (v_low - v_high) if v_low > v_high else math.inf)
+        span = min(spans_to)
+        next_one = spans_to.index(span)
+        t += span
+        spans.append(span)
+        q = [a + span * (b - 0.5 * span) for a, b in zip(q, v, strict=True)]
+        v = [b - span for b in v]
+        reset = land(count) if next_one == 0 else collide(next_one - 1, count)
+        after = reset(t, (*q, *v), p)
+        q, v = list(after[:count]), list(after[count:])
+    return t
+
+
+def pressed(count):
+    """A light ball below a heavy one."""
+    rng = np.random.default_rng(7)
+    for _ in range(count):
+        ratio, e = 10.0 ** rng.uniform(1.5, 6.0), rng.uniform(0.2, 0.9, 2)
+        e[rng.integers(2)] = rng.choice([0.0, 1.0, 0.7], p=[0.1, 0.4, 0.5])
+        q = rng.uniform(0.1, 1.0, 2).cumsum()
+        yield (
+            float(ratio),
+            tuple(map(float, e)),
+            tuple(map(float, q)),
+            tuple(map(float, rng.uniform(-1, 1, 2))),
+        )
+
+
+@METHODS
+def test_pressed_to_the_floor(solver):
+    """All speed is lost in no time, however many rounds the heavy ball takes to lose it."""
+    for ratio, e, q, v in pressed(20):
+        arc = run((1.0, ratio), e, q, v, 20.0, solver)
+        assert arc.status.code == StatusCode.ACCUMULATION, (ratio, e, q, v)
+        assert arc.jumps[-1].kind == "limit"
+        assert arc.t[-1] == pytest.approx(time_of_collapse((1.0, ratio), e, q, v), rel=1e-9)
+        np.testing.assert_allclose(arc.x[-1], 0.0, atol=1e-12)
+
+
+def test_the_run_goes_on_in_the_mode_of_the_limit():
+    arc = run((1e-5, 1.0), (0.5, 0.8), (0.1, 0.2), (0.0, -1.0), 5.0, at_rest=True)
+    assert arc.status.ok
+    assert arc.mode[-1] == "rest"
+    np.testing.assert_allclose(arc.x[-1], 0.0, atol=1e-12)
+
+
+@METHODS
+@pytest.mark.parametrize("light", [1e-2, 1e-4, 1e-6])
+def test_pressed_between_two_in_flight(light, solver):
+    """The three balls go on with their momentum."""
+    m, e = (1.0, light, 2.0), (0.5, 0.4, 0.7)
+    q, v = (5.0, 5.2, 5.5), (1.0, 0.3, -1.5)
+    arc = run(m, e, q, v, 1.0, solver)
+    assert arc.status.code == StatusCode.ACCUMULATION
+    t = time_of_three(m, e, q, v)
+    assert arc.t[-1] == pytest.approx(t, rel=1e-9)
+    common = np.dot(m, v) / sum(m) - t
+    # What a million rounds make of the rounding of each.
+    np.testing.assert_allclose(arc.x[-1, 3:], common, atol=1e-13 + 1e-14 / light)
+    np.testing.assert_allclose(arc.x[-1, :3], arc.x[-1, 0], atol=1e-14)
+
+
+def time_of_three(m, e, q, v):
+    """When the gaps between three balls in flight are gone: seen from the falling frame, nothing falls."""
+    gaps, speeds, t, p = [q[1] - q[0], q[2] - q[1]], list(v), 0.0, (*m, *e)
+    while max(gaps) > 1e-17:
+        closing = [speeds[0] - speeds[1], speeds[1] - speeds[2]]
+        spans = [g / c if c > 0.0 else math.inf for g, c in zip(gaps, closing, strict=True)]
+        span = min(spans)
+        t += span
+        gaps = [max(g - span * c, 0.0) for g, c in zip(gaps, closing, strict=True)]
+        speeds = list(collide(spans.index(span), 3)(t, (0.0, 0.0, 0.0, *speeds), p)[3:])
+    return t
+
+
+@pytest.mark.parametrize("ratio", [10.0, 100.0, 1e3, 1e4, 3e4])
+@pytest.mark.parametrize("loss", [0.0, 1e-6, 1e-3])
+def test_speeds_that_turn_have_no_limit(ratio, loss):
+    """A light ball on the floor that a heavy one hits elastically throws it up again, after many hits."""
+    v, w, e = 0.0, -1.0, 1.0 - loss
+    while v < 0.0 or v > w:
+        reset = land(2) if v < 0.0 else collide(0, 2)
+        v, w = reset(0.0, (0.0, 0.0, v, w), (1.0, ratio, e, e))[2:]
+    arc = run((1.0, ratio), (e, e), (0.0, 0.0), (0.0, -1.0), 0.01)
+    assert arc.status.ok
+    np.testing.assert_allclose(arc.jumps[-1].x_plus[2:], [v, w], rtol=1e-11)
+
+
+def test_a_restitution_that_depends_on_the_speed_is_not_followed():
+    """Rounds that are not affine are said to be endless."""
+    system = column(2)
+    hit = Transition(
+        "fly",
+        "fly",
+        Guard(lambda t, x, p: x[1] - x[0], -1),
+        Reset(
+            lambda t, x, p: (
+                x[0],
+                x[0],
+                x[2] - (1.0 + 0.5 / (1.0 + (x[2] - x[3]) ** 2)) * (x[2] - x[3]) / (1.0 + 1e-5),
+                x[3] + 1e-5 * (1.0 + 0.5 / (1.0 + (x[2] - x[3]) ** 2)) * (x[2] - x[3]) / (1.0 + 1e-5),
+            )
+        ),
+    )
+    bent = HybridSystem(
+        state=4, parameters=system.parameters, modes=system.modes, transitions=[system.transitions[0], hit]
+    )
+    parameters = {"m0": 1.0, "m1": 1e5, "e0": 0.5}
+    arc = simulate(bent, (0.1, 1.0, 0.0, -1.0), (0.0, 5.0), parameters=parameters)
+    assert arc.status.code == StatusCode.STUCK
