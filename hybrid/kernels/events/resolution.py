@@ -103,17 +103,29 @@ def leads_to_guard(model, run, transition, mode, t, x, side, work):
 
 
 @njit(**KERNEL)
+def speed_beside(model, transition, mode, t, x, value, distance, work):
+    """Speed of a guard beside ``x``, where its value is about ``distance``; zero if the guard jumps there.
+
+    ``value`` is that of the guard at ``x``.
+    """
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    speed = speed_displaced(model, transition, mode, t, x, distance - value, work)
+    there = guard_value(model, transition, t, work.state, work.scalar)
+    return speed if 0.5 < there / distance < 2.0 else 0.0
+
+
+@njit(**KERNEL)
 def draws_state(model, run, transition, mode, t, x, value, work):
     """Whether the field leads to a guard from both sides, and reaches it in finite time.
 
     A smooth field does not: near a guard that attracts the state, its speed is proportional to the distance.
-    ``value`` is that of the guard, and ``work.gradient`` is current.
+    ``value`` is that of the guard.
     """
     distance = max(abs(value), rounding_band(model, run, transition, t, x, work))
     side = -1.0 if model.direction[transition] > 0 else 1.0
     for _ in range(2):
-        near = speed_displaced(model, transition, mode, t, x, side * distance - value, work) * side
-        far = speed_displaced(model, transition, mode, t, x, side * FARTHER * distance - value, work) * side
+        near = side * speed_beside(model, transition, mode, t, x, value, side * distance, work)
+        far = side * speed_beside(model, transition, mode, t, x, value, side * FARTHER * distance, work)
         if not SHARE * FARTHER * near < far < 0.0:
             return False
         side = -side

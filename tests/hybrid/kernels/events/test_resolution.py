@@ -178,3 +178,65 @@ def test_a_smooth_field_that_attracts_to_a_guard_does_not_hold_the_state(solver)
     arc = simulate(system, (1.0, 0.0), (0.0, 3.0), mode="u", solver=solver)
     assert arc.status.ok
     assert arc.x[-1, 1] == pytest.approx(3.0)
+
+
+PASSED = {
+    # The guard, and whether it jumps from one sign to the other where the signal passes the level.
+    "slopes that meet in a jump": lambda s, p: np.where(s > 0, p.a * s + p.b, s),
+    "steps": lambda s, p: np.where(s > 0, p.b, -p.a),
+    "a sign": lambda s, p: p.a * np.sign(s),
+    "a saw": lambda s, p: s + p.b * np.heaviside(s, 1.0),
+    "a cube root": lambda s, p: np.cbrt(s),
+    "a fifth power": lambda s, p: p.a * s**5,
+    "a steep slope": lambda s, p: 1e4 * p.a * s,
+    "a pole": lambda s, p: np.where(s > 0, 1 / (s + 1e-3), s),
+}
+
+
+@each_solver
+@pytest.mark.parametrize("name", PASSED)
+def test_a_state_that_passes_its_guard_does_not_rest_there(name, solver):
+    """Whatever the guard does beside its zero, the signal passes the level twice per period and goes on."""
+    guard, level = PASSED[name], -0.37
+    first = np.arccos(level)
+    passages = np.array([[2 * np.pi * k + first, 2 * np.pi * (k + 1) - first] for k in range(3)])
+    for direction, times in ((-1, passages[:, 0]), (0, passages.ravel()), (1, passages[:, 1])):
+        system = HybridSystem(
+            state=("q", "v"),
+            modes=[Mode("m", lambda t, x, p: (x.v, -x.q))],
+            transitions=[
+                Transition("m", "m", Guard(lambda t, x, p: guard(x.q - level, p), direction), name="passes")
+            ],
+            parameters={"a": 1.0, "b": 1.0},
+        )
+        for a, b in ((1.0, 1.0), (0.01, 3.0), (30.0, 1e-6)):
+            arc = simulate(system, (1.0, 0.0), (0.0, 6 * np.pi), parameters={"a": a, "b": b}, solver=solver)
+            assert arc.status.code == StatusCode.SUCCESS
+            assert arc.jumps.t == pytest.approx(times, abs=1e-5)
+
+
+@each_solver
+def test_a_guard_that_jumps_between_slopes_is_passed(solver):
+    """The guard is ``arctan`` of a mixed signal, moved apart above its level."""
+
+    def guard(t, x, p):
+        s = np.arctan(p.c * (x.q + 0.3 * x.v)) - p.level
+        return np.where(s > 0, p.a * s + p.b, s)
+
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -p.w * p.w * x.q))],
+        transitions=[Transition("m", "m", Guard(guard), name="passes")],
+        parameters={"a": 1.0, "b": 1.0, "c": 1.0, "level": 0.0, "w": 1.0},
+    )
+    generator = np.random.default_rng(0)
+    times = np.linspace(0.0, 10.0, 20001)
+    for _ in range(20):
+        a, b, c, level, w = generator.uniform((0.5, 0.1, 0.3, -0.9, 0.5), (5.0, 1.0, 3.0, 0.9, 3.0))
+        q = 0.63 * np.cos(w * times) - 0.91 / w * np.sin(w * times)
+        v = -0.63 * w * np.sin(w * times) - 0.91 * np.cos(w * times)
+        beyond = np.arctan(c * (q + 0.3 * v)) > level
+        values = {"a": a, "b": b, "c": c, "level": level, "w": w}
+        arc = simulate(system, (0.63, -0.91), (0.0, 10.0), parameters=values, solver=solver)
+        assert arc.status.code == StatusCode.SUCCESS
+        assert arc.jumps.t == pytest.approx(times[1:][beyond[1:] != beyond[:-1]], abs=5e-4)
