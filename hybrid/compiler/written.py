@@ -35,23 +35,19 @@ def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbo
     """
     if field.expressions is None or field.jacobian is None:
         return field
-    roots = _roots_inside(field.expressions, known_positive(boundaries), symbols)
+    known = known_positive(boundaries)
+    roots = _roots_inside(field.expressions, known, symbols)
     if not roots:
         return field
+    roots |= _roots_inside([entry for row in field.jacobian for entry in row], known, symbols)
     expressions = [replaced(entry, roots) for entry in field.expressions]
-    entries = [entry for row in field.jacobian for entry in row]
-    roots |= _roots_inside(entries, known_positive(boundaries), symbols)
-    n = len(symbols.x)
     jacobian = [[replaced(entry, roots) for entry in row] for row in field.jacobian]
-    cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
-    derivative = assignments(cells, [entry for row in jacobian for entry in row])
-    return Written(
-        assignments([f"out[{i}]" for i in range(n)], expressions),
-        field.derivative if field.given else derivative,
-        expressions,
-        jacobian,
-        field.given,
-    )
+    n, derivative = len(symbols.x), field.derivative
+    if not field.given:
+        cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
+        derivative = assignments(cells, [entry for row in jacobian for entry in row])
+    value = assignments([f"out[{i}]" for i in range(n)], expressions)
+    return Written(value, derivative, expressions, jacobian, field.given)
 
 
 def _roots_inside(
