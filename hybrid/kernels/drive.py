@@ -64,6 +64,7 @@ def arrived(model, run, work):
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         before = run.side[transition]
+        run.rehearsal[3, transition] = 0
         if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
             continue
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):

@@ -35,6 +35,18 @@ def keep_side(run, transition):
     run.rehearsal[1, transition] = run.on_guard[transition]
 
 
+@njit(**INLINE)
+def keep_change(run, transition, side):
+    """Note a guard's ``side`` at the end of a step on which it has no crossing that fires.
+
+    An event of another guard may end the step before. Where rounding hides the guard there, its side is that
+    from the start of the step.
+    """
+    run.side[transition] = side
+    if side != run.rehearsal[0, transition]:
+        run.rehearsal[3, transition] = run.rehearsal[0, transition]
+
+
 @njit(**KERNEL)
 def restore_sides(model, run):
     """Return to what was known of the guards at the start of the step."""

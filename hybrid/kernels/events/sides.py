@@ -203,13 +203,19 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             and order == BY_STEP
             and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
         )
-        if own and order == BY_STEP and direction != 0 and not flat:
-            # Its own reset has stopped the state on the guard, as a plastic impact does.
-            now = -direction
+        jumps = order == JUMPING or (order == BY_STEP and may_jump(model, run, transition, t, x, work))
+        if own and direction != 0 and not flat:
+            if order == BY_STEP:
+                # Its own reset has stopped the state on the guard, as a plastic impact does.
+                now = -direction
+            if jumps:
+                # The flow may go on across the jump of the guard that has just fired.
+                first, now = signs_beside_jump(model, run, transition, t, x, now, work)
         if came == STARTED:
             crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
-            if order == JUMPING:
+            if jumps:
+                order = JUMPING
                 first, now = signs_beside_jump(model, run, transition, t, x, now, work)
                 # The guard may have jumped and fired already, within the rounding of this place.
                 before = first if before == 0 else before

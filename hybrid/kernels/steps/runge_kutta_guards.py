@@ -23,6 +23,7 @@ from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
+    keep_change,
     keep_side,
     keeps_sign,
     underflows,
@@ -187,7 +188,7 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
         if on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work):
             blurred = transition
         if theta == NO_ROOT:
-            run.side[transition] = side
+            keep_change(run, transition, side)
             continue
         run.rehearsal[3, transition] = -side
         if theta < earliest:

@@ -26,6 +26,7 @@ from hybrid.kernels.events.path import time_at, value_at
 from hybrid.kernels.events.resolution import (
     MARGIN,
     UNDERFLOW,
+    keep_change,
     keep_side,
     keeps_sign,
     underflows,
@@ -417,7 +418,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             if not is_resolved_by_series(model, run, transition, -1, order, t, h, clock, on_guard, work):
                 blurred = transition
             if theta == NO_ROOT:
-                run.side[transition] = side
+                keep_change(run, transition, side)
                 continue
             run.rehearsal[3, transition] = -side
             if theta < earliest:
@@ -483,7 +484,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
             blurred = transition
         if theta == NO_ROOT:
-            run.side[transition] = side
+            keep_change(run, transition, side)
             continue
         run.rehearsal[3, transition] = -side
         if theta < earliest:
