@@ -26,6 +26,8 @@ from hybrid.symbolic.expressions import (
 from hybrid.symbolic.nodes import interned, once
 
 Partials = dict[sympy.Symbol, sympy.Expr]
+# A derivative as a sum: each argument, and the factor of its derivative.
+Terms = list[tuple[sympy.Expr, sympy.Expr]]
 # Derivatives of functions, by the function and its argument. SymPy's own evaluate the function once more.
 SLOPES: dict[type[sympy.Basic], Callable[[sympy.Expr, sympy.Expr], sympy.Expr]] = {
     sympy.sin: lambda f, a: sympy.cos(a, evaluate=False),
@@ -86,7 +88,12 @@ def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distribut
     args = expression.args
     inner = [_partials(argument, wanted, distributed) for argument in args]
     terms: dict[sympy.Symbol, list[sympy.Expr]] = {}
-    if isinstance(expression, Select):
+    decays = _decays(expression)
+    if decays:
+        for argument, factor in decays:
+            for v, part in _partials(argument, wanted, distributed).items():
+                terms.setdefault(v, []).append(product(factor, part))
+    elif isinstance(expression, Select):
         condition, (_, one, other) = args[0], inner
         for v in one | other:
             terms[v] = [Select(condition, one.get(v, ZERO), other.get(v, ZERO))]
@@ -125,8 +132,8 @@ def _along(
     if known is not None:
         return known
     args = expression.args
-    terms = []
-    for place, argument in enumerate(args):
+    terms = [product(factor, _along(argument, seeds, found)) for argument, factor in _decays(expression)]
+    for place, argument in enumerate(args if not terms else ()):
         inner = _along(argument, seeds, found)
         if inner == 0:
             continue
@@ -138,6 +145,37 @@ def _along(
             terms.append(product(_outer(expression, place), inner))
     found[expression] = sympy.Add(*terms) if len(terms) != 1 else terms[0]
     return found[expression]
+
+
+@once
+def _decays(expression: sympy.Expr) -> Terms:
+    """The derivative of a negative power of exponentials in terms of their arguments; empty for the others.
+
+    Where the exponentials overflow, the power is zero, and so is its derivative. The chain rule would divide
+    one infinity by another there. Of ``1/cosh(a)``, the factor of ``a'`` is ``-tanh(a)/cosh(a)``; of
+    ``1/(1 + exp(a))`` it is ``-1/(1 + exp(a))/(1 + exp(-a))``.
+    """
+    if not (expression.is_Pow and expression.exp.is_Number and expression.exp.is_negative):
+        return []
+    base, factor = expression.base, expression.exp * expression
+    if isinstance(base, sympy.cosh):
+        return [(base.args[0], product(factor, sympy.tanh(base.args[0], evaluate=False)))]
+    terms = [_exponential(term) for term in base.args] if base.is_Add else []
+    if not all(size is not None for size, _ in terms):
+        return []
+    return [
+        (argument, factor / sympy.Add(*(b / a * sympy.exp(other - argument) for b, other in terms)))
+        for a, argument in terms
+        if argument != 0
+    ]
+
+
+def _exponential(term: sympy.Expr) -> tuple[sympy.Expr | None, sympy.Expr]:
+    """``a`` and ``u`` of a term ``a*exp(u)`` with a positive number ``a``; None and zero of another term."""
+    size, rest = term.as_coeff_Mul()
+    if not size.is_positive or not (rest == 1 or isinstance(rest, sympy.exp)):
+        return None, ZERO
+    return size, rest.args[0] if rest != 1 else ZERO
 
 
 def _with_factor(

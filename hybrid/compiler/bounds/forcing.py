@@ -1,5 +1,8 @@
 """Parts of a vector field that depend on time and parameters alone and could hide a pulse from a solver.
 
+A component of the state that grows at a constant rate, such as the phase of an oscillator, tells the time as
+well, and so does one that only resets change.
+
 A solver evaluates a field only at certain points: at the stages of a step, or at its start for the series. A
 pulse that is narrower than the step can lie between them. Interval arithmetic on the expression of the pulse
 detects it, as it detects the crossings of a guard.
@@ -32,7 +35,7 @@ SUMS_OF_EXPONENTIALS = (sympy.sinh, sympy.cosh, expm1)
 
 @attrs.frozen
 class Forcing:
-    """An expression in time and parameters, and the component with this term in its rate or NO_COMPONENT.
+    """An expression in times and parameters, and the component with this term in its rate or NO_COMPONENT.
 
     Without an expression, with the component OF_STATE, it stands for parts that saturate in the state, or
     that grow exponentially in time.
@@ -42,14 +45,42 @@ class Forcing:
     component: int
 
 
+@attrs.frozen
+class Times:
+    """What tells the time in a mode.
+
+    Attributes
+    ----------
+    passing
+        Time, and the components of the state whose rate is a constant other than zero.
+    all
+        These, and the components that stay as they are.
+    state
+        The other components.
+    """
+
+    passing: tuple[sympy.Symbol, ...]
+    all: tuple[sympy.Symbol, ...]
+    state: tuple[sympy.Symbol, ...]
+
+
+def times_of(field: Sequence[sympy.Expr], symbols: Symbols) -> Times:
+    """The components of the state that tell the time in the mode of a field, and the others."""
+    constant = [not mentions(rate, symbols.variables) for rate in field]
+    clocks = tuple(x for x, same in zip(symbols.x, constant, strict=True) if same)
+    passing = tuple(x for x, rate in zip(symbols.x, field, strict=True) if x in clocks and rate != 0)
+    return Times((symbols.t, *passing), (symbols.t, *clocks), tuple(x for x in symbols.x if x not in clocks))
+
+
 def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forcing, ...]:
-    """The largest parts of a field in time and parameters alone, without their harmless terms.
+    """The largest parts of a field in times and parameters alone, without their harmless terms.
 
     Empty for a field that was not traced.
     """
     if field is None:
         return ()
-    found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, symbols))
+    times = times_of(field, symbols)
+    found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, times))
     if not found and any(_saturates(entry, symbols.variables) for entry in field):
         found[Forcing(None, OF_STATE)] = None
     return tuple(found)
@@ -86,61 +117,63 @@ def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> bool:
 
 
 @once
-def _parts(node: sympy.Expr, component: int, symbols: Symbols) -> tuple[Forcing, ...]:
-    return tuple(dict.fromkeys(_found_parts(node, component, symbols)))
+def _parts(node: sympy.Expr, component: int, times: Times) -> tuple[Forcing, ...]:
+    return tuple(dict.fromkeys(_found_parts(node, component, times)))
 
 
-def _found_parts(node: sympy.Expr, component: int, symbols: Symbols) -> Iterator[Forcing]:
-    if not mentions(node, (symbols.t,)):
+def _found_parts(node: sympy.Expr, component: int, times: Times) -> Iterator[Forcing]:
+    if not mentions(node, times.passing):
         return
     own, others = [node], []
-    if node.is_Add or (node.is_Mul and mentions(node, symbols.x)):
-        own = [part for part in node.args if mentions(part, (symbols.t,)) and not mentions(part, symbols.x)]
-        others = [part for part in node.args if mentions(part, symbols.x)]
-    elif mentions(node, symbols.x):
+    if node.is_Add or (node.is_Mul and mentions(node, times.state)):
+        own = [
+            part for part in node.args if mentions(part, times.passing) and not mentions(part, times.state)
+        ]
+        others = [part for part in node.args if mentions(part, times.state)]
+    elif mentions(node, times.state):
         own, others = [], [*node.args]
     if node.is_Add:
-        own = [part for part in own if not is_harmless(part, symbols.t)]
+        own = [part for part in own if not is_harmless(part, times.all)]
     whole = node.func(*own) if len(own) > 1 else own[0] if own else sympy.S.Zero
     within = component if node.is_Add or not others else NO_COMPONENT
-    if not is_harmless(whole, symbols.t):
+    if not is_harmless(whole, times.all):
         yield Forcing(whole, within)
     for other in others:
-        yield from _parts(other, within, symbols)
+        yield from _parts(other, within, times)
 
 
-def is_harmless(expression: sympy.Expr, t: sympy.Symbol) -> bool:
-    """Whether an expression in time has no pulse so narrow that a solver could miss it.
+def is_harmless(expression: sympy.Expr, times: tuple[sympy.Symbol, ...]) -> bool:
+    """Whether an expression in times has no pulse so narrow that a solver could miss it.
 
-    Sums of products of a few factors are harmless, where a factor is linear in time, and a sine or cosine of
-    a polynomial counts as two per degree. Exponentials of linear functions are harmless, too. Such functions
-    are not small on most of a step and large elsewhere, unless they grow exponentially. Every other
+    Sums of products of a few factors are harmless, where a factor is linear in the times, and a sine or
+    cosine of a polynomial counts as two per degree. Exponentials of linear functions are harmless, too. Such
+    functions are not small on most of a step and large elsewhere, unless they grow exponentially. Every other
     expression may rest and then have a pulse.
     """
-    factors = _factors(expression, t)
+    factors = _factors(expression, times)
     return factors is not None and factors <= MOST_FACTORS
 
 
 @once
-def _factors(node: sympy.Expr, t: sympy.Symbol) -> int | None:
+def _factors(node: sympy.Expr, times: tuple[sympy.Symbol, ...]) -> int | None:
     """Number of factors of a product that vary, the most in any term of a sum; None for other functions."""
-    if not mentions(node, (t,)):
+    if not mentions(node, times):
         return 0
-    if node == t:
+    if node in times:
         return 1
     if node.is_Add or isinstance(node, sympy.Mul | Together):
-        parts = [_factors(part, t) for part in node.args]
+        parts = [_factors(part, times) for part in node.args]
         numbers = [part for part in parts if part is not None]
         if len(numbers) < len(parts):
             return None
         return sum(numbers) if not node.is_Add else max(1, *numbers)
     if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
-        factors = _factors(node.base, t)
+        factors = _factors(node.base, times)
         return None if factors is None else factors * int(node.exp)
-    if node.is_Pow and mentions(node.base, (t,)):
+    if node.is_Pow and mentions(node.base, times):
         return None
     # The degree is that of a polynomial: a zero derivative would not prove that the argument has no jumps.
-    degree = degree_of(node.exp if node.is_Pow else node.args[0], frozenset((t,)))
+    degree = degree_of(node.exp if node.is_Pow else node.args[0], frozenset(times))
     if degree is None:
         return None
     if isinstance(node, sympy.sin | sympy.cos):

@@ -99,6 +99,7 @@ class _Writer:
         self.numbers = numbers
         self.rows: list[tuple[int, int, int, int]] = []
         self.places: dict[sympy.Basic, int] = {}
+        self.times = (symbols.t, *symbols.x)
         self.leaves: dict[sympy.Basic, tuple[int, int, int, int]] = {symbols.t: (op.TIME, 0, 0, 0)}
         self.leaves |= {x: (op.STATE, i, 0, 0) for i, x in enumerate(symbols.x)}
         self.leaves |= {p: (op.PARAMETER, i, 0, 0) for i, p in enumerate(symbols.p)}
@@ -113,10 +114,9 @@ class _Writer:
 
     def checked(self) -> list[int]:
         """One number per row: 1 for a subexpression that could hide a pulse and for the last row, else 0."""
-        time = next(iter(self.leaves))
         marks = [0] * (len(self.rows) - 1) + [1]
         for expression, row in self.places.items():
-            if not is_harmless(expression, time):
+            if not is_harmless(expression, self.times):
                 marks[row] = 1
         return marks
 

@@ -2,9 +2,10 @@
 
 A method knows a step by samples: the field at its stages, or the series at its start. Error control cannot
 see a pulse between them. So each part of the field that depends on time alone is bounded over the step by
-interval arithmetic. A step is *explained* if between two samples the forcing stays in the range of these
-two, give or take a share of what the samples differ by. All subexpressions that could hide a pulse
-are held to this: two switches may each be explained, and their difference be a pulse.
+interval arithmetic. A component of the state that grows at a constant rate tells the time as well. A step is
+*explained* if between two samples the forcing stays in the range of these two, give or take a share of what
+the samples differ by. All subexpressions that could hide a pulse are held to this: two switches may each be
+explained, and their difference be a pulse.
 
 Where the forcing is monotone, its ends explain it: one evaluation on intervals is all a step costs. Where
 it is so over many steps to come, they cost nothing.
@@ -247,7 +248,7 @@ def _tolerance(model, method, run, forcing):
 
 
 @njit(**KERNEL)
-def _is_calm(model, method, run, mode, path, h, work):
+def _is_calm(model, method, run, mode, path, order, h, work):
     """Whether all forcing is monotone on the step and known to be so for longer."""
     start = run.phase
     known = run.calm_mode == mode + 1 and run.calm_cycle == run.cycle
@@ -260,7 +261,7 @@ def _is_calm(model, method, run, mode, path, h, work):
         program = model.target.shape[0] + forcing
         if not has_program(model, program):
             continue
-        steady, noise = _is_steady(model, program, path, 0, -1, start, AHEAD * h, 0.0, work)
+        steady, noise = _is_steady(model, program, path, order, -1, start, AHEAD * h, 0.0, work)
         if not steady or AHEAD * h * noise > SHARE * _tolerance(model, method, run, forcing):
             run.calm_wait = WAIT
             return False
@@ -277,7 +278,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, h, work):
     as its first place that is not explained has the length of the pulse.
     """
     mode, start = run.mode, run.phase
-    if clock < 0 and _is_calm(model, method, run, mode, path, h, work):
+    if clock < 0 and _is_calm(model, method, run, mode, path, order, h, work):
         return h
     rounding = 0.0 if clock >= 0 else measured_time(model, run, mode)
     longest, shortest = h, FINEST * rounding + EPSILON * h
@@ -313,8 +314,13 @@ def _unresolved(run, longest, shortest):
 
 @exported(REAL, Model, Method, Run, REAL, Work)
 def explained_step(model, method, run, h, work):
-    """The length up to ``h`` of a step whose stages explain the forcing."""
-    return _longest_explained(model, method, run, work.path, 0, -1, method.nodes, h, work)
+    """The length up to ``h`` of a step whose stages explain the forcing.
+
+    The components that tell the time grow at a constant rate. ``work.stages[0]`` holds the rates.
+    """
+    for i in range(model.dimension):
+        work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
+    return _longest_explained(model, method, run, work.path, 1, -1, method.nodes, h, work)
 
 
 @njit(**INLINE)

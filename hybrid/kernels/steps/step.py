@@ -104,10 +104,10 @@ def error_ratio(method, h, y, dimension, tangents, work):
             scale = floor + method.rtol * max(abs(y[i]), abs(new[i]))
             first += (error[i] / scale) ** 2
             second += (second_error[i] / scale) ** 2
+        if not first < math.inf:
+            return math.nan
         if first > 0.0:
             worst = max(worst, h * first / math.sqrt((first + 0.01 * second) * n))
-        elif first != 0.0:
-            return math.nan
     return worst
 
 

@@ -1,11 +1,24 @@
 """Derivatives by the chain rule, compared with SymPy and with finite differences."""
 
+import mpmath
 import numpy as np
 import pytest
 import sympy
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition, compile_system
-from hybrid.symbolic.derivatives import directional, partial_derivatives
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    Taylor,
+    Transition,
+    Tsit5,
+    compile_system,
+    simulate,
+)
+from hybrid.symbolic.derivatives import directional, jacobian_of, partial_derivatives
 from hybrid.symbolic.expressions import Absolute, Maximum, Select, Sign
 from hybrid.system.functions import field_function, reset_function
 
@@ -103,3 +116,49 @@ def test_a_power_of_zero_has_slope_zero_in_its_exponent():
     compiled, function = compile_system(flow), field_function(flow.modes[0], 2)
     found = compiled.derivative(function, 0, 3.0, np.array([0.0, 1.5]), flow.parameter_values())
     np.testing.assert_allclose(found, [[0.0, 0.0, 0.0], [0.0, 0.0, 8.0 * np.log(2.0)]], rtol=1e-14)
+
+
+DECAYS = {
+    # A function that is zero where its exponentials overflow, and its derivative, in high precision.
+    "logistic": (
+        lambda u: 1 / (1 + sympy.exp(-u)),
+        lambda u: 1 / (mpmath.exp(u / 2) + mpmath.exp(-u / 2)) ** 2,
+    ),
+    "power": (
+        lambda u: (3 + 2 * sympy.exp(u)) ** sympy.Rational(-3, 2),
+        lambda u: -3 * mpmath.exp(u) * (3 + 2 * mpmath.exp(u)) ** mpmath.mpf(-2.5),
+    ),
+    "sech": (lambda u: sympy.cosh(u) ** -2, lambda u: -2 * mpmath.tanh(u) * mpmath.sech(u) ** 2),
+    "two": (
+        lambda u: 1 / (sympy.exp(u) + 4 * sympy.exp(-2 * u)),
+        lambda u: (8 * mpmath.exp(-2 * u) - mpmath.exp(u)) / (mpmath.exp(u) + 4 * mpmath.exp(-2 * u)) ** 2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DECAYS)
+@pytest.mark.parametrize("u", [-2e4, -700.0, -360.0, -30.0, -1.0, 0.0, 0.7, 25.0, 360.0, 700.0, 2e4])
+def test_a_function_that_decays_has_a_derivative_where_its_exponentials_overflow(name, u):
+    """Where the chain rule divides infinity by infinity it is zero. Elsewhere it keeps its digits."""
+    function, exact = DECAYS[name]
+    [[slope]] = jacobian_of([function(a)], [a])
+    [along] = directional([function(a)], {a: b})
+    with np.errstate(over="ignore"):
+        values = [
+            f(np.float64(u), 1.0) for f in (sympy.lambdify((a, b), each, "numpy") for each in (slope, along))
+        ]
+    assert values == pytest.approx([float(exact(mpmath.mpf(u)))] * 2, rel=1e-12, abs=1e-300)
+
+
+@pytest.mark.parametrize("solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=lambda s: type(s).__name__)
+def test_a_switch_so_sharp_that_its_exponential_overflows(solver):
+    """The area below a logistic function of width 1e-4, and its tangent map, are exact."""
+    system = HybridSystem(
+        state=("q", "area"),
+        modes=[Mode("run", lambda t, x, p: (1.0, 1 / (1 + np.exp(-(x.q - 0.5) / 1e-4))))],
+        transitions=[],
+    )
+    arc = simulate(system, (0.0, 0.0), (0.0, 3.0), solver=solver, tangent=True)
+    assert arc.status.ok
+    assert arc.x[-1, 1] == pytest.approx(2.5, rel=1e-6)
+    assert arc.fundamental == pytest.approx(np.array([[1.0, 0.0], [1.0, 1.0]]), rel=1e-6)

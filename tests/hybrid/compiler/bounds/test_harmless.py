@@ -25,7 +25,7 @@ def traced(function):
 
 def is_free(function):
     """Whether a solver needs no bounds for a function of time."""
-    return is_harmless(traced(function), T)
+    return is_harmless(traced(function), (T,))
 
 
 JUMPING = {
@@ -102,9 +102,9 @@ def test_a_product_of_many_harmonics_is_no_harmless_forcing():
     """A sum of as many harmonics is harmless."""
     most = MOST_FACTORS // FACTORS_OF_HARMONIC
     many = [sympy.cos(k * T) for k in range(1, most + 2)]
-    assert is_harmless(sympy.Add(*many), T)
-    assert is_harmless(sympy.Mul(*many[:-1]), T)
-    assert not is_harmless(sympy.Mul(*many), T)
+    assert is_harmless(sympy.Add(*many), (T,))
+    assert is_harmless(sympy.Mul(*many[:-1]), (T,))
+    assert not is_harmless(sympy.Mul(*many), (T,))
 
 
 # Samples of an interval; a pulse is found on fewer of them than this share.
