@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid import DOP853, HybridSystem, Mode, Tsit5
+from hybrid import DOP853, HybridSystem, Mode, RadauIIA, Taylor, Tsit5, simulate
 from hybrid.kernels.steps import step
 from hybrid.simulation.trajectory import start
 
@@ -114,3 +114,24 @@ def test_an_error_that_is_no_number_is_no_ratio():
     assert math.isnan(error_ratio(run.method, 0.1, run.run.y, 2, 0, run.work))
     run.work.stages[:, :2] = 0.0
     assert error_ratio(run.method, 0.1, run.run.y, 2, 0, run.work) == 0.0
+
+
+@pytest.mark.parametrize("solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("sharpness", [30.0, 1e3, 1e5])
+def test_a_step_whose_error_is_infinite_is_rejected(solver, sharpness):
+    """A wall that repels exponentially is not seen from afar: a step into it overflows.
+
+    The mass returns with its speed.
+    """
+    wall = HybridSystem(
+        state=("q", "v"),
+        parameters={"k": sharpness},
+        modes=[Mode("free", lambda t, x, p: (x.v, p.k * np.exp(-p.k * x.q)))],
+    )
+    arc = simulate(wall, (3.0, -1.0), (0.0, 7.0), solver=solver)
+    assert arc.status.ok
+    # The exact orbit is 2/k ln cosh(k (t - turn)/2) + lowest.
+    lowest = np.log(2.0) / sharpness
+    turn = 3.0 - lowest + 2.0 * np.log(2.0) / sharpness
+    last = 7.0 - turn - 2.0 * np.log(2.0) / sharpness + lowest
+    assert arc.x[-1] == pytest.approx((last, 1.0), rel=1e-6)
