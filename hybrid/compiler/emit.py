@@ -27,6 +27,7 @@ from hybrid.compiler.emitted import Emitted, Propagator, Series
 from hybrid.compiler.jacobians import slope_columns, without_zeros, zeros_first
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
+from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.surfaces import surfaces
@@ -102,11 +103,19 @@ def _emitted(system: HybridSystem) -> Emitted:
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
+    steep = [
+        writer.remembered(
+            ("steep", id(mode.field), tuple(around)),
+            partial(steep_at_guards, field.expressions, around, symbols),
+        )
+        for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
+    ]
+    crossing, at_crossings = fields_at_crossings(system, fields, steep, guards, resets, boundaries, symbols)
     jacobians = [without_zeros(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
     places = _places(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
-        "field": [field.value for field in evaluated],
+        "field": [*(field.value for field in evaluated), *at_crossings],
         "field_jacobian": [*jacobians],
         "variational_field": [
             writer.remembered(
@@ -162,6 +171,12 @@ def _emitted(system: HybridSystem) -> Emitted:
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
         ),
         proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
+        steep=tuple(_told(system, powers) for powers in steep),
+        steep_inside=tuple(
+            _told(system, steep_inside(field.expressions, around, symbols))
+            for field, around in zip(fields, boundaries, strict=True)
+        ),
+        crossing=crossing,
         timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
         propagators=tuple(map(_without_text, propagators)),
         tangent_start=places.vectors,
@@ -404,9 +419,18 @@ def _where_it_jumps(
         return "it branches" if may_jump(function.value, differentiable) else ""
     known = known_positive(boundaries)
     places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
+    return ", or ".join(_in_names(system, place) for place in places)
+
+
+def _told(system: HybridSystem, expressions: Sequence[sympy.Expr]) -> str:
+    """Expressions in the names of the model."""
+    return ", ".join(_in_names(system, str(each)) for each in expressions)
+
+
+def _in_names(system: HybridSystem, text: str) -> str:
     names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
     names |= {f"p[{i}]": name for i, name in enumerate(system.parameters)}
-    return ", or ".join(_INDEXED.sub(lambda match: names[match[0]], place) for place in places)
+    return _INDEXED.sub(lambda match: names[match[0]], text)
 
 
 def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer: _Writer) -> bool:

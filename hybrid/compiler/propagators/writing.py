@@ -21,10 +21,12 @@ from hybrid.symbolic.tracing import Symbols
 # Columns after those of the guards: the time since the start of the step, the integral of div f. All columns
 # up to here are written and evaluated as whole vectors. The root of a desingularised mode comes next.
 CLOCK, DIVERGENCE, OTHERS = range(3)
-# Smallest start of the square root of a guard, as a share of the sizes of the terms of the guard.
+# Smallest start of a guard whose root is taken, as a share of the sizes of the terms of the guard.
 FLOOR = 1e-17
 # As a share of these sizes: smaller differences between the guard and the square of the root are rounding.
 SAME_ROOT = 1e-13
+# A larger value in place of the last root stands for a guard that is zero, and moves on.
+LARGEST = 1e300
 
 
 def write_series(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols) -> Series:
@@ -89,16 +91,23 @@ class Body:
         """A column after those of the guards."""
         return str(self.behind_guards + place)
 
-    def start_root(self, name: str, z: sympy.Expr, place: int) -> None:
-        """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place."""
+    def start_root(self, name: str, z: sympy.Expr, order: int, place: int) -> None:
+        """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place.
+
+        With a speed of zero too, a root of zero would stay there. So a root that is small starts below the
+        rounding of ``z``. It starts at zero only where the kernel knows that the guard is zero and moves on.
+        """
         size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
-        self.at_start[z] = f"{name}*{name}"
+        power = "*".join(["last"] * order)
+        self.at_start[z] = "*".join([name] * order)
+        least = f"max(z, {FLOOR}*size, 1e-300)"
         self.preamble += [
             *assignments(["z", "size"], [z, size]),
             f"last = abs(out[order + 1, {self.n + place}])",
             # A stored value this close to the root is taken as the root, whichever step stored it.
-            f"same = abs(last*last - z) <= {SAME_ROOT}*size < z",
-            f"{name} = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
+            f"same = abs({power} - z) <= {SAME_ROOT}*size < z",
+            f"{name} = last if same else {f'sqrt({least})' if order == 2 else f'{least}**{1 / order!r}'}",
+            f"{name} = 0.0 if last > {LARGEST} else {name}",
         ]
 
     def allot(self) -> str:

@@ -24,6 +24,7 @@ from hybrid.kernels.arithmetic.lanes import (
 )
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
+from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
@@ -294,13 +295,27 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
 
 
 @njit(**KERNEL)
+def mark_zeros(model, run, order, series):
+    """Tell the series of the roots of guards which guards are zero and move on: there the root is zero.
+
+    The state shows that of a guard only up to rounding, and the root of rounding is far larger.
+    """
+    mode, n = run.mode, model.dimension
+    first = model.first_outgoing[mode]
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        if run.on_guard[model.outgoing[slot]] == BY_SPEED:
+            series[order + 1, n + slot - first] = math.inf
+
+
+@njit(**KERNEL)
 def reach_guard(model, run, tangents, transition, t, longest, work):
     """Bring the state onto the guard by an Euler step in time, whose length is returned.
 
     A contact ends where the root of its guard vanishes, and the guard differs from the square of the root by
     the error of the step. A guard that is not affine has a series with terms, and rounding, of its own. Left
     beyond its rounding it would count as not yet, or once more, crossed. Nothing is done, and 0 returned,
-    where more than ``longest`` would be needed.
+    where more than ``longest`` would be needed. The tangent vectors are those at the zero of the root, and stay
+    as they are if ``tangents`` is 0: their rate may be infinite at the guard.
     """
     field = work.stages[0]
     rates_by_jacobian(model, run.mode, t, run.y, tangents, work.jacobian, field)
@@ -345,6 +360,8 @@ def series_step(task, remaining):
     clock = n + guards if kind == DESINGULARISED else -1
     # State, guards, clock and divergence are evaluated together, in whole vectors.
     front = whole_registers(n + guards + 2, NARROW)
+    if kind in (DESINGULARISED, ROOTED):
+        mark_zeros(model, run, order, series)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.steps += 1
@@ -428,7 +445,8 @@ def series_step(task, remaining):
         project_on_guard(model, run, fired, t + span, work)
     elif fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
         longest = math.inf if clock >= 0 else CLOSE * span
-        span += reach_guard(model, run, tangents, fired, t + span, longest, work)
+        moved = 0 if clock >= 0 and model.guard_in_series[fired] == 1 else tangents
+        span += reach_guard(model, run, moved, fired, t + span, longest, work)
     return GO_ON, span
 
 

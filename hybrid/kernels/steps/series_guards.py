@@ -320,9 +320,11 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
 
 
 @njit(**INLINE)
-def is_root(model, mode):
-    """Whether the series of a guard in a mode is that of its root."""
-    return model.propagator[mode] in (DESINGULARISED, ROOTED)
+def as_root(model, mode, size):
+    """How large a guard of a size is in its series, which may be that of its root."""
+    if model.propagator[mode] not in (DESINGULARISED, ROOTED):
+        return size
+    return math.sqrt(size) if model.root[mode] == 2 else size ** (1.0 / model.root[mode])
 
 
 @njit(**INLINE)
@@ -370,7 +372,7 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
         for i in range(n):
             size += abs(work.gradient[i]) * max(abs(run.y[i]), abs(series[order + 1, i]))
         rounding = ROUNDING_OF_STATE * EPSILON * size
-        return error <= (math.sqrt(rounding) if is_root(model, run.mode) else rounding)
+        return error <= as_root(model, run.mode, rounding)
     for i in range(n):
         work.trial[i] = series[order + 1, i]
         size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
@@ -433,8 +435,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if kind != EXACT:
             band = error_band(method, run, work.gradient, model.dimension)
         # A value that is small for a guard is less small for the root of the guard.
-        if is_root(model, mode):
-            rounding, band = math.sqrt(rounding), math.sqrt(band)
+        rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
         size, power = beyond_known_roots(series, column, h, on_guard, size)
         if on_guard > 0:
             if size <= rounding:
