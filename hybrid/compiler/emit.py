@@ -27,9 +27,9 @@ from hybrid.compiler.emitted import Emitted, Propagator, Series
 from hybrid.compiler.jacobians import slope_columns, without_zeros, zeros_first
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
-from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
+from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
 from hybrid.compiler.written import Written, beyond_guards, variational
@@ -136,7 +136,10 @@ def _emitted(system: HybridSystem) -> Emitted:
         "tangent_series": _placed(places, [each.tangent_statements for each in series]),
     }
     surface, orientation = writer.surfaces(traced)
-    pulses = [forcings(field.expressions, symbols) for field in fields]
+    pulses = [
+        forcings(field.expressions, known_positive(around), symbols)
+        for field, around in zip(fields, boundaries, strict=True)
+    ]
     forcing = [each for of_mode in pulses for each in of_mode]
     residual = [
         residues(field.expressions, _gradients(system, mode.name, guards), symbols)

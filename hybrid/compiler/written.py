@@ -76,7 +76,7 @@ def _roots_inside(
 def _slopes_inside(
     entries: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
 ) -> dict[sympy.Expr, sympy.Expr]:
-    """Powers of the guards that may be infinite at the guard, and what takes their place: zero at the guard."""
+    """Powers of the guards that may be infinite there, and what takes their place: zero at the guard."""
     found: dict[sympy.Expr, sympy.Expr] = {}
     for power in nodes_of(sympy.Pow, *entries):
         if power.exp.is_positive or not mentions(power.base, symbols.variables):

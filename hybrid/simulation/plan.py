@@ -103,7 +103,7 @@ def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:
 
 @lru_cache(MOST_LAYOUTS)
 def kernel_method(solver: Solver, series: bool) -> Any:
-    """The kernel's view of a solver: tableau and tolerances; with ``series``, modes are advanced by series."""
+    """The kernel's view of a solver: tableau and tolerances; with ``series``, some modes have series."""
     tableau = solver.tableau
     return Method(
         a=tableau.a,
@@ -158,9 +158,7 @@ def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[A
 def propagator_kinds(compiled: CompiledSystem, solver: Solver, tangents: int) -> list[int]:
     """How each mode is advanced: by its series if the solver prefers them, or tangent vectors need them."""
     return [
-        each.kind
-        if solver.by_series or (tangents > 0 and compiled.needs_series(mode))
-        else codes.RUNGE_KUTTA
+        each.kind if solver.by_series or (tangents > 0 and compiled.needs_series(mode)) else codes.RUNGE_KUTTA
         for mode, each in enumerate(compiled.emitted.propagators)
     ]
 

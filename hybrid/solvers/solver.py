@@ -53,8 +53,8 @@ class Solver:
     # Module and name of the kernel that attempts a step of an implicit method: a PART with the signature of
     # ``Attempts.attempt_implicit``.
     attempt: ClassVar[tuple[str, str]] = ("hybrid.kernels.steps.step", "no_attempt")
-    # Whether every mode that has a series is advanced by it. Else only modes whose field has an infinite slope
-    # at a guard are, in runs with tangent vectors.
+    # Whether every mode that has a series is advanced by it. Else only modes whose field has an infinite
+    # slope at a guard are, in runs with tangent vectors.
     by_series: ClassVar[bool] = False
 
     rtol: float = attrs.field(default=1e-10, kw_only=True)

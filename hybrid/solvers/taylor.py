@@ -20,8 +20,9 @@ class Taylor(Solver):
       the series allows. If the solutions are polynomials, one step covers the whole time between jumps.
     - **Desingularised**: the field has half-integer powers of a guard, as in a Hertz contact. The mode is
       advanced in its own time ``s``, ``dt = w ds`` with ``w`` the square root of the guard, in which the
-      solution is smooth, also at entry and exit. Thirds and quarters have a clock of the same kind. If the rate of the guard also has the factor ``w``, as for
+      solution is smooth, also at entry and exit. If the rate of the guard also has the factor ``w``, as for
       the level of a tank that empties, ``h' = -sqrt(h)``, the root is smooth in time, and is integrated.
+      Thirds, quarters and so on have roots of their own order.
     - **Taylor series**: any other analytic field. Order and steps follow from the tolerances (Jorba and Zou
       2005, section 3).
     - **Runge-Kutta pair** DOP853: fields that cannot be traced or have kinks inside the mode.

@@ -11,7 +11,7 @@ from hybrid.compiler.propagators.equations import ELEMENTARY
 from hybrid.compiler.taylor.loops import StateLoop, TangentLoop, indented, padded
 from hybrid.compiler.taylor.pairs import columns_of
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences
-from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.kernels.types.codes import FROM_LAST_STEP, FROM_ZERO, NARROW, WIDE
 from hybrid.symbolic.constants import Constants
 from hybrid.symbolic.derivatives import directional, divergence
 from hybrid.symbolic.nodes import mentions, nodes_of
@@ -25,8 +25,8 @@ CLOCK, DIVERGENCE, OTHERS = range(3)
 FLOOR = 1e-17
 # As a share of these sizes: smaller differences between the guard and the square of the root are rounding.
 SAME_ROOT = 1e-13
-# A larger value in place of the last root stands for a guard that is zero, and moves on.
-LARGEST = 1e300
+# As a share of these sizes: larger differences after a step are no errors of a controlled step.
+DRIFT = 1e-6
 
 
 def write_series(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols) -> Series:
@@ -96,6 +96,8 @@ class Body:
 
         With a speed of zero too, a root of zero would stay there. So a root that is small starts below the
         rounding of ``z``. It starts at zero only where the kernel knows that the guard is zero and moves on.
+        Near zero the root at the end of the last step is far better than that of ``z``, which has the error
+        of the state.
         """
         size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
         power = "*".join(["last"] * order)
@@ -104,10 +106,13 @@ class Body:
         self.preamble += [
             *assignments(["z", "size"], [z, size]),
             f"last = abs(out[order + 1, {self.n + place}])",
+            f"origin = out[order + 2, {self.n + place}]",
+            f"apart = abs({power} - z)",
             # A stored value this close to the root is taken as the root, whichever step stored it.
-            f"same = abs({power} - z) <= {SAME_ROOT}*size < z",
+            f"same = apart <= {SAME_ROOT}*size < z",
+            f"same = same or (origin == {FROM_LAST_STEP}.0 and apart <= {DRIFT}*size)",
             f"{name} = last if same else {f'sqrt({least})' if order == 2 else f'{least}**{1 / order!r}'}",
-            f"{name} = 0.0 if last > {LARGEST} else {name}",
+            f"{name} = 0.0 if origin == {FROM_ZERO}.0 else {name}",
         ]
 
     def allot(self) -> str:

@@ -21,8 +21,8 @@ ROOT = sympy.Symbol("w", positive=True)
 THIRD = sympy.Rational(1, 3)
 # Exponents are told from other floats up to this denominator.
 LARGEST_DENOMINATOR = 7
-# In a series in the root of the order ``q``, with ``w**m`` the lowest power in the field, only each ``q + m``-th
-# term may differ from zero. The control of the step looks at eight terms.
+# In a series in the root of the order ``q``, with ``w**m`` the lowest power in the field, only each
+# ``q + m``-th term may differ from zero. The control of the step looks at eight terms.
 WIDEST_GAP = 8
 # Ratios at two points differ if they do by more than this share.
 DIFFERENT = 1e-10
@@ -59,18 +59,19 @@ def singular_bases(
     branch that the power does not have. So a base that may change its sign must be a guard.
     """
     bases: dict[sympy.Expr, list[sympy.Rational]] = {}
-    for power in nodes_of(sympy.Pow, *field):
-        if power.exp.is_Integer or not mentions(power.base, symbols.variables):
+    for node in nodes_of(sympy.Pow, *field):
+        base, exponent = node.args
+        if exponent.is_Integer or not mentions(base, symbols.variables):
             continue
-        if not any(is_multiple(power.base, guard, symbols) for guard in known):
-            if not power.base.is_nonnegative:
+        if not any(is_multiple(base, guard, symbols) for guard in known):
+            if not base.is_nonnegative:
                 raise NoSeries(
-                    f"it has the power {power.exp} of an expression that may change sign and is not a guard"
+                    f"it has the power {exponent} of an expression that may change sign and is not a guard"
                 )
             continue
-        if not (power.exp.is_Rational and power.exp.is_positive):
-            raise NoSeries(f"it has the power {power.exp} of a guard")
-        bases.setdefault(power.base, []).append(power.exp)
+        if not (exponent.is_Rational and exponent.is_positive):
+            raise NoSeries(f"it has the power {exponent} of a guard")
+        bases.setdefault(base, []).append(exponent)
     return {base: _order(bases[base]) for base in sorted(bases, key=sympy.default_sort_key)}
 
 
@@ -141,7 +142,7 @@ def is_crossed(field: Sequence[sympy.Expr], z: sympy.Expr, order: int, symbols: 
 def _slope_in_root(
     field: Sequence[sympy.Expr], z: sympy.Expr, order: int, root: sympy.Symbol, symbols: Symbols
 ) -> Sequence[sympy.Expr] | None:
-    """The terms of the rate of ``z``, with ``root`` in place of one state; None if no state can be solved for."""
+    """The terms of the rate of ``z`` with ``root`` in place of a state; None if ``z`` gives no state."""
     states = [x for x in symbols.x if mentions(z, (x,)) and not mentions(z.diff(x), symbols.variables)]
     if not states:
         return None

@@ -41,8 +41,8 @@ from hybrid.kernels.jumps.locked import (
     restore_tangents,
 )
 from hybrid.kernels.jumps.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
-from hybrid.kernels.jumps.steep import is_steep, is_steep_behind
 from hybrid.kernels.jumps.skipped import MANY_AT_ONCE, has_come_to_rest, jumps_in_turn, way_is_free
+from hybrid.kernels.jumps.steep import is_steep, is_steep_behind
 from hybrid.kernels.types.codes import (
     ENTERING,
     GRAZING,

@@ -1,8 +1,8 @@
 """Slopes of a field that are infinite at a guard, where steps in time lose digits of the tangent vectors.
 
-Near a guard ``z`` a slope like ``z**(p - 1)`` with ``p < 1`` changes tangent vectors by ``z**p`` until ``z`` is
-zero. Rounding hides the last part of ``z``: with ``p = 1/2``, the root of rounding is missing. Series in the
-root of the guard miss nothing.
+Near a guard ``z`` a slope like ``z**(p - 1)`` with ``p < 1`` changes tangent vectors by ``z**p`` until ``z``
+is zero. Rounding hides the last part of ``z``: with ``p = 1/2``, the root of rounding is missing. Series in
+the root of the guard miss nothing.
 """
 
 import math
@@ -23,7 +23,7 @@ GROWS = 1.02
 
 @njit(**KERNEL)
 def rates_beside(model, run, mode, t, distance, tangents, out, work):
-    """The rates of the tangent vectors at a ``distance`` from the guard with the gradient ``work.gradient``."""
+    """Rates of the tangent vectors at a ``distance`` from the guard with the gradient ``work.gradient``."""
     n, square = model.dimension, 0.0
     for i in range(n):
         square += work.gradient[i] * work.gradient[i]

@@ -41,11 +41,15 @@ from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
+    FROM_LAST_STEP,
+    FROM_STATE,
+    FROM_ZERO,
     GO_ON,
     HIGHEST_ORDER,
     NARROW,
     NO_TRANSITION,
     NON_FINITE,
+    READY,
     ROOTED,
     STEP_TOO_SMALL,
     WIDE,
@@ -295,16 +299,19 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
 
 
 @njit(**KERNEL)
-def mark_zeros(model, run, order, series):
-    """Tell the series of the roots of guards which guards are zero and move on: there the root is zero.
+def set_origins(model, run, order, series):
+    """Tell the series what they may take the roots of guards from.
 
-    The state shows that of a guard only up to rounding, and the root of rounding is far larger.
+    The state shows a guard only up to the tolerances and up to rounding, and a root of either is far larger.
+    So a root that a step ended with is the start of the next one, and is zero where the guard is.
     """
     mode, n = run.mode, model.dimension
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
+        origin = FROM_LAST_STEP if run.stage == READY else FROM_STATE
         if run.on_guard[model.outgoing[slot]] == BY_SPEED:
-            series[order + 1, n + slot - first] = math.inf
+            origin = FROM_ZERO
+        series[order + 2, n + slot - first] = origin
 
 
 @njit(**KERNEL)
@@ -314,8 +321,8 @@ def reach_guard(model, run, tangents, transition, t, longest, work):
     A contact ends where the root of its guard vanishes, and the guard differs from the square of the root by
     the error of the step. A guard that is not affine has a series with terms, and rounding, of its own. Left
     beyond its rounding it would count as not yet, or once more, crossed. Nothing is done, and 0 returned,
-    where more than ``longest`` would be needed. The tangent vectors are those at the zero of the root, and stay
-    as they are if ``tangents`` is 0: their rate may be infinite at the guard.
+    where more than ``longest`` would be needed. With ``tangents`` 0, tangent vectors stay as they are: those
+    at the zero of the root are right, and their rate may be infinite there.
     """
     field = work.stages[0]
     rates_by_jacobian(model, run.mode, t, run.y, tangents, work.jacobian, field)
@@ -361,7 +368,7 @@ def series_step(task, remaining):
     # State, guards, clock and divergence are evaluated together, in whole vectors.
     front = whole_registers(n + guards + 2, NARROW)
     if kind in (DESINGULARISED, ROOTED):
-        mark_zeros(model, run, order, series)
+        set_origins(model, run, order, series)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.steps += 1
@@ -439,6 +446,10 @@ def series_step(task, remaining):
     if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
+    for column in range(n, n + guards if kind in (DESINGULARISED, ROOTED) else n):
+        # The next series looks for its root behind a series of the full order.
+        series[method.order + 1, column] = series[order + 1, column]
+    run.stage = READY
     if cut:
         sides_at(model, run, t + span, work)
     if fired != NO_TRANSITION and kind == ROOTED:
