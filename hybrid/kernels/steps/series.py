@@ -455,7 +455,8 @@ def series_step(task, remaining):
     if fired != NO_TRANSITION and kind == ROOTED:
         project_on_guard(model, run, fired, t + span, work)
     elif fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
-        longest = math.inf if clock >= 0 else CLOSE * span
+        # What the error of the root makes of the time is less than the stay in the mode.
+        longest = run.since_entry + span if clock >= 0 else CLOSE * span
         moved = 0 if clock >= 0 and model.guard_in_series[fired] == 1 else tangents
         span += reach_guard(model, run, moved, fired, t + span, longest, work)
     return GO_ON, span

@@ -436,7 +436,9 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             band = error_band(method, run, work.gradient, model.dimension)
         # A value that is small for a guard is less small for the root of the guard.
         rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
-        size, power = beyond_known_roots(series, column, h, on_guard, size)
+        # The root of a guard that is zero without speed begins to grow like its variable, too.
+        known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
+        size, power = beyond_known_roots(series, column, h, known, size)
         if on_guard > 0:
             if size <= rounding:
                 continue
@@ -444,7 +446,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
                 side = 0
         # The second cheap proof: the leading powers keep to their side, even if the others are against it.
-        degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
+        degree, rest = leading_powers(series, column, order, power, known, size, work.polynomial, h)
         leading_to_bernstein(work.polynomial, degree, work.stack)
         verdict, start, end, row = judge_leading(
             degree, rest, order * rest, side, band, series[order + 1, column], work.stack
@@ -463,12 +465,12 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             ):
                 blurred = transition
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
+            theta = root_between(series, column, order, known, h, start * h, end * h, *ends) / h
             run.rehearsal[3, transition] = side
             if theta < earliest:
                 earliest, fired = theta, transition
             continue
-        degree = powers_on_step(series, column, order, h, on_guard, work.polynomial)
+        degree = powers_on_step(series, column, order, h, known, work.polynomial)
         to_bernstein(work.polynomial, degree)
         if stays(work.polynomial, degree, side, band):
             continue
@@ -477,8 +479,8 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         )
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
-        note_touches(run, transition, degree, on_guard, theta, band, work)
+            theta = root_between(series, column, order, known, h, theta * h, end * h, *ends) / h
+        note_touches(run, transition, degree, known, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
         if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
