@@ -61,6 +61,9 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
+# Names of functions in expressions, and as they are written in models.
+_WRITTEN = {"Absolute": "abs", "CubeRoot": "cbrt", "Maximum": "maximum", "Minimum": "minimum", "Sign": "sign"}
+_CLASSES = re.compile("|".join(_WRITTEN))
 
 
 def emit(system: HybridSystem) -> Emitted:
@@ -427,7 +430,8 @@ def _where_it_jumps(
 
 def _told(system: HybridSystem, expressions: Sequence[sympy.Expr]) -> str:
     """Expressions in the names of the model."""
-    return ", ".join(_in_names(system, str(each)) for each in expressions)
+    text = ", ".join(_in_names(system, str(each)) for each in expressions)
+    return _CLASSES.sub(lambda match: _WRITTEN[match[0]], text)
 
 
 def _in_names(system: HybridSystem, text: str) -> str:

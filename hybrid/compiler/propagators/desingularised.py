@@ -62,7 +62,7 @@ def _write_desingularised(
     roots = in_terms_of_root(boundaries, z, ROOT, symbols)
     crossing = [roots.get(place, in_roots(guard, z, order)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)
-    body.start_root("root", z, order, min(roots))
+    body.start_root("root", z, order, min(roots), goes_on=True)
     # A guard that moves with the forcing has the harmonics in its powers in the field, too.
     z = replaced(z, harmonics)
     body.at_start[z] = "*".join(["root"] * order)

@@ -52,7 +52,7 @@ def _write_rooted(
     names = [f"root_{root.symbol}" for root in roots]
     for name, root in zip(names, roots, strict=True):
         places = in_terms_of_root(boundaries, root.base, root.symbol, symbols)
-        body.start_root(name, root.base, root.order, min(places))
+        body.start_root(name, root.base, root.order, min(places), goes_on=False)
         signed |= places
     crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)

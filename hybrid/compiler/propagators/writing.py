@@ -25,8 +25,6 @@ CLOCK, DIVERGENCE, OTHERS = range(3)
 FLOOR = 1e-17
 # As a share of these sizes: smaller differences between the guard and the square of the root are rounding.
 SAME_ROOT = 1e-13
-# As a share of these sizes: larger differences after a step are no errors of a controlled step.
-DRIFT = 1e-6
 
 
 def write_series(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols) -> Series:
@@ -91,13 +89,13 @@ class Body:
         """A column after those of the guards."""
         return str(self.behind_guards + place)
 
-    def start_root(self, name: str, z: sympy.Expr, order: int, place: int) -> None:
+    def start_root(self, name: str, z: sympy.Expr, order: int, place: int, *, goes_on: bool) -> None:
         """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place.
 
         With a speed of zero too, a root of zero would stay there. So a root that is small starts below the
         rounding of ``z``. It starts at zero only where the kernel knows that the guard is zero and moves on.
-        Near zero the root at the end of the last step is far better than that of ``z``, which has the error
-        of the state.
+        A root that ``goes_on`` starts with its value at the end of the last step. Its error is as small as
+        that of the speed of ``z``; near zero, the error of ``z`` itself would make a far larger one.
         """
         size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
         power = "*".join(["last"] * order)
@@ -110,7 +108,7 @@ class Body:
             f"apart = abs({power} - z)",
             # A stored value this close to the root is taken as the root, whichever step stored it.
             f"same = apart <= {SAME_ROOT}*size < z",
-            f"same = same or (origin == {FROM_LAST_STEP}.0 and apart <= {DRIFT}*size)",
+            *([f"same = same or origin == {FROM_LAST_STEP}.0"] if goes_on else []),
             f"{name} = last if same else {f'sqrt({least})' if order == 2 else f'{least}**{1 / order!r}'}",
             f"{name} = 0.0 if origin == {FROM_ZERO}.0 else {name}",
         ]
