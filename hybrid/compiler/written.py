@@ -10,7 +10,7 @@ import sympy
 from hybrid.compiler.jacobians import CELL
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
-from hybrid.symbolic.expressions import ZERO, Less, Maximum, Select
+from hybrid.symbolic.expressions import ZERO, CubeRoot, Less, Maximum, Select
 from hybrid.symbolic.nodes import mentions, nodes_of, replaced
 from hybrid.symbolic.printer import assignments
 from hybrid.symbolic.signs import simplified
@@ -81,7 +81,8 @@ def _slopes_inside(
     for power in nodes_of(sympy.Pow, *entries):
         if power.exp.is_positive or not mentions(power.base, symbols.variables):
             continue
-        base = simplified(power.base, known)
+        base = power.base.args[0] if isinstance(power.base, CubeRoot) else power.base
+        base = simplified(base, known)
         if any(is_multiple(base, guard, symbols) for guard in known):
             found[power] = Select(Less(ZERO, base), power, ZERO)
     return found
