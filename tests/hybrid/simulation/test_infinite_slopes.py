@@ -1,7 +1,7 @@
 """Contact laws whose slope is infinite at the surface: tangent vectors are right, or the status says so.
 
-The reference integrates state and tangent vectors on the clock ``dt = w**(q - 1) ds``, ``depth = w**q``. There
-the law and its slope are smooth. Its steps are its own.
+The reference integrates state and tangent vectors on the clock ``dt = w**(q - 1) ds``, ``depth = w**q``.
+There the law and its slope are smooth. Its steps are its own.
 """
 
 import numpy as np
@@ -28,8 +28,8 @@ from lyapunov import lyapunov_spectrum
 W, A, K, C, T = 0.7, 0.3, 10.0, 0.5, 12.0
 SOLVERS = [Taylor(), DOP853(), Tsit5(), RadauIIA()]
 
-# The law of depth and rate, and q; then, as functions of w and the rate, the force, w**(q - 1) times its slope
-# in the depth, and its slope in the rate.
+# The law of depth and rate, and q; then, as functions of w and the rate: the force, w**(q - 1) times its
+# slope in the depth, and its slope in the rate.
 LAWS = {
     "Kuwabara-Kono": (
         lambda d, r, p: p.K * d**1.5 + p.c * np.sqrt(d) * r,
