@@ -33,6 +33,7 @@ class StatusCode(IntEnum):
     INTERRUPTED = 104
     INDISTINCT_TANGENTS = 105
     FAILED = 106
+    INFINITE_SLOPE = 107
 
 
 @attrs.frozen
@@ -156,4 +157,29 @@ def discontinuous_status(jumps: Mapping[str, str]) -> Status:
         "not valid beyond such a jump.",
         "hybrid.split(system) makes modes joined by guards of a field that is written with NumPy functions, "
         "with the sliding modes between them.",
+    )
+
+
+def steep_status(where: str, powers: Mapping[str, str], *, inside: bool) -> Status:
+    """Status of a run with tangent vectors if the slopes of fields are infinite where steps in time go.
+
+    ``powers`` maps modes to the powers in their fields. ``inside`` says that these powers switch inside of
+    the modes, not at guards.
+    """
+    named = ", and ".join(f"{words} in mode {mode!r}" for mode, words in powers.items())
+    remedy = (
+        "Write the powers of one guard with numbers such as 1/4, 1/3, 1/2 or 3/4 as exponents: then the mode "
+        "has a series in the root of that guard, which carries tangent vectors. "
+        "print(hybrid.compile_system(system)) says why it has none."
+    )
+    if inside:
+        remedy = (
+            "hybrid.split(system) makes guards of what switches inside of a mode: series in the root of a "
+            "guard carry tangent vectors across it."
+        )
+    return Status(
+        StatusCode.INFINITE_SLOPE,
+        f"{where} The slope of {named} is infinite where its base is zero: steps in time lose digits of the "
+        "tangent vectors there, and results computed from them are not valid.",
+        f"{remedy} Runs without tangent vectors are not affected.",
     )

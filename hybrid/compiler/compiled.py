@@ -19,7 +19,7 @@ from hybrid.compiler.operations import operations_of
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
 from hybrid.errors import ArgumentError
-from hybrid.kernels.types.codes import NARROW, NO_MODE, RUNGE_KUTTA
+from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
 from hybrid.system.functions import CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of
@@ -141,7 +141,9 @@ class CompiledSystem:
                 if growth is None or self._own:
                     self.parts[part] = compiled_part(self.emitted, part, self._own)
                 else:
-                    indices = max(len(self.system.modes), 2 * len(self.system.transitions))
+                    transitions = 2 * len(self.system.transitions)
+                    # Behind the fields of all modes there are two for a crossing at most.
+                    indices = len(self.system.modes) + transitions
                     self.parts[part] = compiled_stage(self.emitted, part, growth.written, indices)
         found: dict[str, Any] = self.parts[part]
         return found
@@ -161,6 +163,13 @@ class CompiledSystem:
         if tangents and self.takes_steps(kinds):
             needed |= self.functions(VARIATIONAL)
         return needed
+
+    def needs_series(self, mode: int) -> bool:
+        """Whether tangent vectors need the series of a mode, since the slope of its field may be infinite."""
+        return bool(self.emitted.steep[mode]) and self.emitted.propagators[mode].kind in (
+            DESINGULARISED,
+            ROOTED,
+        )
 
     def takes_steps(self, kinds: Sequence[int]) -> bool:
         """Whether runs by propagators of these kinds may need steps of a Runge-Kutta method."""
@@ -256,6 +265,10 @@ class CompiledSystem:
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
             fragile=_indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
+            steep=_indices(bool(powers) for powers in self.emitted.steep),
+            root=_indices(propagator.root for propagator in self.emitted.propagators),
+            field_before=_indices(before for before, _ in self.emitted.crossing),
+            field_behind=_indices(behind for _, behind in self.emitted.crossing),
             timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
             tangent_start=self.emitted.tangent_start,
             tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),

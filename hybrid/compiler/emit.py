@@ -29,6 +29,7 @@ from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
+from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
 from hybrid.compiler.written import Written, beyond_guards, variational
@@ -60,6 +61,9 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
+# Names of functions in expressions, and as they are written in models.
+_WRITTEN = {"Absolute": "abs", "CubeRoot": "cbrt", "Maximum": "maximum", "Minimum": "minimum", "Sign": "sign"}
+_CLASSES = re.compile("|".join(_WRITTEN))
 
 
 def emit(system: HybridSystem) -> Emitted:
@@ -102,11 +106,19 @@ def _emitted(system: HybridSystem) -> Emitted:
     affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
+    steep = [
+        writer.remembered(
+            ("steep", id(mode.field), tuple(around)),
+            partial(steep_at_guards, field.expressions, around, symbols),
+        )
+        for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
+    ]
+    crossing, at_crossings = fields_at_crossings(system, fields, steep, guards, resets, boundaries, symbols)
     jacobians = [without_zeros(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
     places = _places(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
-        "field": [field.value for field in evaluated],
+        "field": [*(field.value for field in evaluated), *at_crossings],
         "field_jacobian": [*jacobians],
         "variational_field": [
             writer.remembered(
@@ -127,7 +139,10 @@ def _emitted(system: HybridSystem) -> Emitted:
         "tangent_series": _placed(places, [each.tangent_statements for each in series]),
     }
     surface, orientation = writer.surfaces(traced)
-    pulses = [forcings(field.expressions, symbols) for field in fields]
+    pulses = [
+        forcings(field.expressions, known_positive(around), symbols)
+        for field, around in zip(fields, boundaries, strict=True)
+    ]
     forcing = [each for of_mode in pulses for each in of_mode]
     residual = [
         residues(field.expressions, _gradients(system, mode.name, guards), symbols)
@@ -162,6 +177,12 @@ def _emitted(system: HybridSystem) -> Emitted:
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
         ),
         proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
+        steep=tuple(_told(system, powers) for powers in steep),
+        steep_inside=tuple(
+            _told(system, steep_inside(field.expressions, around, symbols))
+            for field, around in zip(fields, boundaries, strict=True)
+        ),
+        crossing=crossing,
         timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
         propagators=tuple(map(_without_text, propagators)),
         tangent_start=places.vectors,
@@ -404,9 +425,19 @@ def _where_it_jumps(
         return "it branches" if may_jump(function.value, differentiable) else ""
     known = known_positive(boundaries)
     places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
+    return ", or ".join(_in_names(system, place) for place in places)
+
+
+def _told(system: HybridSystem, expressions: Sequence[sympy.Expr]) -> str:
+    """Expressions in the names of the model."""
+    text = ", ".join(_in_names(system, str(each)) for each in expressions)
+    return _CLASSES.sub(lambda match: _WRITTEN[match[0]], text)
+
+
+def _in_names(system: HybridSystem, text: str) -> str:
     names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
     names |= {f"p[{i}]": name for i, name in enumerate(system.parameters)}
-    return ", or ".join(_INDEXED.sub(lambda match: names[match[0]], place) for place in places)
+    return _INDEXED.sub(lambda match: names[match[0]], text)
 
 
 def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer: _Writer) -> bool:

@@ -54,6 +54,8 @@ class Propagator:
         By transition that leaves the mode: whether the series hold its guard in a column.
     fragile
         Whether the series may be undefined where the field is defined, as that of a root at zero.
+    root
+        The order of the root of guards that the series hold.
     """
 
     kind: int
@@ -62,6 +64,7 @@ class Propagator:
     series: Series = NO_SERIES
     guards: tuple[bool, ...] = ()
     fragile: bool = False
+    root: int = 1
 
     def __str__(self) -> str:
         return f"{PROPAGATORS[self.kind]} ({self.reason})"
@@ -140,6 +143,14 @@ class Emitted:
         Whether every function is proved to have the declared period, whatever the parameters.
     timed_guard
         By transition: whether the guard may depend on time.
+    steep
+        By mode: the powers of guards in its field, in words, whose slope may be infinite at the guard.
+    steep_inside
+        By mode: such powers of what switches inside of the mode.
+    crossing
+        By transition: the numbers of the fields before and behind it, at the crossing. They are those of its
+        modes, or of fields behind those of all modes, with steep powers that are exactly zero. The last is
+        NO_MODE if the run ends.
     propagators
         By mode: how it is best advanced.
     tangent_start
@@ -163,6 +174,9 @@ class Emitted:
     discontinuities: tuple[str, ...]
     proved_period: bool
     timed_guard: tuple[bool, ...]
+    steep: tuple[str, ...]
+    steep_inside: tuple[str, ...]
+    crossing: tuple[tuple[int, int], ...]
     propagators: tuple[Propagator, ...]
     tangent_start: int
 

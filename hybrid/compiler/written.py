@@ -10,9 +10,10 @@ import sympy
 from hybrid.compiler.jacobians import CELL
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
-from hybrid.symbolic.expressions import ZERO, Less, Maximum, Select
+from hybrid.symbolic.expressions import ZERO, CubeRoot, Less, Maximum, Select
 from hybrid.symbolic.nodes import mentions, nodes_of, replaced
 from hybrid.symbolic.printer import assignments
+from hybrid.symbolic.signs import simplified
 from hybrid.symbolic.tracing import Symbols
 
 
@@ -31,17 +32,19 @@ def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbo
     """The field of a mode, with roots of its guards that are zero beyond the guard.
 
     Inside the mode nothing changes. Where the mode begins and ends, rounding leaves the state on either side
-    of the guard: there ``(-x.q)**1.5`` is no number, but ``np.maximum(-x.q, 0)**1.5`` is.
+    of the guard: there ``(-x.q)**1.5`` is no number, but ``np.maximum(-x.q, 0)**1.5`` is. The slope of a root
+    is zero there too, although that inside the mode may grow without limit towards the guard.
     """
     if field.expressions is None or field.jacobian is None:
         return field
-    known = known_positive(boundaries)
+    known, entries = known_positive(boundaries), [entry for row in field.jacobian for entry in row]
     roots = _roots_inside(field.expressions, known, symbols)
-    if not roots:
+    slopes = _slopes_inside(entries, known, symbols)
+    if not roots and not slopes:
         return field
-    roots |= _roots_inside([entry for row in field.jacobian for entry in row], known, symbols)
+    slopes = _roots_inside(entries, known, symbols) | slopes
     expressions = [replaced(entry, roots) for entry in field.expressions]
-    jacobian = [[replaced(entry, roots) for entry in row] for row in field.jacobian]
+    jacobian = [[replaced(entry, slopes) for entry in row] for row in field.jacobian]
     n, derivative = len(symbols.x), field.derivative
     if not field.given:
         cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
@@ -67,6 +70,21 @@ def _roots_inside(
                     # With a negative factor the root has no value inside the mode, which must show.
                     found[power] = Select(Less(ZERO, factor), extended, power.base) ** power.exp
                 break
+    return found
+
+
+def _slopes_inside(
+    entries: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
+) -> dict[sympy.Expr, sympy.Expr]:
+    """Powers of the guards that may be infinite there, and what takes their place: zero at the guard."""
+    found: dict[sympy.Expr, sympy.Expr] = {}
+    for power in nodes_of(sympy.Pow, *entries):
+        if power.exp.is_positive or not mentions(power.base, symbols.variables):
+            continue
+        base = power.base.args[0] if isinstance(power.base, CubeRoot) else power.base
+        base = simplified(base, known)
+        if any(is_multiple(base, guard, symbols) for guard in known):
+            found[power] = Select(Less(ZERO, base), power, ZERO)
     return found
 
 

@@ -15,6 +15,7 @@ from hybrid.status import (
     chatter_status,
     discontinuous_status,
     run_status,
+    steep_status,
     stuck_status,
 )
 from hybrid.system.growth import Unexplored
@@ -104,6 +105,9 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "the limit of several transitions that accumulate in turn.",
             "The tangent vectors are not valid after these jumps. Move the parameters away from the grazing.",
         )
+    steep = _steep(trajectory, code)
+    if steep is not None:
+        return steep
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
         jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
         return discontinuous_status({mode: where for mode, where in jumping if where})
@@ -138,6 +142,22 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     last = run.last_fired
     bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
     return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
+
+
+def _steep(trajectory: Trajectory, code: int) -> Status | None:
+    """Status of a run whose tangent vectors met the infinite slope of a field in steps in time, else None."""
+    if not trajectory.tangents:
+        return None
+    emitted, modes = trajectory.compiled.emitted, trajectory.system.mode_names
+    powers = {mode: words for mode, words in zip(modes, emitted.steep, strict=True) if words}
+    inside = {mode: words for mode, words in zip(modes, emitted.steep_inside, strict=True) if words}
+    failed = code in (codes.NON_FINITE, codes.STEP_TOO_SMALL)
+    where = f"The run stopped {_place(trajectory)}." if failed else "Reached the end."
+    if trajectory.run.steep_jumps or (failed and trajectory.mode in powers):
+        return steep_status(where, powers, inside=False)
+    if inside and (code == codes.DONE or (failed and trajectory.mode in inside)):
+        return steep_status(where, inside, inside=True)
+    return None
 
 
 def _place(trajectory: Trajectory) -> str:

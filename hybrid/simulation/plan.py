@@ -59,12 +59,13 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
     """
     plan = compiled.plans.get((solver, tangents, by_steps))
     if plan is None:
-        system, method = compiled.system, kernel_method(solver)
+        system = compiled.system
         load_kernels("hybrid.kernels.events.initial_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
-        kinds = propagator_kinds(compiled, solver)
+        kinds = propagator_kinds(compiled, solver, tangents)
         if by_steps is not None:
             kinds[by_steps] = codes.RUNGE_KUTTA
+        method = kernel_method(solver, any(kind != codes.RUNGE_KUTTA for kind in kinds))
         parts, attempts = driver_parts(
             compiled.takes_steps(kinds), solver.attempt, bool(compiled.emitted.forcing_component)
         )
@@ -101,8 +102,8 @@ def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:
 
 
 @lru_cache(MOST_LAYOUTS)
-def kernel_method(solver: Solver) -> Any:
-    """The kernel's view of a solver: tableau and tolerances."""
+def kernel_method(solver: Solver, series: bool) -> Any:
+    """The kernel's view of a solver: tableau and tolerances; with ``series``, some modes have series."""
     tableau = solver.tableau
     return Method(
         a=tableau.a,
@@ -117,7 +118,7 @@ def kernel_method(solver: Solver) -> Any:
         series_nodes=SERIES_NODES,
         series_weights=SERIES_WEIGHTS,
         implicit=int(tableau.implicit),
-        order=solver.series_order,
+        order=solver.series_order if series else 0,
         exponent=1.0 / tableau.error_order,
         rtol=solver.rtol,
         atol=solver.atol,
@@ -154,10 +155,12 @@ def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[A
     return parts, attempts
 
 
-def propagator_kinds(compiled: CompiledSystem, solver: Solver) -> list[int]:
-    """How each mode is advanced: by the series of the model only if the solver has an order for them."""
-    modes = compiled.emitted.propagators
-    return [each.kind for each in modes] if solver.series_order else [codes.RUNGE_KUTTA] * len(modes)
+def propagator_kinds(compiled: CompiledSystem, solver: Solver, tangents: int) -> list[int]:
+    """How each mode is advanced: by its series if the solver prefers them, or tangent vectors need them."""
+    return [
+        each.kind if solver.by_series or (tangents > 0 and compiled.needs_series(mode)) else codes.RUNGE_KUTTA
+        for mode, each in enumerate(compiled.emitted.propagators)
+    ]
 
 
 def dense_degree(compiled: CompiledSystem, method: Any, kinds: list[int]) -> int:

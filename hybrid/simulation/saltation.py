@@ -85,10 +85,9 @@ def matrices_at(
     """Saltation matrices ``(J, n, n)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
     n = system.dimension
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
-    sources = [system.mode_index(transition.source) for transition in system.transitions]
     kernel = load_kernels("hybrid.kernels.jumps.jump").saltation
-    work, x_plus = workspace(kernel_method(Tsit5()), n, 0, 0), np.empty(n)
+    work, x_plus = workspace(kernel_method(Tsit5(), False), n, 0, 0), np.empty(n)
     for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
-        transversalities[i] = kernel(model, fired, sources[fired], phase, state, x_plus, work)
+        transversalities[i] = kernel(model, fired, phase, state, x_plus, work)
         matrices[i] = work.saltation
     return matrices, transversalities

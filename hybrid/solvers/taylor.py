@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import ceil, log
 from typing import ClassVar
 
 import attrs
@@ -10,12 +9,6 @@ import attrs
 from hybrid.solvers.dop853 import DOP853
 from hybrid.solvers.solver import Solver
 from hybrid.solvers.tableau import Tableau
-
-LOWEST_SERIES_ORDER = 12
-# Higher orders take longer steps, whose errors show first in the energy of a contact.
-HIGHEST_SERIES_ORDER = 28
-# Orders added to the order with the fewest operations per unit of time, since each step has a fixed cost.
-MORE_ORDERS = 6
 
 
 @attrs.frozen
@@ -29,6 +22,7 @@ class Taylor(Solver):
       advanced in its own time ``s``, ``dt = w ds`` with ``w`` the square root of the guard, in which the
       solution is smooth, also at entry and exit. If the rate of the guard also has the factor ``w``, as for
       the level of a tank that empties, ``h' = -sqrt(h)``, the root is smooth in time, and is integrated.
+      Thirds, quarters and so on have roots of their own order.
     - **Taylor series**: any other analytic field. Order and steps follow from the tolerances (Jorba and Zou
       2005, section 3).
     - **Runge-Kutta pair** DOP853: fields that cannot be traced or have kinks inside the mode.
@@ -47,12 +41,4 @@ class Taylor(Solver):
     """
 
     tableau: ClassVar[Tableau] = DOP853.tableau
-
-    @property
-    def series_order(self) -> int:
-        """Order of the series in nonlinear modes.
-
-        The series alone costs least at the order for which a step of 1/e of the convergence radius meets the
-        tolerance. A few orders more make the steps longer.
-        """
-        return min(HIGHEST_SERIES_ORDER, max(LOWEST_SERIES_ORDER, ceil(-log(self.rtol)) + MORE_ORDERS))
+    by_series: ClassVar[bool] = True

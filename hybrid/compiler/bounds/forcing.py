@@ -17,8 +17,10 @@ import sympy
 from sympy.codegen.cfunctions import exp2, expm1
 
 from hybrid.compiler.emitted import OF_STATE
+from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.symbolic.expressions import Absolute, Maximum, Together
-from hybrid.symbolic.nodes import degree_of, mentions, once
+from hybrid.symbolic.nodes import degree_of, mentions, nodes_of, once
+from hybrid.symbolic.signs import simplified
 from hybrid.symbolic.tracing import Symbols
 
 # Products of more factors that vary than these, such as ``(1 - t**2)**100``, are narrow pulses.
@@ -72,22 +74,32 @@ def times_of(field: Sequence[sympy.Expr], symbols: Symbols) -> Times:
     return Times((symbols.t, *passing), (symbols.t, *clocks), tuple(x for x in symbols.x if x not in clocks))
 
 
-def forcings(field: Sequence[sympy.Expr] | None, symbols: Symbols) -> tuple[Forcing, ...]:
+def forcings(
+    field: Sequence[sympy.Expr] | None, known: Sequence[sympy.Expr], symbols: Symbols
+) -> tuple[Forcing, ...]:
     """The largest parts of a field in times and parameters alone, without their harmless terms.
 
-    Empty for a field that was not traced.
+    Empty for a field that was not traced. ``known`` are guards that are positive in the mode. Its series hold
+    the roots of guards.
     """
     if field is None:
         return ()
+    roots = frozenset(
+        power
+        for power in nodes_of(sympy.Pow, *field)
+        if not power.exp.is_Integer
+        and mentions(power.base, symbols.x)
+        and any(is_multiple(simplified(power.base, known), guard, symbols) for guard in known)
+    )
     times = times_of(field, symbols)
     found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, times))
-    if not found and any(_saturates(entry, symbols.variables) for entry in field):
+    if not found and any(_saturates(entry, symbols.variables, roots) for entry in field):
         found[Forcing(None, OF_STATE)] = None
     return tuple(found)
 
 
 @once
-def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> bool:
+def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...], roots: frozenset[sympy.Expr]) -> bool:
     """Whether an expression may change where its series is flat to all digits.
 
     ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so are ``x/sqrt(x**2 + 1e-16)``, ``(x/5)**40`` for
@@ -108,12 +120,12 @@ def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> bool:
         mentions(node.exp, variables) or (node.exp.is_Integer and abs(node.exp) > MOST_FACTORS)
     ):
         return True
-    if node.is_Pow and not node.exp.is_Integer:
+    if node.is_Pow and not node.exp.is_Integer and node not in roots:
         bases = node.base.args if isinstance(node.base, Maximum | Absolute) else (node.base,)
         degrees = [degree_of(base, own) for base in bases]
         if any(degree is None or degree > 1 for degree in degrees):
             return True
-    return any(_saturates(part, variables) for part in node.args)
+    return any(_saturates(part, variables, roots) for part in node.args)
 
 
 @once

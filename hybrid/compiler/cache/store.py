@@ -67,10 +67,11 @@ def _read(path: Path) -> Emitted | None:
     try:
         found: dict[str, Any] = json.loads(content)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        of_modes = ("autonomous", "discontinuities", "traced_field")
+        of_modes = ("autonomous", "discontinuities", "traced_field", "steep", "steep_inside")
         parts = ("first_forcing", "forcing_component", "first_residue", "residue_component")
         for name in (*of_transitions, *of_modes, "timed_guard", *parts):
             found[name] = tuple(found[name])
+        found["crossing"] = tuple(map(tuple, found["crossing"]))
         found["slope_columns"] = tuple(tuple(map(tuple, rows)) for rows in found["slope_columns"])
         names = ("rows", "checked", "numbers", "first")
         rows, checked, numbers, first = (found["programs"][name] for name in names)

@@ -1,4 +1,4 @@
-"""Half-integer powers of one guard, such as a Hertz contact, on a clock of their own."""
+"""Fractional powers of one guard, such as a Hertz contact, on a clock of their own."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import sympy
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
 from hybrid.compiler.propagators.writing import CLOCK, Body, harmonics_of, names_of_state, seeds_of
-from hybrid.compiler.taylor.roots import ROOT, in_roots, on_clock, slope_along
+from hybrid.compiler.taylor.roots import ROOT, in_roots, is_crossed, on_clock, slope_along
+from hybrid.compiler.taylor.series import NoSeries
 from hybrid.kernels.types.codes import DESINGULARISED
 from hybrid.symbolic.derivatives import directional, divergence
 from hybrid.symbolic.nodes import replaced
@@ -18,15 +19,19 @@ from hybrid.symbolic.tracing import Symbols
 
 
 def desingularised(mode: Equations) -> Propagator | str:
-    """Series on the clock ``dt = w ds``, where ``w`` is the square root of the guard."""
+    """Series on the clock ``dt = w**(q-1) ds``, where ``w`` is the root of the guard of the order ``q``."""
     if not mode.bases:
-        return "it has no half-integer power of a guard"
+        return "it has no fractional power of a guard"
     if len(mode.bases) > 1:
         return "it has fractional powers of more than one guard"
-    [z] = mode.bases
-    written = _write_desingularised(mode.field, mode.boundaries, mode.guards, z, mode.symbols)
-    reason = "half-integer powers of a guard, on the clock dt = w ds"
-    return Propagator(DESINGULARISED, 0, reason, written, tuple(mode.held))
+    [(z, order)] = mode.bases.items()
+    if order > 2 and not is_crossed(mode.field, z, order, mode.symbols):
+        # On the clock the root would fall exponentially, and never reach zero.
+        raise NoSeries("it has fractional powers of a guard whose rate may vanish with the guard")
+    written = _write_desingularised(mode.field, mode.boundaries, mode.guards, z, order, mode.symbols)
+    powers, clock = ("half-integer powers", "w") if order == 2 else ("fractional powers", f"w^{order - 1}")
+    reason = f"{powers} of a guard, on the clock dt = {clock} ds"
+    return Propagator(DESINGULARISED, 0, reason, written, tuple(mode.held), root=order)
 
 
 def _write_desingularised(
@@ -34,12 +39,13 @@ def _write_desingularised(
     boundaries: Sequence[Boundary],
     guards: Sequence[sympy.Expr],
     z: sympy.Expr,
+    order: int,
     symbols: Symbols,
 ) -> Series:
-    """Series on the clock ``dt = w ds``, ``w = sqrt(z)``, where half-integer powers of ``z`` are smooth.
+    """Series on the clock ``dt = w**(q-1) ds``, ``z = w**q``, where powers of ``z`` are powers of ``w``.
 
-    All fields are multiplied by ``w``, and ``dw/ds = (dz/dt)/2``. The root is never started at zero exactly:
-    with a speed of zero too it would stay there. What it is started at is below the rounding of ``z``.
+    All fields are multiplied by ``w**(q-1)``, and ``dw/ds = (dz/dt)/q``. The slope of a power of ``z`` is no
+    worse than ``w**(1-q)``, so tangent vectors are smooth too, where that slope is infinite in time.
 
     A guard is a small difference of states, and its rounding is felt: by the energy, and a thousandfold by
     the tangent vectors. The root has none of that. So a step goes on with the root that the last one ended
@@ -54,23 +60,24 @@ def _write_desingularised(
     slope = replaced(slope_along(field, z, symbols), harmonics)
     # Where z vanishes, its root crosses zero with a nonzero slope.
     roots = in_terms_of_root(boundaries, z, ROOT, symbols)
-    crossing = [roots.get(place, in_roots(guard, z)) for place, guard in enumerate(guards)]
+    crossing = [roots.get(place, in_roots(guard, z, order)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)
-    body.start_root("root", z, min(roots))
+    body.start_root("root", z, order, min(roots), goes_on=True)
     # A guard that moves with the forcing has the harmonics in its powers in the field, too.
     z = replaced(z, harmonics)
-    body.at_start[z] = "root*root"
-    rates = [on_clock(rate, z) for rate in field]
-    tangents = [on_clock(along, z) for along in directional(field, seeds)]
-    trace = on_clock(divergence(field, symbols.x), z)
-    turning = [ROOT * replaced(function.diff(symbols.t), harmonics) for function in harmonics]
+    body.at_start[z] = "*".join(["root"] * order)
+    rates = [on_clock(rate, z, order) for rate in field]
+    tangents = [on_clock(along, z, order) for along in directional(field, seeds)]
+    trace = on_clock(divergence(field, symbols.x), z, order)
+    pace = ROOT ** (order - 1)
+    turning = [pace * replaced(function.diff(symbols.t), harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
     return body.assemble(
         [*symbols.x, None, ROOT, *harmonics.values()],
         [*columns, clock, root, *driven],
         [*starts, "0.0", "root", *begun],
-        [*rates, ROOT, in_roots(slope / 2, z), *turning],
+        [*rates, pace, in_roots(slope / order, z, order), *turning],
         crossing,
         trace,
         tangents,

@@ -6,13 +6,13 @@ What a guard says of the states inside its mode is used: where ``x1 - x2 >= 0`` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
 import attrs
 import sympy
 
-from hybrid.compiler.taylor.roots import is_multiple, singular_bases
+from hybrid.compiler.taylor.roots import is_multiple, singular_bases, with_fractions
 from hybrid.symbolic.derivatives import partial_derivatives
 from hybrid.symbolic.expressions import ZERO, Together
 from hybrid.symbolic.nodes import mentions, nodes
@@ -55,7 +55,7 @@ class Equations:
     symbols
         Those of time, state and parameters.
     bases
-        Guards whose half-integer powers the field has.
+        Guards whose fractional powers the field has, with the order of the root that makes them smooth.
     held
         For each guard, whether the series of the mode hold it.
     """
@@ -63,7 +63,7 @@ class Equations:
     field: Sequence[sympy.Expr]
     boundaries: Sequence[Boundary]
     symbols: Symbols
-    bases: Sequence[sympy.Expr]
+    bases: Mapping[sympy.Expr, int]
     held: Sequence[bool]
 
     @cached_property
@@ -96,13 +96,13 @@ def equations_of(field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], sy
         If the field has a fractional power of an expression that is no guard.
     """
     known = known_positive(boundaries)
-    field = [simplified(entry, known) for entry in field]
+    field = [with_fractions(simplified(entry, known), known) for entry in field]
     bases = singular_bases(field, known, symbols)
     held = tuple(_is_held(boundary, bases, symbols) for boundary in boundaries)
     return Equations(field, boundaries, symbols, bases, held)
 
 
-def _is_held(boundary: Boundary, bases: Sequence[sympy.Expr], symbols: Symbols) -> bool:
+def _is_held(boundary: Boundary, bases: Iterable[sympy.Expr], symbols: Symbols) -> bool:
     """Whether the series of a mode hold the guard: it is affine, or the series may hold its root."""
     guard = boundary.guard
     if guard is None:

@@ -18,13 +18,18 @@ from hybrid.symbolic.tracing import Symbols
 
 def rooted(mode: Equations) -> Propagator | str:
     """Series in time of the state and of those roots of guards that are smooth in time."""
-    candidates = (regular_root(mode.field, z, place, mode.symbols) for place, z in enumerate(mode.bases))
+    candidates = (
+        regular_root(mode.field, z, order, place, mode.symbols)
+        for place, (z, order) in enumerate(mode.bases.items())
+    )
     roots = [root for root in candidates if root is not None]
     if not roots:
         return "no root of a guard in it is smooth in time"
     written = _write_rooted(mode.field, mode.boundaries, mode.guards, roots, mode.symbols)
-    reason = "half-integer powers of a guard, whose root is smooth"
-    return Propagator(ROOTED, 0, reason, written, tuple(mode.held))
+    powers = "half-integer" if all(root.order == 2 for root in roots) else "fractional"
+    reason = f"{powers} powers of a guard, whose root is smooth"
+    largest = max(root.order for root in roots)
+    return Propagator(ROOTED, 0, reason, written, tuple(mode.held), root=largest)
 
 
 def _write_rooted(
@@ -34,20 +39,20 @@ def _write_rooted(
     roots: Sequence[Root],
     symbols: Symbols,
 ) -> Series:
-    """Series in time of the states and of the roots; powers of the roots replace half-integer powers."""
+    """Series in time of the states and of the roots; powers of the roots replace fractional powers."""
     body = Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
 
     def in_all_roots(expression: sympy.Expr) -> sympy.Expr:
         for root in roots:
-            expression = in_roots(expression, root.base, root.symbol)
+            expression = in_roots(expression, root.base, root.order, root.symbol)
         return expression
 
     signed: dict[int, sympy.Expr] = {}
     names = [f"root_{root.symbol}" for root in roots]
     for name, root in zip(names, roots, strict=True):
         places = in_terms_of_root(boundaries, root.base, root.symbol, symbols)
-        body.start_root(name, root.base, min(places))
+        body.start_root(name, root.base, root.order, min(places), goes_on=False)
         signed |= places
     crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)

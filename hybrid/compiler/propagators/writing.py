@@ -11,7 +11,7 @@ from hybrid.compiler.propagators.equations import ELEMENTARY
 from hybrid.compiler.taylor.loops import StateLoop, TangentLoop, indented, padded
 from hybrid.compiler.taylor.pairs import columns_of
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences
-from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.kernels.types.codes import FROM_LAST_STEP, FROM_ZERO, NARROW, WIDE
 from hybrid.symbolic.constants import Constants
 from hybrid.symbolic.derivatives import directional, divergence
 from hybrid.symbolic.nodes import mentions, nodes_of
@@ -21,7 +21,7 @@ from hybrid.symbolic.tracing import Symbols
 # Columns after those of the guards: the time since the start of the step, the integral of div f. All columns
 # up to here are written and evaluated as whole vectors. The root of a desingularised mode comes next.
 CLOCK, DIVERGENCE, OTHERS = range(3)
-# Smallest start of the square root of a guard, as a share of the sizes of the terms of the guard.
+# Smallest start of a guard whose root is taken, as a share of the sizes of the terms of the guard.
 FLOOR = 1e-17
 # As a share of these sizes: smaller differences between the guard and the square of the root are rounding.
 SAME_ROOT = 1e-13
@@ -89,16 +89,28 @@ class Body:
         """A column after those of the guards."""
         return str(self.behind_guards + place)
 
-    def start_root(self, name: str, z: sympy.Expr, place: int) -> None:
-        """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place."""
+    def start_root(self, name: str, z: sympy.Expr, order: int, place: int, *, goes_on: bool) -> None:
+        """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place.
+
+        With a speed of zero too, a root of zero would stay there. So a root that is small starts below the
+        rounding of ``z``. It starts at zero only where the kernel knows that the guard is zero and moves on.
+        A root that ``goes_on`` starts with its value at the end of the last step. Its error is as small as
+        that of the speed of ``z``; near zero, the error of ``z`` itself would make a far larger one.
+        """
         size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
-        self.at_start[z] = f"{name}*{name}"
+        power = "*".join(["last"] * order)
+        self.at_start[z] = "*".join([name] * order)
+        least = f"max(z, {FLOOR}*size, 1e-300)"
         self.preamble += [
             *assignments(["z", "size"], [z, size]),
             f"last = abs(out[order + 1, {self.n + place}])",
+            f"origin = out[order + 2, {self.n + place}]",
+            f"apart = abs({power} - z)",
             # A stored value this close to the root is taken as the root, whichever step stored it.
-            f"same = abs(last*last - z) <= {SAME_ROOT}*size < z",
-            f"{name} = last if same else sqrt(max(z, {FLOOR}*size, 1e-300))",
+            f"same = apart <= {SAME_ROOT}*size < z",
+            *([f"same = same or origin == {FROM_LAST_STEP}.0"] if goes_on else []),
+            f"{name} = last if same else {f'sqrt({least})' if order == 2 else f'{least}**{1 / order!r}'}",
+            f"{name} = 0.0 if origin == {FROM_ZERO}.0 else {name}",
         ]
 
     def allot(self) -> str:

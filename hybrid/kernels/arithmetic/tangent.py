@@ -135,7 +135,7 @@ def keep_apart(model, run, mode, tangents, gram):
         return
     run.indistinct += orthonormalise(run.y, n, tangents, run.growth, gram, False)
     run.strain = 0.0
-    if run.stage == READY:
+    if kind == RUNGE_KUTTA and run.stage == READY:
         run.stage = STALE
 
 

@@ -12,9 +12,11 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.guards import (
+    PLACE,
     ROUNDING_OF_STATE,
     guard_acceleration,
     size_of_time,
+    slopes_at_guard,
     spread_of_terms,
 )
 from hybrid.kernels.types.layout import EPSILON
@@ -23,7 +25,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 # Relative rounding of a state.
 SHARE = ROUNDING_OF_STATE * EPSILON
 # Rows of ``work.rounding``.
-SPREADS, BENDS, SPREADS_OF_BENDS, PLACE = range(4)
+SPREADS, BENDS, SPREADS_OF_BENDS = range(3)
 
 
 @njit(**INLINE)
@@ -46,7 +48,7 @@ def spread_rates(model, run, transition, mode, t, x, work):
     ``work.field`` and ``work.gradient`` are current; ``work.jacobian`` is on return.
     """
     n, spreads = model.dimension, work.rounding[SPREADS]
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    slopes_at_guard(model, run, transition, mode, t, x, work)
     for i in range(n):
         spreads[i] = _spread(model, run, mode, t, i, work) if _matters(model, transition, i, work) else 0.0
     first = model.target.shape[0] + model.first_forcing[-1]
@@ -105,7 +107,7 @@ def acceleration_rounding(model, run, transition, mode, t, x, work):
 
     ``work.field`` and ``work.gradient`` are current.
     """
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    slopes_at_guard(model, run, transition, mode, t, x, work)
     _bend_rates(model, run, transition, mode, t, work)
     return SHARE * _size(work.gradient, work.rounding[SPREADS_OF_BENDS], model.dimension)
 
@@ -238,7 +240,7 @@ def acceleration_sign(model, run, transition, mode, t, x, work):
     ``work.field`` and ``work.gradient`` are current. The curvature of a guard that could not be traced counts
     as exact.
     """
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    slopes_at_guard(model, run, transition, mode, t, x, work)
     _bend_rates(model, run, transition, mode, t, work)
     acceleration, rounding = _derivative(model, transition, t, x, True, work)
     if math.isnan(acceleration):

@@ -12,6 +12,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
+# The row of ``work.rounding`` for a place beside the state.
+PLACE = 3
 
 
 @njit(**INLINE)
@@ -186,7 +188,7 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     field. That of any other guard is the difference quotient of its speed.
     """
     n = model.dimension
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    slopes_at_guard(model, run, transition, mode, t, x, work)
     total = 0.0
     for i in range(n):
         if work.gradient[i] != 0.0:
@@ -212,6 +214,30 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     after = guard_speed(model, transition, t + epsilon, work.state, work.field, work.gradient)
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     return total + (after - before) / epsilon
+
+
+@njit(**KERNEL)
+def slopes_at_guard(model, run, transition, mode, t, x, work):
+    """The Jacobian of a mode at a guard into ``work.jacobian``; ``work.gradient`` is current.
+
+    The slope of a root of the guard grows without limit towards the guard. Next to the guard it is no measure
+    of what rounding does to the rates. Just beyond the guard, where the mode ends, it is zero.
+    """
+    n, direction = model.dimension, model.direction[transition]
+    if model.steep[mode] == 1 and direction != 0:
+        value = abs(guard_value(model, transition, t, x, work.scalar))
+        size, square = abs(work.gradient[n]) * size_of_time(model, t), 0.0
+        for i in range(n):
+            size += abs(work.gradient[i]) * run.scale[i]
+            square += work.gradient[i] * work.gradient[i]
+        band = ROUNDING_OF_STATE * EPSILON * size
+        if square > 0.0 and value <= LEFT_BEHIND * band:
+            place = work.rounding[PLACE]
+            for i in range(n):
+                place[i] = x[i] + direction * (value + band) * work.gradient[i] / square
+            model.field_jacobian(mode, t, place, model.parameters, work.jacobian)
+            return
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
 
 
 @njit(**KERNEL)

@@ -42,6 +42,7 @@ from hybrid.kernels.jumps.locked import (
 )
 from hybrid.kernels.jumps.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
 from hybrid.kernels.jumps.skipped import MANY_AT_ONCE, has_come_to_rest, jumps_in_turn, way_is_free
+from hybrid.kernels.jumps.steep import is_steep, is_steep_behind
 from hybrid.kernels.types.codes import (
     ENTERING,
     GRAZING,
@@ -57,22 +58,24 @@ from hybrid.kernels.types.task import task_of
 
 
 @njit(**KERNEL)
-def cross(model, transition, mode, t, x_minus, x_plus, work):
+def cross(model, transition, before, behind, t, x_minus, x_plus, work):
     """The state after the jump into ``x_plus (n,)``, and all terms of its saltation matrix.
+
+    ``before`` and ``behind`` are the numbers of the fields on the two sides.
 
     ``D_x R`` and ``D_t R`` into ``work.reset_jacobian``, ``f_plus - D_x R f_minus - D_t R`` into
     ``work.settled``; returns the transversality. After a transition that ends the run the state stays where
     it is, ``f_plus = 0``.
     """
     n = model.dimension
-    model.field(mode, t, x_minus, model.parameters, work.field)
+    model.field(before, t, x_minus, model.parameters, work.field)
     transversality = guard_speed(model, transition, t, x_minus, work.field, work.gradient)
     model.reset(transition, t, x_minus, model.parameters, x_plus)
     model.reset_jacobian(transition, t, x_minus, model.parameters, work.reset_jacobian)
     for i in range(n):
         work.field_after[i] = 0.0
-    if model.target[transition] != NO_MODE:
-        model.field(model.target[transition], t, x_plus, model.parameters, work.field_after)
+    if behind != NO_MODE:
+        model.field(behind, t, x_plus, model.parameters, work.field_after)
     for i in range(n):
         difference = work.field_after[i] - work.reset_jacobian[i, n]
         for j in range(n):
@@ -81,8 +84,8 @@ def cross(model, transition, mode, t, x_minus, x_plus, work):
     return transversality
 
 
-@exported(REAL, Model, INTEGER, INTEGER, REAL, VECTOR, VECTOR, Work)
-def saltation(model, transition, mode, t, x_minus, x_plus, work):
+@exported(REAL, Model, INTEGER, REAL, VECTOR, VECTOR, Work)
+def saltation(model, transition, t, x_minus, x_plus, work):
     """Saltation matrix into ``work.saltation (n, n)`` and the state after the jump into ``x_plus (n,)``.
 
     ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
@@ -91,7 +94,8 @@ def saltation(model, transition, mode, t, x_minus, x_plus, work):
     of each entry go to ``work.sizes``.
     """
     n = model.dimension
-    transversality = cross(model, transition, mode, t, x_minus, x_plus, work)
+    before, behind = model.field_before[transition], model.field_behind[transition]
+    transversality = cross(model, transition, before, behind, t, x_minus, x_plus, work)
     for i in range(n):
         terms = abs(work.field_after[i]) + abs(work.reset_jacobian[i, n])
         for j in range(n):
@@ -253,10 +257,10 @@ def cross_without_map(model, run, transition, mode, work):
 
 
 @njit(**KERNEL)
-def cross_with_map(model, run, transition, mode, tangents, work):
+def cross_with_map(model, run, transition, tangents, work):
     """Cross a guard that sets the time of the jump, and begin an instant; returns the transversality."""
     n = model.dimension
-    transversality = saltation(model, transition, mode, run.phase, run.y, work.new, work)
+    transversality = saltation(model, transition, run.phase, run.y, work.new, work)
     change_of_instant(run, n, transversality, work)
     begin_instant(run, n, tangents, work)
     return transversality
@@ -270,8 +274,8 @@ def recall_map(model, run, tangents, work):
         begin_at_start(run, n, tangents)
     if run.map_is_known == 1:
         return
-    fired, mode, x_minus = run.last_fired, run.previous_mode, run.instant[:n]
-    transversality = saltation(model, fired, mode, run.phase, x_minus, work.new, work)
+    fired, x_minus = run.last_fired, run.instant[:n]
+    transversality = saltation(model, fired, run.phase, x_minus, work.new, work)
     change_of_instant(run, n, transversality, work)
     keep_map(run, n, work)
 
@@ -291,12 +295,14 @@ def jump(task, transition):
     run.locked = 0
     # A locked jump inherits the grazing flag of the jump that triggered it.
     kind = run.last_kind if locked else TRANSVERSE
+    steep = tangents > 0 and not locked and is_steep(model, method, run, transition, tangents, work)
     if locked:
         recall_map(model, run, tangents, work)
-        transversality = cross(model, transition, mode, run.phase, run.y, work.new, work)
+        target = model.target[transition]
+        transversality = cross(model, transition, mode, target, run.phase, run.y, work.new, work)
         follow(run, n, work)
     elif known:
-        transversality = cross_with_map(model, run, transition, mode, tangents, work)
+        transversality = cross_with_map(model, run, transition, tangents, work)
     else:
         transversality = cross_without_map(model, run, transition, mode, work)
     judged = asked and not locked and model.marker[transition] == 0
@@ -318,6 +324,9 @@ def jump(task, transition):
         if kind == GRAZING:
             run.ill_conditioned_growth += grown
     leave(model, run, transition, transversality, work)
+    if tangents > 0 and not steep and not locked:
+        steep = is_steep_behind(model, method, run, transition, tangents, work)
+    run.steep_jumps += 1 if steep else 0
 
 
 @njit(**KERNEL)

@@ -361,6 +361,19 @@ def _is_finite(model, mode, tangents, order, work):
 
 
 @njit(**KERNEL)
+def _is_beyond_guard(model, run, order, s, work):
+    """Whether a place on the clock of a mode lies beyond a guard in the series: the mode ends before."""
+    first = model.first_outgoing[run.mode]
+    for slot in range(first, model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        if model.guard_in_series[transition] == 1:
+            value, _ = _value_and_slope(work.series, model.dimension + slot - first, order, s)
+            if value * run.side[transition] < 0.0:
+                return True
+    return False
+
+
+@njit(**KERNEL)
 def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
     """Whether the series has the field as its derivative at the nodes: its order may not know a pulse yet.
 
@@ -379,6 +392,8 @@ def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
         if clock >= 0:
             t, pace = _value_and_slope(series, clock, order, s)
             t += start
+            if _is_beyond_guard(model, run, order, s, work):
+                break
         rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, field)
         for i in range(length):
             other[i] = field[i]

@@ -24,6 +24,7 @@ from hybrid.kernels.arithmetic.lanes import (
 )
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
+from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
@@ -40,11 +41,15 @@ from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
+    FROM_LAST_STEP,
+    FROM_STATE,
+    FROM_ZERO,
     GO_ON,
     HIGHEST_ORDER,
     NARROW,
     NO_TRANSITION,
     NON_FINITE,
+    READY,
     ROOTED,
     STEP_TOO_SMALL,
     WIDE,
@@ -294,13 +299,30 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
 
 
 @njit(**KERNEL)
+def set_origins(model, run, order, series):
+    """Tell the series what they may take the roots of guards from.
+
+    The state shows a guard only up to the tolerances and up to rounding, and a root of either is far larger.
+    So a root that a step ended with is the start of the next one, and is zero where the guard is.
+    """
+    mode, n = run.mode, model.dimension
+    first = model.first_outgoing[mode]
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        origin = FROM_LAST_STEP if run.stage == READY else FROM_STATE
+        if run.on_guard[model.outgoing[slot]] == BY_SPEED:
+            origin = FROM_ZERO
+        series[order + 2, n + slot - first] = origin
+
+
+@njit(**KERNEL)
 def reach_guard(model, run, tangents, transition, t, longest, work):
     """Bring the state onto the guard by an Euler step in time, whose length is returned.
 
     A contact ends where the root of its guard vanishes, and the guard differs from the square of the root by
     the error of the step. A guard that is not affine has a series with terms, and rounding, of its own. Left
     beyond its rounding it would count as not yet, or once more, crossed. Nothing is done, and 0 returned,
-    where more than ``longest`` would be needed.
+    where more than ``longest`` would be needed. With ``tangents`` 0, tangent vectors stay as they are: those
+    at the zero of the root are right, and their rate may be infinite there.
     """
     field = work.stages[0]
     rates_by_jacobian(model, run.mode, t, run.y, tangents, work.jacobian, field)
@@ -345,6 +367,8 @@ def series_step(task, remaining):
     clock = n + guards if kind == DESINGULARISED else -1
     # State, guards, clock and divergence are evaluated together, in whole vectors.
     front = whole_registers(n + guards + 2, NARROW)
+    if kind in (DESINGULARISED, ROOTED):
+        set_origins(model, run, order, series)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.steps += 1
@@ -422,13 +446,19 @@ def series_step(task, remaining):
     if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
+    for column in range(n, n + guards if kind in (DESINGULARISED, ROOTED) else n):
+        # The next series looks for its root behind a series of the full order.
+        series[method.order + 1, column] = series[order + 1, column]
+    run.stage = READY
     if cut:
         sides_at(model, run, t + span, work)
     if fired != NO_TRANSITION and kind == ROOTED:
         project_on_guard(model, run, fired, t + span, work)
     elif fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
-        longest = math.inf if clock >= 0 else CLOSE * span
-        span += reach_guard(model, run, tangents, fired, t + span, longest, work)
+        # What the error of the root makes of the time is less than the stay in the mode.
+        longest = run.since_entry + span if clock >= 0 else CLOSE * span
+        moved = 0 if clock >= 0 and model.guard_in_series[fired] == 1 else tangents
+        span += reach_guard(model, run, moved, fired, t + span, longest, work)
     return GO_ON, span
 
 

@@ -321,9 +321,11 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
 
 
 @njit(**INLINE)
-def is_root(model, mode):
-    """Whether the series of a guard in a mode is that of its root."""
-    return model.propagator[mode] in (DESINGULARISED, ROOTED)
+def as_root(model, mode, size):
+    """How large a guard of a size is in its series, which may be that of its root."""
+    if model.propagator[mode] not in (DESINGULARISED, ROOTED):
+        return size
+    return math.sqrt(size) if model.root[mode] == 2 else size ** (1.0 / model.root[mode])
 
 
 @njit(**INLINE)
@@ -371,7 +373,7 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
         for i in range(n):
             size += abs(work.gradient[i]) * max(abs(run.y[i]), abs(series[order + 1, i]))
         rounding = ROUNDING_OF_STATE * EPSILON * size
-        return error <= (math.sqrt(rounding) if is_root(model, run.mode) else rounding)
+        return error <= as_root(model, run.mode, rounding)
     for i in range(n):
         work.trial[i] = series[order + 1, i]
         size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
@@ -434,9 +436,10 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if kind != EXACT:
             band = error_band(method, run, work.gradient, model.dimension)
         # A value that is small for a guard is less small for the root of the guard.
-        if is_root(model, mode):
-            rounding, band = math.sqrt(rounding), math.sqrt(band)
-        size, power = beyond_known_roots(series, column, h, on_guard, size)
+        rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
+        # The root of a guard that is zero without speed begins to grow like its variable, too.
+        known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
+        size, power = beyond_known_roots(series, column, h, known, size)
         if on_guard > 0:
             if size <= rounding:
                 continue
@@ -444,7 +447,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
                 side = 0
         # The second cheap proof: the leading powers keep to their side, even if the others are against it.
-        degree, rest = leading_powers(series, column, order, power, on_guard, size, work.polynomial, h)
+        degree, rest = leading_powers(series, column, order, power, known, size, work.polynomial, h)
         leading_to_bernstein(work.polynomial, degree, work.stack)
         verdict, start, end, row = judge_leading(
             degree, rest, order * rest, side, band, series[order + 1, column], work.stack
@@ -463,12 +466,12 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             ):
                 blurred = transition
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, on_guard, h, start * h, end * h, *ends) / h
+            theta = root_between(series, column, order, known, h, start * h, end * h, *ends) / h
             run.rehearsal[3, transition] = side
             if theta < earliest:
                 earliest, fired = theta, transition
             continue
-        degree = powers_on_step(series, column, order, h, on_guard, work.polynomial)
+        degree = powers_on_step(series, column, order, h, known, work.polynomial)
         to_bernstein(work.polynomial, degree)
         if stays(work.polynomial, degree, side, band):
             continue
@@ -477,8 +480,8 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         )
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, on_guard, h, theta * h, end * h, *ends) / h
-        note_touches(run, transition, degree, on_guard, theta, band, work)
+            theta = root_between(series, column, order, known, h, theta * h, end * h, *ends) / h
+        note_touches(run, transition, degree, known, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
         if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):

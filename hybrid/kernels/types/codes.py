@@ -58,6 +58,10 @@ PROPAGATORS = (
     "Taylor series, with the root of a guard",
 )
 
+# What a series may take the root of a guard from: the state; the end of the step before, which led here; or
+# nothing, since the guard is zero and moves on.
+FROM_STATE, FROM_LAST_STEP, FROM_ZERO = range(3)
+
 # What is known of a row of a guard's program, in the columns of ``Work.registers``: a range, a range of the
 # slope, and a range of the value in the middle of a piece.
 LOW = 0

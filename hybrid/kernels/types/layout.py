@@ -66,6 +66,9 @@ class Model(Structure):
     those of their terms that may cancel so, have programs behind them.
     ``field_jacobian`` writes its last column, and in row ``i`` of mode ``m`` the columns
     ``slope_column[first_slope[m, i]:first_slope[m, i + 1]]``: all others are zero.
+    ``steep`` is 1 for a mode whose field has powers of its guards that may have an infinite slope at the
+    guard; ``root`` is the order of the root that the series of a mode hold for its guards. ``field_before``
+    and ``field_behind`` are the numbers of the fields at the crossing of a guard, on its two sides.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
@@ -107,6 +110,10 @@ class Model(Structure):
     propagator: INDICES
     degree: INDICES
     fragile: INDICES
+    steep: INDICES
+    root: INDICES
+    field_before: INDICES
+    field_behind: INDICES
     timed: INDICES
     tangent_start: INTEGER
     tangent_columns: INDICES
@@ -181,6 +188,7 @@ COUNTERS = (
     "calm_mode",
     "calm_cycle",
     "calm_wait",
+    "steep_jumps",
 )
 NUMBERS = (
     "phase",

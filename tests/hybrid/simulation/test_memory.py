@@ -32,7 +32,7 @@ def shapes(monkeypatch):
     ],
 )
 def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes):
-    method = kernel_method(solver)
+    method = kernel_method(solver, solver.by_series)
     order = method.order if order is None else order
     # Whole registers of eight columns; three more rows than the order for the error and two of scratch.
     series = (codes.HIGHEST_ORDER + 3, 16) if order else (0, 0)
@@ -117,5 +117,5 @@ def test_a_fresh_run_is_in_no_mode_and_has_not_jumped():
 def test_records_keep_nothing_at_first_and_implicit_methods_have_no_last_step():
     assert memory.empty_record(2, 7, 5, 3).used.tolist() == [0, 0, 0, 0]
     for solver, last in ((hybrid.RadauIIA(), -1.0), (hybrid.DOP853(), None)):
-        work = memory.workspace(kernel_method(solver), 2, 0, 8)
+        work = memory.workspace(kernel_method(solver, solver.by_series), 2, 0, 8)
         assert work.systems[-1].tolist() == ([] if last is None else [last] * 6)

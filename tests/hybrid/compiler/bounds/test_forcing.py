@@ -443,5 +443,5 @@ def test_forcing_that_rounding_of_time_hides_is_reported(w, factor, solver):
 def test_what_saturates_in_the_state_or_is_flat_at_first(field, saturates):
     symbols = model_symbols(2, 1)
     wanted = (Forcing(None, OF_STATE),) if saturates else ()
-    assert forcings([symbols.x[1], field(*symbols.x)], symbols) == wanted
-    assert forcings([symbols.x[1], field(symbols.p[0], 2 * symbols.p[0])], symbols) == ()
+    assert forcings([symbols.x[1], field(*symbols.x)], [], symbols) == wanted
+    assert forcings([symbols.x[1], field(symbols.p[0], 2 * symbols.p[0])], [], symbols) == ()

@@ -53,12 +53,27 @@ class TestRoots:
         power = HEIGHT ** sympy.Rational(3, 2)
         for end in (boundary(HEIGHT, 1), boundary(-2 * HEIGHT, -1)):
             found = equations_of([Y, -power], [end], SYMBOLS)
-            assert found.bases == [HEIGHT]
+            assert found.bases == {HEIGHT: 2}
             assert found.held == (True,)
         with pytest.raises(NoSeries, match="3/2 of an expression that may change sign"):
             equations_of([Y, -power], [boundary(Y, 1)], SYMBOLS)
-        with pytest.raises(NoSeries, match="1/3 of a guard"):
-            equations_of([Y, HEIGHT ** sympy.Rational(1, 3)], [boundary(HEIGHT, 1)], SYMBOLS)
+        for exponent in (sympy.Float(0.45), SYMBOLS.p[0]):
+            with pytest.raises(NoSeries, match="of a guard"):
+                equations_of([Y, HEIGHT**exponent], [boundary(HEIGHT, 1)], SYMBOLS)
+
+    @pytest.mark.parametrize(
+        ("powers", "order"),
+        [((1 / 3,), 3), ((0.25, 1.5), 4), ((1 / 6, 0.5), 6), ((0.5, 7.5), 2), ((4 / 3,), 3)],
+    )
+    def test_the_order_of_the_root_that_makes_powers_whole(self, powers, order):
+        field = [Y, sympy.Add(*(HEIGHT ** sympy.Float(power) for power in powers))]
+        assert equations_of(field, [boundary(HEIGHT, 1)], SYMBOLS).bases == {HEIGHT: order}
+
+    @pytest.mark.parametrize("powers", [(1.25,), (0.75, 1 / 3)])
+    def test_series_with_wide_gaps_are_not_taken(self, powers):
+        field = [Y, sympy.Add(*(HEIGHT ** sympy.Float(power) for power in powers))]
+        with pytest.raises(NoSeries, match="wide gaps"):
+            equations_of(field, [boundary(HEIGHT, 1)], SYMBOLS)
 
     def test_series_hold_guards_that_are_affine_or_roots(self):
         ends = [Boundary(HEIGHT, 1), Boundary(X**2, 1), Boundary(Y, 1, is_affine=True), Boundary(None, 1)]

@@ -336,7 +336,7 @@ def test_series_do_not_depend_on_where_the_factors_lie(monkeypatch, tangents):
 def test_the_reason_is_told():
     reasons = [str(each) for each in emit(contact(1.25)).propagators]
     assert reasons[0] == "exact (affine in the state)"
-    assert reasons[1].startswith("Runge-Kutta pair (it has the power 5/4 of a guard")
+    assert reasons[1].startswith("Runge-Kutta pair (it has the powers 5/4 of a guard, and series in its root")
 
 
 def test_a_linear_mode_has_a_table_and_what_only_looks_linear_has_none():

@@ -270,8 +270,8 @@ _saltation = jump.saltation
 
 
 @njit
-def saltation(model, transition, mode, t, x_minus, x_plus, work):
-    return _saltation(model, transition, mode, t, x_minus, x_plus, work)
+def saltation(model, transition, t, x_minus, x_plus, work):
+    return _saltation(model, transition, t, x_minus, x_plus, work)
 
 
 @pytest.mark.parametrize("unit", [1.0, 2.0**40])
@@ -290,7 +290,7 @@ def test_the_sizes_of_the_terms_of_a_saltation_matrix(unit):
     )  # fmt: skip
     run = start(system, (-4.0, 0.7), 0.2, mode="a", parameters={"unit": unit}, tangent=np.eye(2))
     t, (x, y), x_plus = 0.2, (0.3, 0.7), np.zeros(2)
-    transversality = saltation(run.model, 0, 0, t, np.array([x, y]), x_plus, run.work)
+    transversality = saltation(run.model, 0, t, np.array([x, y]), x_plus, run.work)
     f, g, g_t = np.array([y, -2.0 * x]), np.array([3.0, -2.0 * y]), 0.5
     matrix, rate = np.array([[0.5, -1.0], [2.0, 1.0]]), np.array([0.0, 3.0])
     np.testing.assert_allclose(x_plus, matrix @ (x, y) + rate * t, rtol=1e-15)

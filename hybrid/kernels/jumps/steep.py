@@ -1,0 +1,85 @@
+"""Slopes of a field that are infinite at a guard, where steps in time lose digits of the tangent vectors.
+
+Near a guard ``z`` a slope like ``z**(p - 1)`` with ``p < 1`` changes tangent vectors by ``z**p`` until ``z``
+is zero. Rounding hides the last part of ``z``: with ``p = 1/2``, the root of rounding is missing. Series in
+the root of the guard miss nothing.
+"""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.slopes import change_of_rate
+from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_speed, size_of_time
+from hybrid.kernels.types.codes import RUNGE_KUTTA
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import KERNEL
+
+# Slopes are compared at the distance of rounding from the guard, and so many times farther.
+FARTHER = 16.0
+# A slope that is larger at the guard by this factor grows without limit.
+GROWS = 1.02
+
+
+@njit(**KERNEL)
+def rates_beside(model, run, mode, t, distance, tangents, out, work):
+    """Rates of the tangent vectors at a ``distance`` from the guard with the gradient ``work.gradient``."""
+    n, square = model.dimension, 0.0
+    for i in range(n):
+        square += work.gradient[i] * work.gradient[i]
+    for i in range(n):
+        work.state[i] = run.y[i] + (distance * work.gradient[i] / square if square > 0.0 else 0.0)
+    model.field_jacobian(mode, t, work.state, model.parameters, work.jacobian)
+    for start in range(n, n * (1 + tangents), n):
+        for i in range(n):
+            out[start + i] = change_of_rate(model, mode, i, work.jacobian, run.y[start:])
+
+
+@njit(**KERNEL)
+def is_lost(model, method, run, mode, transition, side, tangents, work):
+    """Whether tangent vectors change by more than the tolerance over the rounding of a guard, on one side.
+
+    Uses ``work.new`` and ``work.trial`` as scratch.
+    """
+    n, t = model.dimension, run.phase
+    if model.steep[mode] == 0 or model.propagator[mode] != RUNGE_KUTTA:
+        return False
+    model.field(mode, t, run.y, model.parameters, work.field)
+    speed = abs(guard_speed(model, transition, t, run.y, work.field, work.gradient))
+    size = abs(work.gradient[n]) * size_of_time(model, t)
+    for i in range(n):
+        size += abs(work.gradient[i]) * run.scale[i]
+    distance = ROUNDING_OF_STATE * EPSILON * size
+    rates_beside(model, run, mode, t, side * distance, tangents, work.new, work)
+    rates_beside(model, run, mode, t, side * FARTHER * distance, tangents, work.trial, work)
+    for start in range(n, n * (1 + tangents), n):
+        square = 0.0
+        for i in range(start, start + n):
+            square += run.y[i] * run.y[i]
+        floor = math.sqrt(square / n)
+        for i in range(start, start + n):
+            grows = abs(work.new[i]) > GROWS * abs(work.trial[i])
+            lost = abs(work.new[i]) * distance
+            if grows and lost > method.rtol * (floor + abs(run.y[i])) * speed:
+                return True
+    return False
+
+
+@njit(**KERNEL)
+def is_steep(model, method, run, transition, tangents, work):
+    """Whether steps have lost digits on the way to the guard of a transition that is about to fire."""
+    side = -float(model.direction[transition])
+    return is_lost(model, method, run, run.mode, transition, side, tangents, work)
+
+
+@njit(**KERNEL)
+def is_steep_behind(model, method, run, fired, tangents, work):
+    """Whether steps will lose digits on the way from the guard of the transition that has just fired."""
+    mode = run.mode
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if model.surface[other] == model.surface[fired] and is_lost(
+            model, method, run, mode, other, -float(model.direction[other]), tangents, work
+        ):
+            return True
+    return False
