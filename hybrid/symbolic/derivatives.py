@@ -161,7 +161,7 @@ def _decays(expression: sympy.Expr) -> Terms:
     if isinstance(base, sympy.cosh):
         return [(base.args[0], product(factor, sympy.tanh(base.args[0], evaluate=False)))]
     terms = [_exponential(term) for term in base.args] if base.is_Add else []
-    if not all(size is not None for size, _ in terms):
+    if not all(size != 0 for size, _ in terms):
         return []
     return [
         (argument, factor / sympy.Add(*(b / a * sympy.exp(other - argument) for b, other in terms)))
@@ -170,11 +170,11 @@ def _decays(expression: sympy.Expr) -> Terms:
     ]
 
 
-def _exponential(term: sympy.Expr) -> tuple[sympy.Expr | None, sympy.Expr]:
-    """``a`` and ``u`` of a term ``a*exp(u)`` with a positive number ``a``; None and zero of another term."""
+def _exponential(term: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+    """``a`` and ``u`` of a term ``a*exp(u)`` with a positive number ``a``; zeros of another term."""
     size, rest = term.as_coeff_Mul()
     if not size.is_positive or not (rest == 1 or isinstance(rest, sympy.exp)):
-        return None, ZERO
+        return ZERO, ZERO
     return size, rest.args[0] if rest != 1 else ZERO
 
 
