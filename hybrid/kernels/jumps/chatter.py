@@ -30,12 +30,6 @@ INVISIBLE = 1e-6
 # It is also taken earlier if a flight is no higher than this many times rounding: the rounding error of its
 # duration grows like the reciprocal of its speed and would spoil the limit.
 SHALLOW = 1e6
-# Change of the Jacobian over the remaining time that counts as none: what it adds to a state, as a share.
-SHORT = 1e-10
-# Longest remaining time, in units of the field's own time, over which the drift is an exponential.
-LONG = 1.0
-# The same where the drift is that of the mean field, which is followed to second order.
-BRIEF = 1e-4
 # Largest relative change of the limit that may be due to rounding.
 ROUGH = 1e-6
 # That change is no more than this many times what the rounding of the last landing makes of it.
@@ -327,20 +321,47 @@ def changed(up, down, noise):
 
 
 @njit(**KERNEL)
-def add_change_of_impacts(model, run, transition, t, speed, span, work):
+def add_turn_of_impulse(model, run, transition, t, speed, span, work):
+    """Add the effect of an impulse that turns along the way to the limit to ``work.saltation``.
+
+    A height is taken out along ``D_x f p`` less the rate at which ``p`` turns, as on a curved wall. That rate
+    is the difference quotient from the last impact to one at the limit. The speed has its sign.
+    """
+    n, impulse, slope = model.dimension, run.trail[IMPULSE], work.error
+    place, after, turn = work.new, work.second_error, work.trial
+    for i in range(n):
+        place[i] = work.settled[i] - speed * impulse[i]
+    _, change = impact(model, run, transition, t, place, after, work)
+    coupling = 0.0
+    for i in range(n):
+        noise = ROUNDING_OF_STATE * EPSILON * run.scale[i] / abs(change)
+        turn[i] = changed((after[i] - place[i]) / change, impulse[i], noise) / span
+        coupling += slope[i] * turn[i]
+    model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
+    for i in range(n):
+        for j in range(n):
+            work.saltation[i, j] += (turn[i] - coupling * impulse[i]) * work.gradient[j]
+
+
+@njit(**KERNEL)
+def add_change_of_impacts(model, run, transition, speed, span, work):
     """Add the effect of a change of the impulse to ``work.saltation``, which holds the chatter matrix.
 
     The impulse takes out the guard's ``speed``, and what the pull adds in the time ``span`` to the limit.
-    Acceleration, restitution and impulse of the remaining impacts are those at the limit. Their derivatives
-    along the columns of the matrix are central differences; those of acceleration and restitution go to the
-    first two rows of ``work.rounding``. The speed has its sign.
+    Acceleration, restitution and impulse of the remaining impacts are those of the state without its speed.
+    Their derivatives along the columns of the matrix, which keep that state on its guard, are central
+    differences; those of acceleration and restitution go to the first two rows of ``work.rounding``. The
+    speed has its sign.
     """
-    n, impulse, place, after = model.dimension, run.trail[IMPULSE], work.new, work.second_error
+    n, t, impulse = model.dimension, run.phase, run.trail[IMPULSE]
+    place, after, start = work.new, work.second_error, work.trial
     bends, ratios, up = work.rounding[0], work.rounding[1], work.rounding[2]
+    for i in range(n):
+        start[i] = run.y[i] - speed * impulse[i]
     for j in range(n):
         step = math.inf
         for i in range(n):
-            size = max(abs(work.settled[i]), run.scale[i])
+            size = max(abs(start[i]), run.scale[i])
             if size > 0.0 and work.saltation[i, j] != 0.0:
                 step = min(step, 6e-6 * size / abs(work.saltation[i, j]))
         bends[j], ratios[j] = 0.0, 0.0
@@ -351,7 +372,7 @@ def add_change_of_impacts(model, run, transition, t, speed, span, work):
         bend, ratio = 0.0, 0.0
         for part in range(2):
             for i in range(n):
-                place[i] = work.settled[i] + (step if part == 0 else -step) * work.saltation[i, j]
+                place[i] = start[i] + (step if part == 0 else -step) * work.saltation[i, j]
             model.field(run.mode, t, place, model.parameters, work.field)
             guard_speed(model, transition, t, place, work.field, work.gradient)
             bent = guard_acceleration(model, run, transition, run.mode, t, place, work)
@@ -392,12 +413,15 @@ def add_change_of_duration(model, method, run, target, span, work):
     ratio, speed = run.restitution, run.trail[BEFORE, n]
     limit, side = run.phase + span, -far_side(model, run, transition)
     mean = work.trial
-    add_change_of_impacts(model, run, transition, limit, side * speed, span, work)
+    add_turn_of_impulse(model, run, transition, limit, side * speed, span, work)
+    add_change_of_impacts(model, run, transition, side * speed, span, work)
     pull = -side * mean_field(model, run, transition, limit, work.settled, mean, work)
     model.field(target, limit, work.settled, model.parameters, work.field_after)
     model.field_jacobian(target, limit, work.settled, model.parameters, work.reset_jacobian)
     by_speed = 2.0 * side / (pull * (1.0 - ratio))
     by_height = side * (1.0 + ratio) / (speed * (1.0 - ratio))
+    # The gradient has since been that at the limit. A guard that bends has another one here.
+    model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
     for j in range(n):
         run.instant[j] = by_speed * work.error[j] + by_height * work.gradient[j]
         run.instant[j] += span * (side * work.rounding[0, j] / pull + work.rounding[1, j] / (1.0 - ratio))
@@ -421,51 +445,3 @@ def add_change_of_duration(model, method, run, target, span, work):
             for j in range(n):
                 work.saltation[i, j] += excess[i] * run.instant[j]
     return apart
-
-
-@njit(**KERNEL)
-def feedback(matrix, n):
-    """Upper bound of how fast components act back on themselves, over at most two others, in any units."""
-    most = 0.0
-    for i in range(n):
-        for j in range(n):
-            there = abs(matrix[i, j])
-            most = max(most, math.sqrt(there * abs(matrix[j, i])))
-            for k in range(n if there > 0.0 else 0):
-                most = max(most, (there * abs(matrix[j, k]) * abs(matrix[k, i])) ** (1.0 / 3.0))
-    return n * most
-
-
-@njit(**KERNEL)
-def drift_is_known(model, run, target, span, work):
-    """Whether the tangents' drift in what is left is an exponential of the resting mode's Jacobian.
-
-    It is where that Jacobian does not change until the limit in ``work.settled``, or changes too little to
-    matter. The Jacobian at the limit is left in ``work.jacobian``.
-    """
-    n, t = model.dimension, run.phase
-    whole_jacobian(model, target, t, run.y, work.reset_jacobian)
-    whole_jacobian(model, target, t + span, work.settled, work.jacobian)
-    for i in range(n):
-        change = 0.0
-        for j in range(n):
-            change += abs(work.jacobian[i, j] - work.reset_jacobian[i, j]) * run.scale[j]
-        if change * span > SHORT * run.scale[i]:
-            return False
-    return feedback(work.jacobian, n) * span <= LONG
-
-
-@njit(**KERNEL)
-def drift(y, n, tangents, matrix, span, term, image):
-    """Multiply the tangent vectors in ``y`` by ``exp(matrix span)``, by its series; scratch ``(n,)``."""
-    for start in range(n, n * (1 + tangents), n):
-        for i in range(n):
-            term[i] = y[start + i]
-        for order in range(1, 25):
-            for i in range(n):
-                image[i] = 0.0
-                for j in range(n):
-                    image[i] += matrix[i, j] * term[j]
-            for i in range(n):
-                term[i] = image[i] * span / order
-                y[start + i] += term[i]

@@ -20,16 +20,19 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.jumps.chatter import (
-    BRIEF,
     accumulation,
     add_change_of_duration,
     chatter_matrix,
-    drift,
-    drift_is_known,
-    feedback,
     remember_impulse,
 )
 from hybrid.kernels.jumps.collapse import UNTIL_NEXT_LOOK, limit_at_once
+from hybrid.kernels.jumps.drift import (
+    BRIEF,
+    drift,
+    drift_is_known,
+    feedback,
+    rounding_of_tangents,
+)
 from hybrid.kernels.jumps.locked import (
     begin_at_start,
     begin_instant,
@@ -356,9 +359,10 @@ def follow_impacts(task, transition, remaining):
         return False
     limit_mode = model.accumulates_to[transition]
     target = run.mode if limit_mode == NO_MODE else limit_mode
-    steep = 0.0
+    steep, noise = 0.0, 0.0
     if tangents > 0:
-        if not drift_is_known(model, run, target, span, work):
+        noise = rounding_of_tangents(model, run, transition, span, work)
+        if not drift_is_known(model, run, target, span, noise, work):
             return False
         steep = span * feedback(work.jacobian, model.dimension)
     x_limit = work.settled
@@ -366,7 +370,8 @@ def follow_impacts(task, transition, remaining):
         return False
     chatter_matrix(model, run, transition, work)
     apart = add_change_of_duration(model, method, run, target, span, work)
-    if apart and steep > BRIEF:
+    # Tangent vectors along the mean field have an error of third order.
+    if apart and steep > max(BRIEF, noise ** (1.0 / 3.0)):
         return False
     remember_flight(run, record, model.dimension, span, x_limit)
     begin_instant(run, model.dimension, tangents, work)
