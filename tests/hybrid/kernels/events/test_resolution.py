@@ -240,3 +240,66 @@ def test_a_guard_that_jumps_between_slopes_is_passed(solver):
         arc = simulate(system, (0.63, -0.91), (0.0, 10.0), parameters=values, solver=solver)
         assert arc.status.code == StatusCode.SUCCESS
         assert arc.jumps.t == pytest.approx(times[1:][beyond[1:] != beyond[:-1]], abs=5e-4)
+
+
+@each_solver
+@pytest.mark.parametrize("name", PASSED)
+@pytest.mark.parametrize("directions", [(-1, 1), (-1, 0, 1), (0, -1), (1, 1, -1, 0)])
+def test_every_transition_on_a_guard_fires_once_at_its_passages(name, directions, solver):
+    """Markers and counters watch one guard; those in the other direction, or fired before, do not matter."""
+    guard, level = PASSED[name], -0.37
+    first = np.arccos(level)
+    down = np.array([2 * np.pi * k + first for k in range(3)])
+    up = np.array([2 * np.pi * (k + 1) - first for k in range(3)])
+    times = {-1: down, 0: np.sort([*down, *up]), 1: up}
+    system = HybridSystem(
+        state=("q", "v", "count"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -x.q, 0.0))],
+        transitions=[
+            Transition(
+                "m",
+                "m",
+                Guard(lambda t, x, p: guard(x.q - level, p), direction),
+                Reset(lambda t, x, p: (x.q, x.v, x.count + 1)) if place % 2 else None,
+                name=f"{place}",
+            )
+            for place, direction in enumerate(directions)
+        ],
+        parameters={"a": 1.0, "b": 1.0},
+    )
+    for a, b in ((1.0, 1.0), (30.0, 1e-6)):
+        arc = simulate(system, (1.0, 0.0, 0.0), (0.0, 6 * np.pi), parameters={"a": a, "b": b}, solver=solver)
+        assert arc.status.code == StatusCode.SUCCESS
+        for place, direction in enumerate(directions):
+            found = arc.jumps.t[arc.jumps.transition == f"{place}"]
+            assert found == pytest.approx(times[direction], abs=1e-5)
+        assert arc.x[-1, 2] == sum(len(times[direction]) for direction in directions[1::2])
+
+
+@each_solver
+@pytest.mark.parametrize("power", [1, 3, 5, 7, 9])
+def test_a_flat_root_is_as_exact_as_what_it_is_a_power_of(power, solver):
+    """Where value and speed of a guard are rounding, their quotient moves no event, and none comes twice."""
+    system = HybridSystem(
+        state=("q", "v", "count"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -p.w * p.w * x.q, 0.0))],
+        transitions=[
+            Transition(
+                "m",
+                "m",
+                Guard(lambda t, x, p: (np.sin(2.0 * x.q * x.v) - 0.3) ** power),
+                Reset(lambda t, x, p: (x.q, x.v, x.count + 1)),
+            )
+        ],
+        parameters={"w": 2.0},
+    )
+    for w in (1.3, 2.3, 2.6):
+        # q v is -w sin(2 w t)/2, and passes the places where its sine is 0.3.
+        span = 8.0 * np.pi / w
+        angle = np.arcsin(0.3) + np.array([0.0, 2.0, -2.0]) * np.pi
+        levels = np.array([*angle, *(np.pi - angle)]) / 2.0
+        levels = levels[abs(levels) < w / 2]
+        arc = simulate(system, (1.0, 0.0, 0.0), (0.0, span), parameters={"w": w}, solver=solver)
+        assert len(arc.jumps) == 2 * 8 * len(levels)
+        product = arc.jumps.x_minus[:, 0] * arc.jumps.x_minus[:, 1]
+        assert np.abs(np.sin(2.0 * product) - 0.3).max() < 2e-14
