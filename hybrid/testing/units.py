@@ -139,6 +139,5 @@ def _measured(system: HybridSystem) -> Measured:
 
 
 def _free_name(system: HybridSystem, name: str) -> str:
-    while name in system.parameters:
-        name += "_"
-    return name
+    taken = system.parameters
+    return next(free for i in range(len(taken) + 1) if (free := name + "_" * i) not in taken)

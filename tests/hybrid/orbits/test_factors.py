@@ -78,14 +78,51 @@ class TestProduct:
         np.testing.assert_array_equal(eigenvalues.phases, 1.0)
 
     def test_units_suit_rows_and_columns(self):
-        """``Phi`` has the entry 1e9; units of which it is a whole number of sizes smaller are found."""
+        """``Phi`` has entries of 1e9 and 1e-9; in the units that are found, the sizes are alike."""
         shear = HybridSystem(state=("a", "b"), modes=[Mode("only", lambda t, x, p: (1e9 * x.b, -1e-9 * x.a))])
         found = factorised(shear, (0.0, 0.0), 1.0)
-        assert found.units[0] / found.units[1] == pytest.approx(1e9, rel=1.0)
+        assert 2e8 < found.units[0] / found.units[1] < 5e9
+        again = factorised(shear, (0.0, 0.0), 1.0, found.units)
+        np.testing.assert_allclose(again.units, found.units, rtol=10.0, atol=0.0)
+        assert 2e8 < again.units[0] / again.units[1] < 5e9
+        assert np.linalg.cond(product(again)) < 100.0
         wanted = [[np.cos(1.0), 1e9 * np.sin(1.0)], [-1e-9 * np.sin(1.0), np.cos(1.0)]]
         np.testing.assert_allclose(product(found), wanted, rtol=1e-9)
-        eigenvalues = fundamental_eigenvalues(partial(began, shear, (0.0, 0.0)), 1.0)
-        np.testing.assert_allclose(eigenvalues.values, np.exp([1j, -1j]), rtol=1e-12)
+
+    @pytest.mark.parametrize(("unit", "runs"), [(1.0, 1), (100.0, 1), (1e4, 2), (1e-4, 2), (1e9, 2)])
+    def test_a_run_is_repeated_in_units_that_suit_it(self, unit, runs):
+        turn = HybridSystem(
+            state=("a", "b"),
+            parameters={"u": unit},
+            modes=[Mode("only", lambda t, x, p: (p.u * x.b, -x.a / p.u))],
+        )
+        starts = []
+        found = fundamental_eigenvalues(lambda: starts.append(began(turn, (0.0, 0.0))) or starts[-1], 1.0)
+        np.testing.assert_allclose(found.values, np.exp([1j, -1j]), rtol=1e-12)
+        assert len(starts) == runs
+
+    @pytest.mark.parametrize("solver", SOLVERS)
+    @pytest.mark.parametrize("rate", [3.0, -4.0])
+    def test_one_vector_needs_a_factor_where_it_leaves_the_range(self, rate, solver):
+        """In ``exp(400)`` there are three sizes of 1e50."""
+        line = HybridSystem(state=("a",), modes=[Mode("only", lambda t, x, p: (rate * x.a,))])
+        found = factorised(line, (0.0,), 400.0 / abs(rate), solver=solver)
+        assert len(found.matrices) == 4
+        logs = [float(np.log(each[0, 0])) for each in found.matrices]
+        assert sum(logs) == pytest.approx(np.sign(rate) * 400.0, rel=1e-7)
+
+    @pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+    def test_steps_of_an_implicit_method_are_short_enough(self, rtol):
+        """The method takes the stiff direction to zero in a few steps, the tangent vectors may not follow."""
+        solver = hybrid.RadauIIA(rtol=rtol, atol=1e-2 * rtol)
+        stiff = HybridSystem(
+            state=("a", "b"), modes=[Mode("only", lambda t, x, p: (-x.a + 0.1 * np.sin(x.b), -1e3 * x.b))]
+        )
+        found = factorised(stiff, (1.0, 0.0), 2.0, solver=solver)
+        assert max(map(np.linalg.cond, found.matrices)) < factors.WORST_CONDITION * factors.LONGEST_STEP
+        assert 100 < len(found.matrices) < 1000
+        eigenvalues = fundamental_eigenvalues(partial(began, stiff, (1.0, 0.0), solver=solver), 2.0)
+        np.testing.assert_allclose(eigenvalues.log_moduli, [-2.0, -2000.0], rtol=1e-4)
 
 
 def landing():
