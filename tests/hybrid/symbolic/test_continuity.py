@@ -231,3 +231,22 @@ def test_exponents_and_orbits_say_so():
     assert orbit.status.code == hybrid.StatusCode.DISCONTINUOUS_FIELD
     chart = lyapunov.chart(system, {"A": (2.0, 3.0)}, (0.5, 0.1), intervals=3)
     assert (chart.status != 0).all()
+
+
+def test_functions_within_a_function_are_looked_at():
+    def outer(t, x, p):
+        def inner(value):
+            return value if value > 1.0 else 1.0
+
+        return (inner(x[0].real),)
+
+    def smooth(t, x, p):
+        def inner(value):
+            return value * value
+
+        return (inner(x[0]),)
+
+    for differentiable in (False, True):
+        assert may_jump(outer, differentiable)
+        assert not may_jump(smooth, differentiable)
+    assert not may_jump(lambda t, x, p: (x[0].real * x[1],), differentiable=True)
