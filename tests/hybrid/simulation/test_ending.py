@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
+from hybrid.kernels.types import codes
 from hybrid.simulation import ending
 
 
@@ -138,3 +139,42 @@ def test_two_modes_send_the_state_back_across_one_guard(directions, orientation,
         system=SimpleNamespace(transitions=transitions), compiled=SimpleNamespace(emitted=emitted)
     )
     assert ending._faces(run, list(range(len(transitions)))) == faces
+
+
+def finished(tangents=2, **changes):
+    """A run that has reached its end, with something to tell."""
+    counted = dict.fromkeys(("singular_jumps", "order_mattered", "ill_conditioned", "indistinct"), 0)
+    emitted = SimpleNamespace(discontinuities=changes.pop("discontinuities", ((), ())))
+    return SimpleNamespace(
+        tangents=tangents,
+        jumps=9,
+        run=SimpleNamespace(**(counted | changes)),
+        compiled=SimpleNamespace(emitted=emitted),
+        system=SimpleNamespace(mode_names=("a", "b")),
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "told"),
+    [
+        ({"singular_jumps": 2}, StatusCode.SINGULAR_SALTATION, "2 of 9 jumps had no saltation matrix"),
+        ({"discontinuities": ((), ("x.q = 0",))}, StatusCode.DISCONTINUOUS_FIELD, "x.q = 0"),
+        ({"indistinct": 3}, StatusCode.INDISTINCT_TANGENTS, "3 times the tangent vectors became parallel"),
+    ],
+)
+def test_what_matters_to_tangent_vectors_alone(changes, code, told):
+    found = ending._status(finished(**changes), codes.DONE)
+    assert found.code == code
+    assert told in found.message
+    assert ending._status(finished(0, **changes), codes.DONE).code == StatusCode.SUCCESS
+
+
+def test_an_order_that_mattered_is_said_with_what_grazed():
+    text = "4 times two guards were reached together"
+    for tangents in (0, 2):
+        found = ending._status(finished(tangents, order_mattered=4, ill_conditioned=5), codes.DONE)
+        assert found.code == StatusCode.AMBIGUOUS_ORDER
+        assert text in found.message
+        assert ("5 of 9 jumps grazed" in found.message) == (tangents > 0)
+    alone = ending._status(finished(order_mattered=4), codes.DONE)
+    assert "grazed" not in alone.message

@@ -47,5 +47,11 @@ def test_squares_are_the_first_of_many_and_the_most_used_come_first(squared):
     assert first == pairs.Layer("sa0", "sa0", tuple(names[:squared]), tuple(range(40, 40 + squared)))
     assert [squares[place] for layer in found for place in layer.places].count(True) == squared
     assert all(layer.left != layer.right for layer in found[1:])
+    # The first factors of the third and fourth layer are those of the second one.
+    assert [layer.left for layer in found[1:4]] == ["sa1"] * 3
+    assert [bool(layer.lefts) for layer in found[:4]] == [True, True, False, False]
+    blocks = {layer.left: layer.lefts for layer in found if layer.lefts}
+    for layer in found:
+        assert tuple(lefts[place] for place in layer.places) == blocks[layer.left][: len(layer.places)]
     sizes = [len(layer.places) for layer in found[1:]]
     assert sizes == sorted(sizes, reverse=True)
