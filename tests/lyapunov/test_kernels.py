@@ -39,6 +39,7 @@ def test_distances_whose_squares_leave_the_range(scale):
     other = SimpleNamespace(y=scale * np.array([-2.0, 4.0, 7.0, 99.0]))
     assert distance(one, other, 3) == distance(other, one, 3) == 13.0 * scale
     assert distance(one, one, 3) == 0.0
+    assert distance(one, SimpleNamespace(y=-one.y), 3) == pytest.approx(2 * np.sqrt(26.0) * scale, rel=1e-15)
 
 
 def test_a_companion_is_put_beside_the_orbit():
@@ -151,11 +152,19 @@ class TestGrowthRates:
         ours.run.growth[:] = 3.0, 6.0
         ours.run.divergence, ours.run.log_determinant = 1.0, 2.0
         batches = statistics.new_batches(3)
-        rates = np.zeros((1, 3))
+        rates = np.zeros((2, 3))
         code = plain.growth_rates(Advance(), None, ours, end, 1.5, 123, True, rates, *batches)
-        assert (code, end.done, end.cycle, end.phase) == (DONE, 1, 1, 1.0)
+        assert (code, end.done, end.cycle, end.phase) == (DONE, 2, 2, 0.5)
         grown = [3.0 / 1.5 + 0.5, 6.0 / 1.5 - 1.25, (1.0 + 2.0 - 0.1) / 1.5 + 0.3]
-        np.testing.assert_allclose(rates, [grown], rtol=1e-14)
+        np.testing.assert_allclose(rates, [grown, [0.5, -1.25, 0.3 - 0.1 / 1.5]], rtol=1e-14)
+
+    def test_vectors_are_no_images_of_others(self, plain):
+        """Old contents of the scratch memory say nothing of the size of the terms."""
+        ours = task([1.0, 1.0, 1.0, 0.0, 0.0, 1.0], np.zeros(6), tangents=2)
+        ours.work.jacobian[:] = 1e30
+        rates = np.zeros((1, 3))
+        plain.growth_rates(Advance(), None, ours, new_end(), 1.5, 9, False, rates, *statistics.new_batches(3))
+        assert rates[0, :2].tolist() == [0.0, 0.0]
 
     def test_vectors_of_which_only_rounding_is_left_are_counted(self, plain, monkeypatch):
         monkeypatch.setattr(plain, "orthonormalise", lambda *_: 2)

@@ -99,7 +99,9 @@ def test_each_thread_tells_of_its_own_starts():
         starts = np.vstack([np.roll(kinds, turn + i, axis=0) for i in range(4)])
         for options in ({}, {"mode": "flight"}):
             found = simulate_many(ball, starts, (0.0, 9.0), max_jumps=5, executor=3, **options)
-            each = [simulate_many(ball, x0[None], (0.0, 9.0), max_jumps=5, executor=1, **options) for x0 in starts]
+            each = [
+                simulate_many(ball, x0[None], (0.0, 9.0), max_jumps=5, executor=1, **options) for x0 in starts
+            ]
             for name in ("x_end", "t_end", "mode_end", "jumps", "status", "message"):
                 np.testing.assert_array_equal(
                     found[name].values, np.concatenate([one[name].values for one in each])

@@ -86,7 +86,8 @@ def test_names(target, options, name):
 
 
 @pytest.mark.parametrize(
-    ("target", "reset", "marker"), [("a", None, True), ("a", RESET, False), ("b", None, False), (None, None, False)]
+    ("target", "reset", "marker"),
+    [("a", None, True), ("a", RESET, False), ("b", None, False), (None, None, False)],
 )
 def test_markers(target, reset, marker):
     assert Transition("a", target, GUARD, reset).is_marker == marker

@@ -72,9 +72,9 @@ def test_a_regime_at_one_frequency():
     assert found.two_orbit.intervals == 12
     period = 2 * np.pi / 7.40
     np.testing.assert_allclose(found.section.t, (np.arange(12) + 1.5) * period, rtol=1e-12)
-    np.testing.assert_allclose([found.arc.t[0], found.arc.t[-1]], [0.5 * period, (0.5 + PORTRAIT_PERIODS) * period])
-    np.testing.assert_allclose(found.arc(1.5 * period), found.section.x[0], atol=1e-6)
     np.testing.assert_allclose(
-        found.orbit.x0, (-0.00765806, -0.00411675, 0.05565196, -0.35621583), atol=1e-7
+        [found.arc.t[0], found.arc.t[-1]], [0.5 * period, (0.5 + PORTRAIT_PERIODS) * period]
     )
+    np.testing.assert_allclose(found.arc(1.5 * period), found.section.x[0], atol=1e-6)
+    np.testing.assert_allclose(found.orbit.x0, (-0.00765806, -0.00411675, 0.05565196, -0.35621583), atol=1e-7)
     assert found.omega == 7.40
