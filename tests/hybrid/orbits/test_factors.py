@@ -1,4 +1,4 @@
-"""The factors of a fundamental matrix: their product, how well-conditioned they are, and how their run ended."""
+"""Factors of a fundamental matrix: their product, how well-conditioned they are, how their run ended."""
 
 from functools import partial
 

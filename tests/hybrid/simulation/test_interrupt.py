@@ -326,7 +326,7 @@ class TestBursts:
         assert bursts.steps == before
 
     def test_the_limit_of_steps_ends_a_run(self, monkeypatch):
-        bursts, run, clock = self.made(monkeypatch, limit=100)
+        bursts, run, _ = self.made(monkeypatch, limit=100)
         run.steps = 95
         assert bursts.most() == 100
         run.steps = 100

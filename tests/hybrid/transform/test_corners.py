@@ -142,7 +142,7 @@ def test_surfaces_are_apart_if_neither_changes_the_speed_through_the_other(field
 
 
 def test_oblique_surfaces_are_apart_by_their_normals():
-    """The step across ``x = 0`` is along ``x + y = 0``, so the speed through that is the same on both sides."""
+    """The step across ``x = 0`` is along ``x + y = 0``: on both sides, the speed through that is the same."""
 
     def field(t, x, p):
         dry, other = np.sign(x.x), np.sign(x.x + x.y)

@@ -1,7 +1,6 @@
 """The factors of many convolutions side by side: none gets lost."""
 
 import pytest
-
 from hypothesis import given
 from hypothesis import strategies as st
 
