@@ -102,6 +102,15 @@ def test_failures_are_not_known():
     assert maps.kinds(made).values.tolist() == [[2, 0, 4, 0]]
     lost = chart([[[-np.inf, -np.inf], [np.inf, 0.0]]])
     assert maps.kinds(lost).values.tolist() == [[2, 0]]
+    # A first exponent of minus infinity is known: the only one may be such.
+    single = chart([[[-np.inf], [np.nan], [-1.0], [0.5]]], forced="no")
+    assert [maps.KINDS[i] for i in maps.kinds(single).values[0]] == [
+        "at rest",
+        "not known",
+        "at rest",
+        "chaotic",
+    ]
+    assert maps.kinds(chart([[[np.nan, -np.inf], [-np.inf, np.nan]]])).values.tolist() == [[0, 2]]
     attributes = maps.kinds(made).attrs
     assert attributes["flag_values"] == [0, 1, 2, 3, 4]
     assert attributes["flag_meanings"] == "not_known at_rest periodic torus chaotic"

@@ -149,7 +149,9 @@ def test_modes_whose_field_or_guard_depends_on_time_are_timed():
     assert compile_system(system).model().timed.tolist() == [0, 1, 1, 1]
 
 
-@pytest.mark.parametrize(("operations", "opaque"), [("ops", False), ("ops", True), (None, False), (None, True)])
+@pytest.mark.parametrize(
+    ("operations", "opaque"), [("ops", False), ("ops", True), (None, False), (None, True)]
+)
 def test_what_is_stored_is_what_another_process_can_read(operations, opaque, monkeypatch):
     """Functions that are compiled as they are cannot be stored, nor what has no key."""
     written = []
