@@ -4,9 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
-from hybrid import Taylor
+from hybrid import HybridSystem, Mode, Taylor
 from hybrid.orbits import periodic_orbit as module
-from hybrid.orbits.newton import EPSILON, Newton
+from hybrid.orbits.newton import EPSILON, Newton, Point
 from tests.hybrid.orbits.test_newton import shot
 
 SOLVER = Taylor(rtol=1e-10, atol=1e-12)
@@ -61,7 +61,7 @@ def test_only_what_moves_has_a_period_of_its_own():
 
 
 class TestFamilies:
-    """Orbits side by side: the step along the family is arbitrary, and the gap has a part that it cannot close."""
+    """Orbits side by side: the step along the family is arbitrary, and a part of the gap stays."""
 
     @staticmethod
     def family(**changes):
@@ -95,3 +95,20 @@ class TestFamilies:
         for size, near in ((2.0 / module.FARTHEST * 1.1, True), (2.0 / module.FARTHEST * 0.9, False)):
             newton = attrs.evolve(Newton.begin(found, SOLVER.atol, False), first=np.full(2, size))
             assert (shooting._objection(found, newton, 3, TOLERANCE) is None) == near
+
+
+@pytest.mark.parametrize("off", [-0.09, -0.03, 0.0, 0.05, 0.09])
+def test_the_guessed_period_is_moved_to_where_the_solution_returns(off):
+    """Of a rotation with the period 2 pi, to half the distance between the times that are compared."""
+    rotation = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -x.q))])
+    shooting = module._Shooting(rotation, None, None, SOLVER)
+    guess = 2 * np.pi / (1 + off)
+    found = shooting._time_of_return(Point(np.array([1.0, 0.5]), 0.7, guess))
+    apart = guess * module.PERIOD_OFF / (module.SAMPLES - 1)
+    assert found == pytest.approx(2 * np.pi, abs=0.51 * apart)
+
+
+def test_a_guess_without_a_return_stays():
+    line = HybridSystem(state=("q",), modes=[Mode("run", lambda t, x, p: (1.0 + 0.0 * x.q,))])
+    shooting = module._Shooting(line, None, None, SOLVER)
+    assert shooting._time_of_return(Point(np.array([1.0]), 0.0, 3.0)) == 3.0
