@@ -47,6 +47,7 @@ NEAREST = {
     "hybrid/compiler/propagators/equations.py": ("compiler/taylor/test_series.py",),
     "hybrid/compiler/propagators/polynomial.py": ("compiler/taylor/test_series.py", "solvers/test_taylor.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
+    "hybrid/orbits/periodic_orbit.py": ("orbits/test_objections.py", "orbits/test_newton.py"),
     "hybrid/plot/arcs.py": ("plot/test_plot.py",),
     "hybrid/plot/graph.py": ("plot/test_plot.py",),
     "hybrid/plot/orbits.py": ("plot/test_arcs.py", "plot/test_plot.py"),

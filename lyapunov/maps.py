@@ -69,7 +69,8 @@ def kinds(chart: xarray.Dataset) -> xarray.DataArray:
     else:
         regular = np.choose(np.minimum(zeros, 2), [KINDS.index(name) for name in KINDS[1:4]])
     found = np.where((values > 0.0).any(axis=-1), KINDS.index("chaotic"), regular)
-    flags = {"flag_values": list(range(len(KINDS))), "flag_meanings": " ".join(KINDS).replace("t k", "t_k")}
+    words = " ".join(name.replace(" ", "_") for name in KINDS)
+    flags = {"flag_values": list(range(len(KINDS))), "flag_meanings": words}
     return chart.status.copy(data=np.where(known, found, 0)).assign_attrs(flags).rename("kind")
 
 

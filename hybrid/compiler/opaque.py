@@ -214,10 +214,8 @@ def _short(error: Exception) -> str:
     lines = [line.strip(" |>") for line in str(error).splitlines()]
     empty = ("Failed in", "During", "File", "There are", "Overload", "- Of", "raised from", "<source", "^")
     telling = [line for line in lines if line and not line.startswith(empty)]
-    if not telling:
-        return f"{type(error).__name__}: it gives no reason" if not str(error) else f"{lines[0]}"
-    text = telling[0]
+    text = (telling or lines or ["it gives no reason"])[0].rstrip(".")
     if text.endswith("signature:") and len(telling) > 1:
         text = f"{text} {telling[1]}"
     text = text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]} ..."
-    return f"{type(error).__name__}: {text.rstrip('.')}"
+    return f"{type(error).__name__}: {text}"

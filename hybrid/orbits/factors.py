@@ -125,7 +125,6 @@ def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> 
     repeats = jumps_at_once(trajectory)
     implicit = bool(trajectory.method.implicit)
     products = _Products(trajectory, units)
-    strained = False
     while True:
         if trajectory.stop.is_set():
             return products.ended(StatusCode.INTERRUPTED)
@@ -134,26 +133,22 @@ def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> 
         code = trajectory.advance_to(*place, record, max_steps=steps + 1, max_jumps=trajectory.jumps)
         if code not in (codes.MAX_STEPS, codes.MAX_JUMPS, codes.DONE):
             return products.ended(code)
-        if int(run.steps) > steps or code == codes.DONE:
-            sizes = np.linalg.svd(products.vectors, compute_uv=False)
-            if not np.all(np.isfinite(sizes)):
-                return products.ended(codes.NON_FINITE)
-            if before is not None and sizes[0] > WORST_CONDITION * LONGEST_STEP * sizes[-1]:
-                length = run.last_step
-                run.restore(before)
-                run.next_step = SHORTER * length
-                trajectory.replace_tangents(trajectory.tangent_matrix)
-                continue
-            strained = True
-            if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
-                products.orthonormalise()
-                strained = False
+        vectors = products.vectors
+        if not np.all(np.isfinite(vectors)):
+            return products.ended(codes.NON_FINITE)
+        sizes = np.linalg.svd(vectors, compute_uv=False)
+        if before is not None and sizes[0] > WORST_CONDITION * LONGEST_STEP * sizes[-1]:
+            length = run.last_step
+            run.restore(before)
+            run.next_step = SHORTER * length
+            trajectory.replace_tangents(trajectory.tangent_matrix)
+            continue
+        if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
+            products.orthonormalise()
         if code == codes.MAX_JUMPS and repeats and same_time(trajectory.t, t, trajectory.model.period):
             return products.ended(codes.DONE)
         if code == codes.MAX_JUMPS:
-            if strained:
-                products.orthonormalise()
-                strained = False
+            products.orthonormalise()
             run.log_determinant = 0.0
             code = trajectory.advance_to(*place, record, max_steps=int(run.steps))
             if code not in (codes.MAX_STEPS, codes.DONE):

@@ -263,7 +263,7 @@ class _Runs:
 
     def run(self, block: range) -> None:
         """Run from these starts, in a memory of this thread."""
-        if not block or CTRL_C.is_set():
+        if CTRL_C.is_set():
             return
         plan, found, part = self.plan, self.found, slice(block.start, block.stop)
         origins, states = found.origins[part], found.states[part]

@@ -196,8 +196,8 @@ class _Chunks:
 
     def __init__(self, job: Job, workers: int) -> None:
         self.job, self.workers = job, workers
-        self.units = iter(job.units())
-        self.left = len(job.rows) if job.lines is None else len(job.units())
+        units = job.units()
+        self.units, self.left = iter(units), len(units)
         self.wanted = None if job.lines is None else set(job.rows.tolist())
         self.seconds_per_unit: float | None = None
 

@@ -241,6 +241,11 @@ class Case:
             discard(found)
         return found
 
+    @property
+    def duration(self) -> float:
+        """How long the run of the case takes."""
+        return float(self.run.t1 - self.t0)
+
     @cached_property
     def _run(self) -> Run | str:
         if self.mode is None:

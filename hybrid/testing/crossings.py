@@ -43,7 +43,7 @@ def _check_doubled(case: Case) -> None:
     jumps = case.run.arc.jumps
     for before, after in zip(jumps, list(jumps)[1:], strict=False):
         apart = after.t - before.t
-        if before.transition == after.transition and not apart > AT_ONCE * (case.run.t1 - case.t0):
+        if before.transition == after.transition and not apart > AT_ONCE * case.duration:
             case.fail(
                 CROSSINGS,
                 f"{after.transition!r} fired at t = {before.t:.15g} and again at t = {after.t:.15g}",

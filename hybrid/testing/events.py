@@ -39,7 +39,7 @@ def check_jumps(case: Case) -> None:
         value = float(case.evaluate(transition.guard.function, jump.t, jump.x_minus)[0])
         band = np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1] * jump.t)
         # Change of the guard over the uncertainty of the event time.
-        band += abs(jump.transversality) * (run.t1 - case.t0)
+        band += abs(jump.transversality) * case.duration
         # A reset may land beyond a guard, which then fires at the same instant.
         landed = jump.t == previous and value * transition.guard.direction > 0.0
         previous = jump.t
@@ -69,7 +69,7 @@ def _guard_jumps(case: Case, jump: Jump) -> bool:
     """Whether a guard is discontinuous at an event: its signs just before and just after differ."""
     transition = case.transition(jump)
     field = case.evaluate(case.system.modes[case.system.mode_index(jump.source)].field, jump.t, jump.x_minus)
-    moment = 1e-9 * (case.run.t1 - case.t0)
+    moment = 1e-9 * case.duration
     before, after = (
         float(case.evaluate(transition.guard.function, jump.t + shift, jump.x_minus + shift * field)[0])
         for shift in (-moment, moment)

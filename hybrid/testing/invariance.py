@@ -143,7 +143,7 @@ def check_split(case: Case) -> None:
     """
     as_case(case)
     run = case.run
-    times = [case.t0 + case.fraction * (run.t1 - case.t0)]
+    times = [case.t0 + case.fraction * case.duration]
     if len(run.arc.jumps) and case.the_jump().transition not in case.passable:
         times.append(case.the_jump().t)
     for t in times:
@@ -165,7 +165,7 @@ def check_samples(case: Case) -> None:
     as_case(case)
     run = case.run
     jumps = {jump.t: jump.x_plus for jump in run.arc.jumps}
-    times = np.unique([case.t0 + case.fraction * (run.t1 - case.t0), *jumps, run.t1])
+    times = np.unique([case.t0 + case.fraction * case.duration, *jumps, run.t1])
     arc = case.simulate(run.t1, samples=times)
     hint = "samples that change the steps, or are taken on the wrong side of an event."
     compare(case, SAMPLES, arc, _fired(arc), str(arc.mode[-1]), hint)

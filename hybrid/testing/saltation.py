@@ -244,7 +244,7 @@ class _Window:
         self.jump, self.last = self.jumps[0], self.jumps[-1]
         times = np.array([case.t0, *self.run.arc.jumps.t, self.run.t1])
         before, after = jump.t - times[self.jump.j], times[self.last.j + 2] - jump.t
-        if not min(before, after) > 1e-6 * (self.run.t1 - case.t0):
+        if not min(before, after) > 1e-6 * case.duration:
             discard("events follow one another too closely")
         rates = [
             np.abs(_field_slope(case, mode, jump.t, x))

@@ -14,6 +14,7 @@ from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 from hybrid.testing.case import Case, as_case, discard
 from hybrid.testing.invariance import compare
+from hybrid.testing.variants import free_name
 
 UNITS = "The units of the state and of the time do not matter"
 
@@ -83,7 +84,7 @@ def check_units(case: Case) -> None:
 
 def _measured(system: HybridSystem) -> Measured:
     names = tuple(system.parameters)
-    state, time = _free_name(system, "unit_of_state"), _free_name(system, "unit_of_time")
+    state, time = free_name(system, "unit_of_state"), free_name(system, "unit_of_time")
     n = system.dimension
 
     def original(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -136,9 +137,3 @@ def _measured(system: HybridSystem) -> Measured:
         period=None if system.period is None else period,
     )
     return Measured(changed, state, time)
-
-
-def _free_name(system: HybridSystem, name: str) -> str:
-    while name in system.parameters:
-        name += "_"
-    return name

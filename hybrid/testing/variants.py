@@ -110,9 +110,9 @@ def reordered(system: HybridSystem) -> HybridSystem:
 def _altered(system: HybridSystem) -> Altered:
     stay = bool(compile_system(system).emitted.opaque)
     components = range(system.dimension)
-    normal = tuple(_free_name(system, f"cut_normal_{i}") for i in components)
-    multiples = tuple(_free_name(system, f"multiple_of_guard_{i}") for i in components)
-    offset, factor = _free_name(system, "cut_offset"), _free_name(system, "factor_of_guards")
+    normal = tuple(free_name(system, f"cut_normal_{i}") for i in components)
+    multiples = tuple(free_name(system, f"multiple_of_guard_{i}") for i in components)
+    offset, factor = free_name(system, "cut_offset"), free_name(system, "factor_of_guards")
 
     def plane(t: Any, x: Any, p: Any) -> Any:
         return sum((getattr(p, name) * x[i] for i, name in enumerate(normal)), 0.0) - getattr(p, offset)
@@ -154,10 +154,10 @@ def _altered(system: HybridSystem) -> Altered:
     )
 
 
-def _free_name(system: HybridSystem, name: str) -> str:
-    while name in system.parameters:
-        name += "_"
-    return name
+def free_name(system: HybridSystem, name: str) -> str:
+    """A name like this one that no parameter has."""
+    taken = system.parameters
+    return next(free for i in range(len(taken) + 1) if (free := name + "_" * i) not in taken)
 
 
 def _unaware_of_more(system: HybridSystem) -> Callable[[Any], Any]:

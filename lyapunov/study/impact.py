@@ -113,11 +113,11 @@ def impacts(system: HybridSystem, omega: float, leads: tuple[float, ...] = LEADS
     )
     span = (0.5 * period, (0.5 + SEARCHED) * period)
     arc = simulate(system, settled.x[-1], span, mode="free", parameters=parameters, solver=EXACT)
-    times = np.array([jump.t for jump in arc.jumps])
-    for i in range(1, len(times) - 2):
-        flights = times[i] - times[i - 1], times[i + 2] - times[i + 1]
-        if arc.jumps[i].transition == "impact" and min(flights) > (max(leads) + LAG) * period:
-            return [_window(system, omega, arc.jumps[i - 1 : i + 2], lead * period) for lead in leads]
+    jumps = list(arc.jumps)
+    for last, touch, release, following in zip(jumps, jumps[1:], jumps[2:], jumps[3:], strict=False):
+        flight = min(touch.t - last.t, following.t - release.t)
+        if touch.transition == "impact" and flight > (max(leads) + LAG) * period:
+            return [_window(system, omega, (last, touch, release), lead * period) for lead in leads]
     raise ValueError(f"no impact with free flights around it at omega = {omega}")
 
 

@@ -358,3 +358,18 @@ def test_bad_arguments(arguments, message):
 def test_a_section_needs_a_period():
     with pytest.raises(hybrid.ArgumentError, match="per forcing period, but the system declares no period"):
         lyapunov.chart(models.bouncing_ball(), {"e": [0.8]}, (1.0, 0.0), section=5)
+
+
+def test_without_a_period_the_second_row_starts_where_the_transient_of_the_first_ends():
+    """A focus with the rate ``a``: the state turns by one radian per unit of time and shrinks."""
+    focus = hybrid.HybridSystem(
+        state=("q", "v"),
+        parameters={"a": 0.1},
+        modes=[hybrid.Mode("on", lambda t, x, p: (-p.a * x.q - x.v, x.q - p.a * x.v))],
+    )
+    two = lyapunov.chart(
+        focus, {"a": [0.1, 0.2]}, (1.0, 0.0), interval=0.5, transient=3, intervals=4, continue_from="previous"
+    )
+    # Then the second row's own transient and intervals: 3.5 units of time at its own rate.
+    size = np.exp(-0.1 * 1.5 - 0.2 * 3.5)
+    np.testing.assert_allclose(two.x_end[1], size * np.array([np.cos(5.0), np.sin(5.0)]), atol=1e-8)

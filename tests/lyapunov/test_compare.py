@@ -1,12 +1,14 @@
 """Comparisons of linear models, whose exponents are known."""
 
 import math
+from contextlib import contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hybrid import ArgumentError, Guard, HybridSystem, Mode, Reset, StatusCode, Transition
-from lyapunov import compare_models
+from lyapunov import compare, compare_models
 
 POINTS = ({"a": 1.0}, {"a": 2.0})
 SHORT = {"intervals": 20, "transient": 5}
@@ -106,3 +108,17 @@ def test_arguments_that_do_not_fit(comparison):
         comparison.cheapest(-1.0)
     with pytest.raises(ArgumentError, match=r"Model 'nearer' does not exist.*Did you mean 'near'"):
         comparison.distance("nearer")
+
+
+def test_the_bar_counts_the_spectra(monkeypatch):
+    shown = []
+
+    @contextmanager
+    def bar(total, *_):
+        shown.append(total)
+        yield SimpleNamespace(update=shown.append)
+
+    monkeypatch.setattr(compare, "progress_bar", bar)
+    systems = {"one": decay(lambda p: p.a), "other": decay(lambda p: 2 * p.a)}
+    compare_models(systems, (1.0, 1.0), reference="one", points=[{"a": 1.0}, {"a": 2.0}, {"a": 3.0}], **SHORT)
+    assert shown == [6, *[1] * 6]

@@ -125,7 +125,7 @@ def test_three_exponents_of_zero_are_a_torus_too():
         ["at rest", "at rest"],
     ]
     assert found.attrs["flag_values"] == [0, 1, 2, 3, 4]
-    assert found.attrs["flag_meanings"] == "not_known at rest periodic torus chaotic"
+    assert found.attrs["flag_meanings"] == "not_known at_rest periodic torus chaotic"
 
 
 def test_what_is_known_follows_from_the_first_exponent_and_the_status():

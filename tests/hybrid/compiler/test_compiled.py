@@ -1,11 +1,15 @@
 """From a model to machine code and a graph of indices."""
 
+from types import SimpleNamespace
+
 import attrs
 import numpy as np
 import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
+from hybrid.compiler import compiled as compiling
+from hybrid.compiler import emit
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT
@@ -143,3 +147,24 @@ def test_modes_whose_field_or_guard_depends_on_time_are_timed():
         ],
     )
     assert compile_system(system).model().timed.tolist() == [0, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("operations", "opaque"), [("ops", False), ("ops", True), (None, False), (None, True)]
+)
+def test_what_is_stored_is_what_another_process_can_read(operations, opaque, monkeypatch):
+    """Functions that are compiled as they are cannot be stored, nor what has no key."""
+    written = []
+    emitted = SimpleNamespace(opaque={"model_0": 1} if opaque else {})
+    monkeypatch.setattr(compiling, "operations_of", lambda system: operations)
+    monkeypatch.setattr(compiling.store, "read", lambda key: None)
+    monkeypatch.setattr(compiling.store, "write", lambda *both: written.append(both))
+    monkeypatch.setattr(emit, "emit", lambda system: emitted)
+    assert compiling.emitted_of("system") is emitted
+    assert written == ([] if operations is None or opaque else [("ops", emitted)])
+
+
+def test_what_was_stored_is_read(monkeypatch):
+    monkeypatch.setattr(compiling, "operations_of", lambda system: "ops")
+    monkeypatch.setattr(compiling.store, "read", lambda key: f"found {key}")
+    assert compiling.emitted_of("system") == "found ops"

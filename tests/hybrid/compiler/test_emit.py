@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hybrid.compiler.compiled import compile_system
-from hybrid.compiler.emit import emit
+from hybrid.compiler.emit import _placed, _places, _power_of_two_from, emit
+from hybrid.compiler.emitted import Series
 from hybrid.compiler.llvm.functions import compiled_part, own_functions
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS
 from hybrid.errors import ModelError
@@ -396,3 +397,47 @@ def test_columns_of_tangent_vectors_come_in_fours(tangents, groups):
         compiled.series_columns(tangents)
         == compiled.emitted.tangent_start + groups * mode.series.tangent_columns
     )
+
+
+def test_guards_that_are_not_affine_have_programs():
+    """They are bounded by interval arithmetic; where an affine one crosses follows from its polynomial."""
+    values = {
+        "line": lambda t, x, p: x.q - 2 * x.v + 1,
+        "circle": lambda t, x, p: x.q**2 + x.v**2 - 1,
+        "plane": lambda t, x, p: 3 * x.v,
+        "wave": lambda t, x, p: np.sin(x.q) - 0.3 * t,
+    }
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("run", lambda t, x, p: (x.v, -x.q))],
+        transitions=[Transition("run", "run", Guard(each, +1), name=name) for name, each in values.items()],
+    )
+    emitted = emit(system)
+    assert emitted.affine_guard == (True, False, True, False)
+    assert emitted.timed_guard == (False, False, False, True)
+    rows = np.diff(emitted.programs.first)[:4]
+    assert (rows > 0).tolist() == [False, True, False, True]
+
+
+class TestPlaces:
+    """Columns of the series of two modes in one matrix; the widest register has eight."""
+
+    series = (Series(columns=3, table_columns=4), Series(columns=5, table_columns=8))
+
+    def test_one_behind_the_other(self):
+        found = _places(self.series, with_room=False)
+        assert (found.tables, found.vectors) == ((5, 9), 24)
+
+    def test_with_room_for_further_modes(self):
+        found = _places(self.series, with_room=True)
+        assert (found.tables, found.vectors) == ((8, 12), 32)
+
+    def test_each_body_knows_its_columns_and_none_has_none(self):
+        places = _places(self.series, with_room=False)
+        bodies = _placed(places, [("a = 1", "b = 2"), ()])
+        assert bodies == [["table = 5", "vectors = 24", "a = 1", "b = 2"], []]
+
+    def test_powers_of_two(self):
+        assert [_power_of_two_from(count) for count in (1, 2, 3, 4, 5, 8, 9, 16, 17)] == [
+            *(1, 2, 4, 4, 8, 8, 16, 16, 32)
+        ]

@@ -10,6 +10,19 @@ from hybrid.orbits import periodic_schur
 from hybrid.orbits.periodic_schur import product_eigenvalues, rowwise_qr
 
 
+@pytest.fixture(autouse=True)
+def _sweeps_end(monkeypatch):
+    """A product whose eigenvalues do not separate fails; its sweeps are few."""
+    sweeps, sweep = [], periodic_schur._Reduced._sweep
+
+    def counted(*args):
+        sweeps.append(1)
+        assert len(sweeps) < 2000
+        return sweep(*args)
+
+    monkeypatch.setattr(periodic_schur._Reduced, "_sweep", counted)
+
+
 def orthogonal(n, rng):
     return np.linalg.qr(rng.normal(size=(n, n)))[0]
 

@@ -9,7 +9,7 @@ import pytest
 import hybrid
 from hybrid import Guard, StatusCode, poincare_section, simulate, stroboscopic_section
 from hybrid.orbits import sections
-from hybrid.simulation import trajectory
+from hybrid.simulation import interrupt, trajectory
 from models import bouncing_ball, impact_oscillator, vibroimpact
 from tests.cases import systems
 from tests.reference.load import reference
@@ -44,6 +44,22 @@ class TestStroboscopic:
         start = trajectory.start(system, (0.0,) * n, 0.0, solver=solver)
         carrying = trajectory.start(system, (0.0,) * n, 0.0, solver=solver, tangent=np.eye(n))
         for one, other in zip(sections.strobe(start, 30), sections.strobe(carrying, 30), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+    @pytest.mark.parametrize("steps", [1, 2, 3, 50, 10**6])
+    @pytest.mark.parametrize("count", [1, 2, 7])
+    def test_points_do_not_depend_on_where_bursts_end(self, steps, count, monkeypatch):
+        """A burst may end within a period, at its end, or within the last one."""
+
+        def made():
+            found = trajectory.start(OSCILLATOR, (0.0, 0.0), 0.0, solver=hybrid.DOP853(rtol=1e-6))
+            return sections.strobe(found, count)
+
+        states, places, code = made()
+        assert (len(states), len(places)) == (count, count)
+        monkeypatch.setattr(interrupt, "FIRST_BURST", steps)
+        monkeypatch.setattr(interrupt, "SECONDS", 0.0)
+        for one, other in zip(made(), (states, places, code), strict=True):
             np.testing.assert_array_equal(one, other)
 
     def test_modes(self):

@@ -1,9 +1,13 @@
 """The status reports the effect of a grazing on tangent vectors."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
+from hybrid.kernels.types import codes
+from hybrid.simulation import ending
 
 
 def parabola(depth):
@@ -70,3 +74,107 @@ def test_an_order_that_mattered_outranks_a_grazing_and_counts_it(depth, grazed):
     assert [jump.kind for jump in arc.jumps] == ["grazing" if grazed else "transverse", *["transverse"] * 2]
     assert arc.status.code == StatusCode.AMBIGUOUS_ORDER
     assert ("Besides, 1 of 3 jumps grazed within the tolerances." in arc.status.message) == grazed
+
+
+def ended(recent, jumps):
+    """A run that has made so many jumps, of which it remembers the last."""
+    return SimpleNamespace(jumps=jumps, run=SimpleNamespace(recent=np.array(recent)))
+
+
+@pytest.mark.parametrize(
+    ("recent", "jumps", "number", "found"),
+    [
+        ([5, 6, 7, 8], 4, 3, [6, 7, 8]),
+        ([5, 6, 7, 8], 6, 3, [8, 5, 6]),
+        ([5, 6, 7, 8], 6, 9, [7, 8, 5, 6]),
+        ([5, 6, 0, 0], 2, 3, [5, 6]),
+        ([5, 6, 7, 8], 4, 0, []),
+        ([5, 6, 7, 8], 0, 3, []),
+    ],
+)
+def test_transitions_that_fired_last_are_in_order(recent, jumps, number, found):
+    assert ending._recent(ended(recent, jumps), number) == found
+
+
+@pytest.mark.parametrize(
+    ("recent", "jumps", "found"),
+    [
+        ([1, 1, 1, 1], 4, [1]),
+        ([1, 2, 1, 2], 4, [1, 2]),
+        ([2, 2, 1, 2], 5, [2, 1, 2, 2]),
+        ([1, 2, 3, 1, 2, 3], 6, [1, 2, 3]),
+        ([3, 1, 2, 3, 1, 2], 6, [3, 1, 2]),
+        ([4, 4, 1, 2], 4, [4, 4, 1, 2]),
+        ([7, 0], 1, [7]),
+    ],
+)
+def test_the_round_is_the_shortest_that_repeats(recent, jumps, found):
+    assert ending._round(ended(recent, jumps)) == found
+
+
+RESET = Reset(lambda t, x, p: x)
+
+
+@pytest.mark.parametrize(
+    ("directions", "orientation", "surface", "resets", "faces"),
+    [
+        ((1, -1), (1, 1), (0, 0), (None, None), True),
+        ((1, 1), (1, -1), (0, 0), (None, None), True),
+        ((1, 1), (1, 1), (0, 0), (None, None), False),
+        ((1, -1), (1, -1), (0, 0), (None, None), False),
+        ((1, -1), (1, 1), (0, 1), (None, None), False),
+        ((1, -1), (1, 1), (0, 0), (RESET, None), False),
+        ((1, -1), (1, 1), (0, 0), (None, RESET), False),
+        ((1, -1, 1), (1, 1, 1), (0, 0, 0), (None, None, None), False),
+        ((1,), (1,), (0,), (None,), False),
+    ],
+)
+def test_two_modes_send_the_state_back_across_one_guard(directions, orientation, surface, resets, faces):
+    transitions = [
+        SimpleNamespace(guard=SimpleNamespace(direction=direction), reset=reset)
+        for direction, reset in zip(directions, resets, strict=True)
+    ]
+    emitted = SimpleNamespace(orientation=orientation, surface=surface)
+    run = SimpleNamespace(
+        system=SimpleNamespace(transitions=transitions), compiled=SimpleNamespace(emitted=emitted)
+    )
+    assert ending._faces(run, list(range(len(transitions)))) == faces
+
+
+def finished(tangents=2, **changes):
+    """A run that has reached its end, with something to tell."""
+    counted = dict.fromkeys(("singular_jumps", "order_mattered", "ill_conditioned", "indistinct"), 0)
+    emitted = SimpleNamespace(discontinuities=changes.pop("discontinuities", ((), ())))
+    return SimpleNamespace(
+        tangents=tangents,
+        jumps=9,
+        run=SimpleNamespace(**(counted | changes)),
+        compiled=SimpleNamespace(emitted=emitted),
+        system=SimpleNamespace(mode_names=("a", "b")),
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "told"),
+    [
+        ({"singular_jumps": 2}, StatusCode.SINGULAR_SALTATION, "2 of 9 jumps had no saltation matrix"),
+        ({"discontinuities": ((), ("x.q = 0",))}, StatusCode.DISCONTINUOUS_FIELD, "x.q = 0"),
+        ({"indistinct": 3}, StatusCode.INDISTINCT_TANGENTS, "3 times the tangent vectors became parallel"),
+    ],
+)
+def test_what_matters_to_tangent_vectors_alone(changes, code, told):
+    found = ending._status(finished(**changes), codes.DONE)
+    assert found.code == code
+    assert told in found.message
+    assert ending._status(finished(0, **changes), codes.DONE).code == StatusCode.SUCCESS
+
+
+def test_an_order_that_mattered_is_said_with_what_grazed():
+    text = "4 times two guards were reached together"
+    for tangents in (0, 2):
+        found = ending._status(finished(tangents, order_mattered=4, ill_conditioned=5), codes.DONE)
+        assert found.code == StatusCode.AMBIGUOUS_ORDER
+        assert text in found.message
+        assert ("5 of 9 jumps grazed" in found.message) == (tangents > 0)
+    alone = ending._status(finished(order_mattered=4), codes.DONE)
+    assert "grazed" not in alone.message

@@ -287,3 +287,53 @@ def test_many_short_calls_of_a_kernel():
         models.bouncing_ball(), (1.0, 0.0), intervals=70 * INTERVALS_AT_ONCE, interval=1e-7
     )
     assert found.intervals == 70 * INTERVALS_AT_ONCE
+
+
+class TestBursts:
+    """Steps that take 1 ms each, of which 20 ms are wanted before each question."""
+
+    def made(self, monkeypatch, limit=10**9, asked=False):
+        clock = [100.0]
+        monkeypatch.setattr(interrupt, "perf_counter", lambda: clock[0])
+        run = SimpleNamespace(steps=7, max_steps=limit, stop=SimpleNamespace(is_set=lambda: asked))
+        return interrupt.Bursts([run]), run, clock
+
+    def burst(self, bursts, run, clock, seconds, code=codes.MAX_STEPS):
+        run.steps = min(bursts.most(), run.steps + bursts.steps)
+        clock[0] += seconds
+        return bursts.judged(code)
+
+    def test_short_ones_are_doubled(self, monkeypatch):
+        bursts, run, clock = self.made(monkeypatch)
+        for times in range(1, 4):
+            assert self.burst(bursts, run, clock, 0.5 * interrupt.SECONDS) == codes.GO_ON
+            assert bursts.steps == interrupt.FIRST_BURST * 2**times
+
+    def test_long_ones_are_cut_to_what_fits(self, monkeypatch):
+        bursts, run, clock = self.made(monkeypatch)
+        before = bursts.steps
+        assert self.burst(bursts, run, clock, 1.5 * interrupt.SECONDS) == codes.GO_ON
+        assert bursts.steps == before
+        assert self.burst(bursts, run, clock, 4.0 * interrupt.SECONDS) == codes.GO_ON
+        assert bursts.steps == before // 4
+        assert self.burst(bursts, run, clock, 1e9) == codes.GO_ON
+        assert bursts.steps == 1
+
+    def test_work_that_is_done_early_tells_nothing(self, monkeypatch):
+        bursts, run, clock = self.made(monkeypatch)
+        before = bursts.steps
+        assert self.burst(bursts, run, clock, 0.0, codes.DONE) == codes.DONE
+        assert bursts.steps == before
+
+    def test_the_limit_of_steps_ends_a_run(self, monkeypatch):
+        bursts, run, _ = self.made(monkeypatch, limit=100)
+        run.steps = 95
+        assert bursts.most() == 100
+        run.steps = 100
+        assert bursts.judged(codes.MAX_STEPS) == codes.MAX_STEPS
+
+    def test_a_stop_is_heard_when_a_burst_or_a_run_is_over(self, monkeypatch):
+        bursts, run, clock = self.made(monkeypatch, asked=True)
+        assert self.burst(bursts, run, clock, 0.0) == StatusCode.INTERRUPTED
+        assert self.burst(bursts, run, clock, 0.0, codes.DONE) == StatusCode.INTERRUPTED
+        assert self.burst(bursts, run, clock, 0.0, codes.STUCK) == codes.STUCK

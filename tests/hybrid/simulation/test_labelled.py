@@ -9,6 +9,7 @@ import hybrid
 import lyapunov
 import models
 from hybrid import ArgumentError, simulate
+from hybrid.simulation.labelled import Names
 from tests.hybrid import systems
 
 SPAN = (0.0, 2.0)
@@ -83,3 +84,12 @@ def test_units_are_checked():
         systems.ball(units={"w": "m"})
     with pytest.raises(ArgumentError, match=r"HybridSystem: units\['v'\] must be"):
         systems.ball(units={"v": 3})
+
+
+def test_names_of_which_some_have_units():
+    names = Names(("q", "v"), {"v": "m/s", "t": "s"})
+    assert names.coords() == {"state": ("state", ["q", "v"]), "unit": ("state", ["", "m/s"])}
+    assert (names.of("v"), names.of("q"), names.rate) == ({"units": "m/s"}, {}, {"units": "1/s"})
+    without = Names(("q", "v"), {"t": "s"})
+    assert without.coords() == {"state": ("state", ["q", "v"])}
+    assert Names(("q",), {"q": "m"}).rate == {}

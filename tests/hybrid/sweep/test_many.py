@@ -91,6 +91,26 @@ def test_runs_that_end_early_say_so():
     assert_one_by_one(named, ball, starts[2:3], (0.0, 1.0), mode="flight")
 
 
+def test_each_thread_tells_of_its_own_starts():
+    """Each kind of end, the same starts in other orders, shared among three threads."""
+    ball = models.bouncing_ball()
+    kinds = np.array([[1.0, 0.0], [-1.0, 0.0], [200.0, 0.0]])
+    for turn in range(3):
+        starts = np.vstack([np.roll(kinds, turn + i, axis=0) for i in range(4)])
+        for options in ({}, {"mode": "flight"}):
+            found = simulate_many(ball, starts, (0.0, 9.0), max_jumps=5, executor=3, **options)
+            each = [
+                simulate_many(ball, x0[None], (0.0, 9.0), max_jumps=5, executor=1, **options) for x0 in starts
+            ]
+            for name in ("x_end", "t_end", "mode_end", "jumps", "status", "message"):
+                np.testing.assert_array_equal(
+                    found[name].values, np.concatenate([one[name].values for one in each])
+                )
+            wanted = {1.0: StatusCode.MAX_JUMPS, -1.0: StatusCode.FAILED, 200.0: StatusCode.SUCCESS}
+            if not options:
+                assert found.status.values.tolist() == [wanted[q] for q, _ in starts]
+
+
 def test_samples():
     times = [0.5, 0.5, 2.0]
     found = simulate_many(OSCILLATOR, {"x": [0.1, 0.2], "v": 0.0}, (0.0, 2.0), samples=times)

@@ -10,7 +10,7 @@ import sympy
 import hybrid
 import models
 from hybrid.compiler.compiled import emitted_of
-from hybrid.symbolic.continuity import jumps_of, may_jump
+from hybrid.symbolic.continuity import _sides, jumps_of, may_jump
 from hybrid.symbolic.tracing import model_symbols, trace
 
 STATES, PARAMETERS = ("q", "v"), ("k", "c")
@@ -231,3 +231,42 @@ def test_exponents_and_orbits_say_so():
     assert orbit.status.code == hybrid.StatusCode.DISCONTINUOUS_FIELD
     chart = lyapunov.chart(system, {"A": (2.0, 3.0)}, (0.5, 0.1), intervals=3)
     assert (chart.status != 0).all()
+
+
+def test_functions_within_a_function_are_looked_at():
+    def outer(t, x, p):
+        def inner(value):
+            return value if value > 1.0 else 1.0
+
+        return (inner(x[0].real),)
+
+    def smooth(t, x, p):
+        def inner(value):
+            return value * value
+
+        return (inner(x[0]),)
+
+    for differentiable in (False, True):
+        assert may_jump(outer, differentiable)
+        assert not may_jump(smooth, differentiable)
+    assert not may_jump(lambda t, x, p: (x[0].real * x[1],), differentiable=True)
+
+
+@pytest.mark.parametrize(
+    ("function", "step", "jump", "values"),
+    [
+        (np.floor, 2, 2.0, (1.0, 2.0)),
+        (np.ceil, 2, 2.0, (2.0, 3.0)),
+        (np.ceil, -1, -1.0, (-1.0, 0.0)),
+        (np.sign, 0, 0.0, (-1.0, 1.0)),
+        (lambda q: np.mod(q, 3.0), 2, 6.0, (3.0, 0.0)),
+    ],
+)
+def test_values_below_and_above_a_jump_are_those_of_numpy(function, step, jump, values):
+    [expression] = trace(lambda t, x, p: (function(x.q),), STATES, PARAMETERS)
+    symbol = sympy.Symbol("n", integer=True)
+    surface, sides = _sides(expression, symbol)
+    [q] = expression.free_symbols
+    assert float(surface.subs({q: jump, symbol: step})) == 0.0
+    assert tuple(float(sympy.sympify(side).subs(symbol, step)) for side in sides) == values
+    np.testing.assert_allclose([function(jump - 1e-9), function(jump + 1e-9)], values, atol=1e-8)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import sympy
 
+from hybrid.symbolic.expressions import Absolute, Level, Sign
 from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.switches import Surfaces, Switches, switching_names
+from hybrid.symbolic.switches import Surfaces, Switches, _first_atom, switching_names
 from hybrid.symbolic.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
@@ -28,6 +29,30 @@ def value(expression, t, q, v):
     except ValueError:
         return np.nan
     return out[0]
+
+
+class TestFirst:
+    """The innermost switching function is the first that is replaced by its branches."""
+
+    def first(self, *functions):
+        return _first_atom([each for function in functions for each in traced(function)], SYMBOLS)
+
+    def test_none(self):
+        assert self.first(lambda t, q, v: q * v - t, lambda t, q, v: np.sin(q)) is None
+        assert _first_atom([Sign(K) * Q, Q], SYMBOLS) is None
+        assert _first_atom([Level(Q), V], SYMBOLS) is None
+
+    def test_the_only_one(self):
+        assert self.first(lambda t, q, v: q * v, lambda t, q, v: 2 * np.sign(q - v)) == Sign(Q - V)
+        assert self.first(lambda t, q, v: np.sign(t)) == Sign(T)
+
+    def test_the_innermost(self):
+        assert self.first(lambda t, q, v: np.sign(q - np.abs(v))) == Absolute(V)
+
+    def test_conditions_come_before_what_they_choose(self):
+        found = self.first(lambda t, q, v: np.where(q > 1, np.abs(v), 0.0))
+        assert found == self.first(lambda t, q, v: np.where(q > 1, v, 0.0))
+        assert found.free_symbols == {Q}
 
 
 class TestSurfaces:

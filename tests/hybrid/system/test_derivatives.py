@@ -7,7 +7,7 @@ import pytest
 from hybrid.errors import ModelError
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.tracing import model_symbols, trace
-from hybrid.system.derivatives import complex_step_error
+from hybrid.system.derivatives import _central_difference, complex_step_error, reference_derivative
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem
@@ -158,3 +158,63 @@ def test_a_derivative_rounds_as_the_function_does():
     [row] = jacobian_of(trace(lambda t, x, p: 3.0 * (x[0] - x[1]) * x[2], 3, ()), (c,))
     assert row[0].is_Mul
     assert a - b in row[0].args
+
+
+class TestReference:
+    """Derivatives of one field at ``t = 0.8``, ``x = (1.25, -0.5)``, whose second entry is given."""
+
+    t, x = 0.8, np.array([1.25, -0.5])
+
+    def at(self, second, method=reference_derivative, slow=1.0):
+        system = HybridSystem(state=("q", "v"), modes=[Mode("a", lambda t, x, p: (x.v * slow, second(t, x)))])
+        function = field_function(system.modes[0], 2)
+        return method(system.variables, function, self.t, self.x, system.parameter_values())
+
+    @pytest.mark.parametrize("method", [reference_derivative, _central_difference])
+    @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+    def test_of_a_smooth_function(self, method, size):
+        found = self.at(lambda t, x: size * np.sin(2 * x.q) * x.v * t, method, size)
+        s, c = np.sin(2.5), np.cos(2.5)
+        exact = size * np.array([[0.0, 1.0, 0.0], [2 * c * -0.5 * 0.8, s * 0.8, s * -0.5]])
+        error, near = np.abs(found.values - exact), 1e-9 if method is _central_difference else 1e-14
+        assert error.max() < near * size
+        assert np.all(error <= found.tolerance)
+        assert found.tolerance.max() < 2e-6 * size
+        assert (found.t, found.x.tolist()) == (self.t, self.x.tolist())
+
+    def test_which_is_taken(self):
+        assert self.at(lambda t, x: x.q * x.v).source == "complex step"
+        # Beside its kink, the absolute value has no complex derivative.
+        assert self.at(lambda t, x: np.abs(x.q)).source == "central difference"
+        assert self.at(lambda t, x: np.abs(x.q)).values[1].tolist() == pytest.approx([1.0, 0.0, 0.0])
+        assert self.at(lambda t, x: np.sqrt(x.v)) is None
+
+    @pytest.mark.parametrize(
+        ("second", "column"),
+        [
+            (lambda t, x: np.abs(x.q - 1.25), 0),
+            (lambda t, x: np.maximum(x.v, -0.5) * 3, 1),
+            (lambda t, x: np.abs(t - 0.8), 2),
+            (lambda t, x: np.where(x.q > 1.25, 1.0, 0.0), 0),
+        ],
+    )
+    @pytest.mark.parametrize("method", [reference_derivative, _central_difference])
+    def test_kinks_and_jumps_are_not_judged(self, second, column, method):
+        """Of the other entries, all are."""
+        found = self.at(second, method)
+        wanted = np.zeros((2, 3), dtype=bool)
+        wanted[1, column] = True
+        np.testing.assert_array_equal(np.isinf(found.tolerance), wanted)
+
+    def test_what_bends_fast_is_no_kink(self):
+        found = self.at(lambda t, x: np.sin(1e3 * x.q))
+        assert np.all(np.isfinite(found.tolerance))
+        assert found.values[1, 0] == pytest.approx(1e3 * np.cos(1250.0), rel=1e-12)
+
+    def test_another_is_confirmed_within_the_tolerance(self):
+        found = self.at(lambda t, x: x.q * x.v)
+        tolerance = found.tolerance[1, 0]
+        for share, confirmed in ((0.9, True), (-0.9, True), (1.1, False), (-1.1, False), (np.nan, True)):
+            other = found.values.copy()
+            other[1, 0] += share * tolerance
+            assert found.confirms(other) == confirmed

@@ -202,3 +202,10 @@ class TestSides:
         depth = 1.1 * allowed
         with pytest.raises(PropertyError, match="goes below zero"):
             check_sides(case)
+
+
+@pytest.mark.parametrize("t0", [-7.0, 0.0, 5.0])
+def test_durations_do_not_depend_on_when_a_run_begins(t0):
+    case = attrs.evolve(case_of(), t0=t0, t1=t0 + 3.5)
+    assert case.duration == 3.5
+    check_jumps(case)

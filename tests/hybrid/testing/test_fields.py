@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hybrid import Mode, Taylor, from_equations, simulate
 from hybrid.system.graph import HybridSystem
-from hybrid.testing import piecewise_affine_fields
+from hybrid.testing import fields, piecewise_affine_fields
 from hybrid.transform.splitter import Splitter
 from tests.reference.piecewise_affine import System, solve
 
@@ -71,3 +71,10 @@ class TestRuns:
         arc = simulate(from_equations(field, state=2), x0, (0.0, 2.0), solver=TIGHT)
         assert arc.t[-1] == 2.0
         np.testing.assert_allclose([arc(t) for t in samples], reference.states, atol=1e-9)
+
+
+def test_a_row_of_zeros_is_zero():
+    """Factors of zero are left out: the product with what is not a number would be none."""
+    assert fields._sum(np.array([0.0, 0.0]), [np.nan, 5.0]) == 0.0
+    assert fields._sum(np.array([0.0, -2.0]), [np.nan, 5.0]) == -10.0
+    assert fields._sum(np.array([3.0, -2.0]), [1.0, 5.0]) == -7.0

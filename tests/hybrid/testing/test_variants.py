@@ -1,10 +1,12 @@
 """Systems written differently have the values of the original, and the changes that are asked for."""
 
+import attrs
 import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.system.derivatives import evaluate
+from hybrid.testing import variants
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
 
 X, T = np.array([0.3, -0.7]), 0.9
@@ -170,3 +172,11 @@ def test_the_period_stays(change):
     system = made(period=3.0)
     changed = change(system)
     assert getattr(changed, "system", changed).period == 3.0
+
+
+def test_a_name_that_no_parameter_has():
+    modes = [Mode("only", lambda t, x, p: (x.q,))]
+    system = HybridSystem(state=("q",), parameters={"unit": 1.0, "unit_": 2.0, "unit___": 3.0}, modes=modes)
+    assert variants.free_name(system, "unit") == "unit__"
+    assert variants.free_name(system, "other") == "other"
+    assert variants.free_name(attrs.evolve(system, parameters={}), "unit") == "unit"

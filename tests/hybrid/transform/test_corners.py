@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hybrid import StatusCode, from_equations, simulate
-from hybrid.transform.corners import arrivals, exits
+from hybrid.transform.corners import are_apart, arrivals, exits
+from tests.hybrid.transform.test_cells import numbers, pieces_of
 
 QUADRANTS = [(-1, -1), (-1, 1), (1, -1), (1, 1)]
 
@@ -120,3 +121,36 @@ class TestDeparture:
         assert arc.status.code == StatusCode.TERMINAL
         assert str(arc.jumps.transition[-1]) == "x=0, y=0: two-fold"
         assert arc.t[-1] == pytest.approx(0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("field", "apart"),
+    [
+        (lambda t, x, p: (-np.sign(x.x), -np.sign(x.y)), True),
+        (lambda t, x, p: (-np.sign(x.x) + x.y, -np.sign(x.y) * (2.0 + x.x)), True),
+        (lambda t, x, p: (-np.sign(x.x), -np.sign(x.y) + 0.1 * np.sign(x.x)), False),
+        (lambda t, x, p: (-np.sign(x.x) - 0.1 * np.sign(x.y), -np.sign(x.y)), False),
+        # Beside the normal (1, 0) of one surface the other one may change the rest as it likes.
+        (lambda t, x, p: (-np.sign(x.x) * np.sign(x.y), -np.sign(x.y)), False),
+    ],
+)
+def test_surfaces_are_apart_if_neither_changes_the_speed_through_the_other(field, apart):
+    pieces, _ = pieces_of(field)
+    on = numbers(pieces)
+    assert are_apart(pieces, dict.fromkeys(on, 0), on) == apart
+    assert are_apart(pieces, dict.fromkeys(on, 0), on[:1])
+
+
+def test_oblique_surfaces_are_apart_by_their_normals():
+    """The step across ``x = 0`` is along ``x + y = 0``: on both sides, the speed through that is the same."""
+
+    def field(t, x, p):
+        dry, other = np.sign(x.x), np.sign(x.x + x.y)
+        return -2.0 * dry, 2.0 * dry - other
+
+    pieces, _ = pieces_of(field)
+    on = list(range(len(pieces.surfaces.known)))
+    assert len(on) == 2
+    assert are_apart(pieces, dict.fromkeys(on, 0), on)
+    tilted, _ = pieces_of(lambda t, x, p: (-2.0 * np.sign(x.x), np.sign(x.x) - np.sign(x.x + x.y)))
+    assert not are_apart(tilted, dict.fromkeys(on, 0), on)

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 import models
+from hybrid import simulate
+from lyapunov.study import impact as study
 from lyapunov.study.impact import (
+    LAG,
+    Measured,
     by_library,
     by_ode23s,
     by_straight_dop853,
@@ -69,3 +73,44 @@ def test_controlled_tangents_at_events_are_right_and_uncontrolled_ones_are_not(w
     assert measure(windows[0], by_library(1e-6)).map_error < 1e-5
     assert measure(windows[0], by_uncontrolled_dop853(1e-6)).map_error > 0.1
     assert measure(windows[0], by_straight_dop853(1e-8)).map_error < 1e-3
+
+
+@pytest.mark.parametrize(("omega", "touch"), [(7.40, 2.010243718), (7.50, 2.057722819), (7.60, 4.115301816)])
+def test_the_first_impact_with_free_flights_around_it(omega, touch):
+    """The window has one contact, ``lead`` after its start, and ends ``LAG`` after the release."""
+    system, period = models.vibroimpact(), 2 * np.pi / omega
+    for lead, impact in zip((0.05, 0.3), impacts(system, omega, leads=(0.05, 0.3)), strict=True):
+        assert impact.t_impact / period == pytest.approx(touch, abs=1e-6)
+        begin, end = impact.t_span
+        assert impact.t_impact - begin == pytest.approx(lead * period, rel=1e-9)
+        assert end - impact.t_release == pytest.approx(LAG * period, rel=1e-9)
+        run = simulate(
+            system, impact.x, impact.t_span, mode="free", parameters={"omega": omega}, solver=study.EXACT,
+            tangent=np.eye(4),
+        )  # fmt: skip
+        assert [jump.transition for jump in run.jumps] == ["impact", "release"]
+        np.testing.assert_allclose(run.jumps.t, [impact.t_impact, impact.t_release], atol=1e-11)
+        np.testing.assert_allclose(run.x[-1], impact.end, atol=1e-9)
+        np.testing.assert_allclose(run.jumps[0].x_minus, impact.x_impact, atol=1e-9)
+        whole = impact.after @ impact.contact @ impact.before
+        np.testing.assert_allclose(run.fundamental, whole, rtol=1e-4, atol=1e-4 * np.abs(whole).max())
+        rest = simulate(
+            system, impact.end, (end, begin + period), mode="free", parameters={"omega": omega},
+            solver=study.EXACT, tangent=np.eye(4),
+        )  # fmt: skip
+        np.testing.assert_allclose(impact.rest_of_the_period, rest.fundamental, atol=1e-9)
+
+
+def test_no_impact_with_so_long_flights():
+    with pytest.raises(ValueError, match=r"no impact with free flights around it at omega = 7.4"):
+        impacts(models.vibroimpact(), 7.40, leads=(0.99,))
+
+
+def test_errors_are_relative_and_have_signs(windows):
+    impact = windows[0]
+    end = impact.end.copy()
+    end[2:] *= 1.01
+    found = Measured(impact, end, 0.9 * impact.contact)
+    assert found.restitution_error == pytest.approx(0.01, rel=1e-9)
+    assert found.map_error == pytest.approx(0.1, rel=1e-9)
+    assert found.volume_error == pytest.approx(0.9**4 - 1, rel=1e-6)

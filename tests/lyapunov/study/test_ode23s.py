@@ -3,6 +3,7 @@
 import math
 import shutil
 import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import models
 from hybrid import simulate
 from hybrid.kernels.types.kinds import REAL, VECTOR
 from hybrid.kernels.types.numba_types import signature_of
+from lyapunov.study import ode23s
 from lyapunov.study.ode23s import Ode23s, StepTooSmall
 from lyapunov.study.runs import STARTS
 
@@ -153,6 +155,25 @@ def test_it_says_that_no_step_met_the_tolerance():
 
     with pytest.raises(StepTooSmall, match="ode23s at rtol"):
         Ode23s().steps(compiled(explodes), (1.0,), (0.0, 2.0))
+
+
+@pytest.mark.parametrize("done", [0, 6, 7])
+def test_growths_end_where_no_step_met_the_tolerance(done, monkeypatch):
+    """Two periods of transient and five of growth."""
+
+    def growth_rates(*arguments):
+        arguments[7][:] = np.arange(7.0)[:, None]
+        return done
+
+    kernels = SimpleNamespace(growth_rates=growth_rates, founding_field=None)
+    monkeypatch.setattr(ode23s, "load_kernels", lambda name: kernels)
+    method, options = Ode23s(1e-6, 1e-7), {"omega": 7.4, "k": 2, "periods": 5, "transient": 2}
+    if done < 7:
+        with pytest.raises(StepTooSmall, match=f"rtol = 1e-06 stopped in period {done}"):
+            method.growths(models.vibroimpact(), np.zeros(4), **options)
+    else:
+        found = method.growths(models.vibroimpact(), np.zeros(4), **options)
+        np.testing.assert_array_equal(found, [[i, i] for i in range(2, 7)])
 
 
 def test_the_founding_field_is_that_of_the_model():

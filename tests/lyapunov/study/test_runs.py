@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import models
 from hybrid import DOP853, Taylor
-from lyapunov.study.runs import Regime, Settings
+from lyapunov.study.runs import PORTRAIT_PERIODS, STARTS, Regime, Settings, study_regime
 
 SPREAD = np.array([[0.0, 1.0], [0.5, 1.0], [0.2, 1.5]])
 
@@ -60,3 +61,20 @@ def test_neighbouring_orbits_have_a_tighter_solver(solver, tight):
 def test_an_impact_is_two_jumps():
     spectra = tuple(SimpleNamespace(jumps_per_interval=each) for each in (2.0, 1.0, 0.5))
     assert Regime(7.4, spectra, None, None, None, None).impacts_per_period == (1.0, 0.5, 0.25)
+
+
+def test_a_regime_at_one_frequency():
+    """All exponents from the first start and the largest from the others; the section half a period later."""
+    settings = Settings(intervals=12, transient=60, solver=Taylor(rtol=1e-7, atol=1e-9))
+    found = study_regime(models.vibroimpact(), 7.40, settings)
+    assert [len(spectrum.exponents) for spectrum in found.spectra] == [4] + [1] * (len(STARTS) - 1)
+    assert {spectrum.intervals for spectrum in found.spectra} == {12}
+    assert found.two_orbit.intervals == 12
+    period = 2 * np.pi / 7.40
+    np.testing.assert_allclose(found.section.t, (np.arange(12) + 1.5) * period, rtol=1e-12)
+    np.testing.assert_allclose(
+        [found.arc.t[0], found.arc.t[-1]], [0.5 * period, (0.5 + PORTRAIT_PERIODS) * period]
+    )
+    np.testing.assert_allclose(found.arc(1.5 * period), found.section.x[0], atol=1e-6)
+    np.testing.assert_allclose(found.orbit.x0, (-0.00765806, -0.00411675, 0.05565196, -0.35621583), atol=1e-7)
+    assert found.omega == 7.40

@@ -120,12 +120,20 @@ class TestIsMultiple:
             (a * x - a * y, x - y),
             ((x - y) * (a + b) ** 2, b * x - b * y),
             (x**2 - x, x * (1 - x)),
+            (1e15 * a * x - 1e15 * a * y, x - y),
+            (x / 7 - y / 7, 1e-15 * x - 1e-15 * y),
         ],
     )
     def test_factor_of_parameters(self, expression, other):
         assert is_multiple(expression, other, symbols)
 
-    @pytest.mark.parametrize(("expression", "other"), [(x + 0.01, x), (x * y, x), (symbols.t * x, x)])
+    @pytest.mark.parametrize(
+        ("expression", "other"),
+        [
+            *[(x + 0.01, x), (x * y, x), (symbols.t * x, x)],
+            *[(1e-15 * x + 1e-17, x), (1e15 * x * y, 1e-15 * x)],
+        ],
+    )
     def test_factor_of_the_state(self, expression, other, monkeypatch):
         """The values decide; simplifying the ratio of large expressions would take minutes."""
         monkeypatch.delattr(sympy, "cancel")

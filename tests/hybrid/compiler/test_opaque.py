@@ -1,0 +1,74 @@
+"""Functions that are compiled as they are: their values and slopes, and what is said where that fails."""
+
+import math
+
+import pytest
+
+from hybrid.compiler.opaque import LONGEST_REASON, OpaqueFunction, _short, compiled_functions
+from hybrid.errors import ModelError
+
+NAMED, COUNTED = ("q", "v"), 2
+
+
+def opaque(function, state=NAMED, shape=(2,), slopes=False):
+    title, reason = "Mode 'a': field", "a comparison"
+    return OpaqueFunction(title, function, reason, state, ("k",), shape, slopes)
+
+
+def refusal(*args, **options):
+    with pytest.raises(ModelError) as caught:
+        compiled_functions("model_0", opaque(*args, **options))
+    text = str(caught.value)
+    assert text.startswith("Mode 'a': field")
+    return text
+
+
+class TestRefusal:
+    """Either the function itself or what it returns cannot be compiled, and the text tells which."""
+
+    @pytest.mark.parametrize("slopes", [False, True])
+    @pytest.mark.parametrize("state", [NAMED, COUNTED])
+    def test_a_number_where_a_row_is_needed(self, state, slopes):
+        text = refusal(lambda t, x, p: x[0] if x[0].real > 1.0 else 2.0 * x[1], state, slopes=slopes)
+        assert ": what it returns cannot be compiled: TypingError: " in text
+        assert text.endswith("Return a tuple or an array of numbers.")
+
+    def test_a_write_into_the_state(self):
+        def field(t, x, p):
+            x[0] = 1.0
+            return x
+
+        text = refusal(field, COUNTED)
+        assert "as it is. Tracing stopped: a comparison. The compiler stopped: " in text
+        assert "setitem(readonly array(float64, 1d, C)" in text
+
+    @pytest.mark.parametrize("state", [NAMED, COUNTED])
+    def test_a_function_of_real_numbers_that_needs_a_slope(self, state):
+        def field(t, x, p):
+            return x[1], math.gamma(x[0])
+
+        assert len(compiled_functions("model_0", opaque(field, state))) == 1
+        text = refusal(field, state, slopes=True)
+        assert "The compiler stopped: TypingError: " in text
+        assert "signature: gamma(complex128). Write" in text
+
+
+class TestTextOfTheCompiler:
+    @pytest.mark.parametrize(
+        ("text", "told"),
+        [
+            ("Failed in nopython mode\n  | Use of unknown type.\nFile x, line 3", "Use of unknown type"),
+            ("Unknown.\nMore", "Unknown"),
+            ("None for signature:\n >>> floor(complex128)\nMore", "None for signature: floor(complex128)"),
+            ("Wrong signature:", "Wrong signature:"),
+            ("Failed in nopython mode", "Failed in nopython mode"),
+            ("", "it gives no reason"),
+        ],
+    )
+    def test_the_line_that_names_the_problem(self, text, told):
+        assert _short(ValueError(text)) == f"ValueError: {told}"
+
+    def test_a_long_line_is_cut(self):
+        most = "x" * LONGEST_REASON
+        assert _short(ValueError(f"{most}y")) == f"ValueError: {most} ..."
+        assert _short(ValueError(most)) == f"ValueError: {most}"
