@@ -18,7 +18,6 @@ from hybrid.kernels.events.guards import (
     guard_acceleration,
     guard_speed,
 )
-from hybrid.kernels.events.record import start_record
 from hybrid.kernels.jumps.chatter import (
     accumulation,
     add_change_of_duration,
@@ -43,6 +42,7 @@ from hybrid.kernels.jumps.locked import (
     postpone_map,
     restore_tangents,
 )
+from hybrid.kernels.jumps.record import remember_flight, remember_jump
 from hybrid.kernels.jumps.rounds import limit_of_rounds, next_in_turn, remember_visit, slot_of
 from hybrid.kernels.jumps.skipped import MANY_AT_ONCE, has_come_to_rest, jumps_in_turn, way_is_free
 from hybrid.kernels.jumps.steep import is_steep, is_steep_behind
@@ -123,33 +123,6 @@ def assume_sizes(n, work):
     for i in range(n):
         for j in range(n):
             work.sizes[i, j] = largest
-
-
-@njit(**KERNEL)
-def remember_jump(model, run, record, transition, transversality, kind, known, x_plus, work):
-    """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any.
-
-    Its matrix is ``work.saltation`` if that is ``known``; else the matrix follows from the other entries.
-    """
-    n, slot = model.dimension, record.jumps
-    if slot == record.jump_phase.shape[0]:
-        return
-    record.jump_phase[slot] = run.phase
-    record.jump_cycle[slot] = run.cycle
-    record.jump_transition[slot] = transition
-    record.jump_transversality[slot] = transversality
-    record.jump_kind[slot] = kind
-    record.jump_has_matrix[slot] = 1 if known else 0
-    for i in range(n):
-        record.jump_states[slot, 0, i] = run.y[i]
-        record.jump_states[slot, 1, i] = x_plus[i]
-    record.jumps = slot + 1
-    if known:
-        matrix = record.jump_saltation[record.matrices]
-        for i in range(n):
-            for j in range(n):
-                matrix[i, j] = work.saltation[i, j]
-        record.matrices += 1
 
 
 @njit(**KERNEL)
@@ -330,18 +303,6 @@ def jump(task, transition):
     if tangents > 0 and not steep and not locked:
         steep = is_steep_behind(model, method, run, transition, tangents, work)
     run.steep_jumps += 1 if steep else 0
-
-
-@njit(**KERNEL)
-def remember_flight(run, record, n, span, x_limit):
-    """Write the skipped jumps into the record of steps, as one straight line to their limit."""
-    if record.steps == record.step_phase.shape[0]:
-        return
-    rows = record.step_coefficients[start_record(run, record, run.phase, span)]
-    for k in range(rows.shape[0]):
-        for i in range(n):
-            rows[k, i] = run.y[i] if k == 0 else (x_limit[i] - run.y[i] if k == 1 else 0.0)
-        rows[k, n] = span if k == 1 else 0.0
 
 
 @njit(**KERNEL)

@@ -60,5 +60,11 @@ def test_values_become_plain_numbers():
     assert [type(each) for each in (found.rtol, found.max_step, found.max_steps)] == [float, float, int]
 
 
-def test_only_taylor_has_series():
-    assert [kind().series_order > 0 for kind in SOLVERS] == [True, False, False, False]
+def test_only_taylor_prefers_series():
+    assert [kind.by_series for kind in SOLVERS] == [True, False, False, False]
+
+
+@pytest.mark.parametrize(("rtol", "order"), [(1e-2, 12), (1e-4, 16), (1e-8, 25), (1e-10, 28), (1e-14, 28)])
+def test_the_order_of_series_grows_with_the_digits(rtol, order):
+    """It is six more than the number of e-foldings of the tolerance, between 12 and 28."""
+    assert [kind(rtol=rtol).series_order for kind in SOLVERS] == [order] * 4
