@@ -299,7 +299,7 @@ def remember_series(model, run, record, order, t, h, span, clock, work):
             rows[o, i] = 0.0
 
 
-@njit(**KERNEL)
+@njit(**INLINE)
 def set_origins(model, run, order, series):
     """Tell the series what they may take the roots of guards from.
 
@@ -308,11 +308,10 @@ def set_origins(model, run, order, series):
     """
     mode, n = run.mode, model.dimension
     first = model.first_outgoing[mode]
+    origin = FROM_LAST_STEP if run.stage == READY else FROM_STATE
     for slot in range(first, model.first_outgoing[mode + 1]):
-        origin = FROM_LAST_STEP if run.stage == READY else FROM_STATE
-        if run.on_guard[model.outgoing[slot]] == BY_SPEED:
-            origin = FROM_ZERO
-        series[order + 2, n + slot - first] = origin
+        leaves = run.on_guard[model.outgoing[slot]] == BY_SPEED
+        series[order + 2, n + slot - first] = FROM_ZERO if leaves else origin
 
 
 @njit(**KERNEL)
@@ -454,9 +453,10 @@ def series_step(task, remaining):
     if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
     accept_series(model, run, tangents, order, h, work)
-    for column in range(n, n + guards if kind in (DESINGULARISED, ROOTED) else n):
+    if order < method.order:
         # The next series looks for its root behind a series of the full order.
-        series[method.order + 1, column] = series[order + 1, column]
+        for column in range(n, n + guards):
+            series[method.order + 1, column] = series[order + 1, column]
     run.stage = READY
     if cut:
         sides_at(model, run, t + span, work)
