@@ -23,7 +23,8 @@ from hybrid.kernels.arithmetic.lanes import (
     store,
 )
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
-from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, rounding_band, sides_at
+from hybrid.kernels.events.derivatives import speed_rounding
+from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at, value_at
 from hybrid.kernels.events.record import start_record
@@ -321,7 +322,7 @@ def reach_guard(model, run, tangents, transition, t, longest, work):
     A contact ends where the root of its guard vanishes, and the guard differs from the square of the root by
     the error of the step. A guard that is not affine has a series with terms, and rounding, of its own. Left
     beyond its rounding it would count as not yet, or once more, crossed. Nothing is done, and 0 returned,
-    where it is within its rounding, or where more than ``longest`` would be needed. With ``tangents`` 0,
+    where its speed is rounding, or where more than ``longest`` would be needed. With ``tangents`` 0,
     tangent vectors stay as they are: those at the zero of the root are right, and their rate may be infinite
     there.
     """
@@ -330,15 +331,15 @@ def reach_guard(model, run, tangents, transition, t, longest, work):
     speed = guard_speed(model, transition, t, run.y, field, work.gradient)
     if speed == 0.0:
         return 0.0
-    value = guard_value(model, transition, t, run.y, work.scalar)
-    correction = -value / speed
+    correction = -guard_value(model, transition, t, run.y, work.scalar) / speed
     if not abs(correction) <= longest:
         return 0.0
-    if model.affine_guard[transition] == 0 and abs(value) <= rounding_band(
-        model, run, transition, t, run.y, work
-    ):
-        # At a flat root value and speed are rounding, and their quotient may be large.
-        return 0.0
+    if model.affine_guard[transition] == 0:
+        for i in range(model.dimension):
+            work.field[i] = field[i]
+        if abs(speed) <= speed_rounding(model, run, transition, run.mode, t, run.y, work):
+            # At a flat root value and speed are rounding, and their quotient may be large.
+            return 0.0
     for i in range(model.dimension * (1 + tangents)):
         run.y[i] += correction * field[i]
     return correction
