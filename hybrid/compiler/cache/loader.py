@@ -8,9 +8,12 @@ Numba is imported only to compile them.
 from __future__ import annotations
 
 import ast
+import gc
 import importlib
 import importlib.util
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -79,13 +82,25 @@ def compiled(module: str) -> bytes:
     import_numba()
     from hybrid.kernels.types.export import exports_of, object_code
 
-    with between_passes():
+    with between_passes(), _without_collection():
         exports = exports_of(importlib.import_module(module))
         signatures = {
             name: [text_of(export.result), *map(text_of, export.arguments)]
             for name, export in exports.items()
         }
         return file_of(signatures, object_code(exports))
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Pause the search for garbage: nearly all that a compilation makes is kept until its end."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 @cache

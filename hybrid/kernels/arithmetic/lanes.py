@@ -23,10 +23,16 @@ from hybrid.kernels.instructions.registers import (
     write,
 )
 from hybrid.kernels.types.codes import NARROW
-from hybrid.kernels.types.options import PartCompiler
+from hybrid.kernels.types.part_compiler import PartCompiler
 
 # These functions are small and run at every order: without inlining, the call would cost as much as the work.
-HERE = {"_nrt": False, "forceinline": True, "pipeline_class": PartCompiler}
+HERE = {
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "forceinline": True,
+    "pipeline_class": PartCompiler,
+}
 
 
 class LanesType(types.Type):

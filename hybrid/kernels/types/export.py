@@ -10,24 +10,17 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba.core import types
-from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 
 from hybrid.kernels.types.kinds import BY_WORDS, Pair, width_of
 from hybrid.kernels.types.numba_types import array_in, numba_type, signature_of, word_in
-from hybrid.kernels.types.options import optimise
+from hybrid.kernels.types.part_compiler import WholeLibrary
 
 WORD = ir.IntType(64)
 
 
-class _ExportLibrary(JITCodeLibrary):
+class _ExportLibrary(WholeLibrary):
     """A library whose machine code goes into a file, not into this process."""
-
-    def _optimize_final_module(self):
-        optimise(self)
-
-    def _finalize_final_module(self):
-        self._finalized = True
 
     def machine_code(self):
         """The contents of an object file."""
