@@ -23,8 +23,6 @@ THOROUGHLY = (
     "hybrid.kernels.steps.series",
     "hybrid.kernels.steps.series_guards",
 )
-# Their functions that mostly call the others: to optimise them twice takes a tenth of all time for nothing.
-ONCE = ("series_step", "earliest_on_series")
 # Numba's passes that change nothing in a kernel. The legalisation marks where variables end, which only
 # references need.
 NEEDLESS = {
@@ -165,8 +163,7 @@ class _PartLowering(NativeLowering):
     def run_pass(self, state):
         """Choose the library before numba would make the usual one."""
         name = state.func_id.func_qualname
-        thoroughly = state.func_id.modname in THOROUGHLY and name not in ONCE
-        library = _OptimisedPart if thoroughly else _PartLibrary
+        library = _OptimisedPart if state.func_id.modname in THOROUGHLY else _PartLibrary
         state.library = library(state.targetctx.codegen(), name)
         state.library.enable_object_caching()
         return super().run_pass(state)
