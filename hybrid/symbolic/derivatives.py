@@ -86,9 +86,9 @@ def _partials(expression: sympy.Expr, wanted: frozenset[sympy.Symbol], distribut
     if isinstance(expression, sympy.sign):
         return {}
     args = expression.args
-    inner = [_partials(argument, wanted, distributed) for argument in args]
-    terms: dict[sympy.Symbol, list[sympy.Expr]] = {}
     decays = _decays(expression)
+    inner = [_partials(argument, wanted, distributed) for argument in (args if not decays else ())]
+    terms: dict[sympy.Symbol, list[sympy.Expr]] = {}
     if decays:
         for argument, factor in decays:
             for v, part in _partials(argument, wanted, distributed).items():

@@ -97,14 +97,34 @@ def was_left_behind(model, run, transition, t, x, speed, side, work):
 
 
 @njit(**INLINE)
+def gradient_band(model, run, t, gradient):
+    """How far rounding of state and time moves a guard with this gradient ``(n + 1,)``."""
+    n = model.dimension
+    size = abs(gradient[n]) * size_of_time(model, t)
+    for i in range(n):
+        size += abs(gradient[i]) * run.scale[i]
+    return ROUNDING_OF_STATE * EPSILON * size
+
+
+@njit(**INLINE)
+def displace(model, x, distance, gradient, out):
+    """Write the state beside ``x (n,)`` where a guard is larger by ``distance`` into ``out``.
+
+    If the guard, whose gradient is given, does not depend on the state, that is ``x``.
+    """
+    n, square = model.dimension, 0.0
+    for i in range(n):
+        square += gradient[i] * gradient[i]
+    for i in range(n):
+        out[i] = x[i] + (distance * gradient[i] / square if square > 0.0 else 0.0)
+
+
+@njit(**INLINE)
 def smooth_band(model, run, transition, t, x, work):
     """``rounding_band`` from the gradient in ``work.gradient`` and from terms that may cancel."""
-    n = model.dimension
-    size = abs(work.gradient[n]) * size_of_time(model, t)
-    for i in range(n):
-        size += abs(work.gradient[i]) * run.scale[i]
+    band = gradient_band(model, run, t, work.gradient)
     program = transition + model.target.shape[0] + model.first_forcing[-1] + model.first_residue[-1]
-    return ROUNDING_OF_STATE * EPSILON * size + spread_of_terms(model, run, program, t, x, work)
+    return band + spread_of_terms(model, run, program, t, x, work)
 
 
 @njit(**KERNEL)
@@ -223,18 +243,13 @@ def slopes_at_guard(model, run, transition, mode, t, x, work):
     The slope of a root of the guard grows without limit towards the guard. Next to the guard it is no measure
     of what rounding does to the rates. Just beyond the guard, where the mode ends, it is zero.
     """
-    n, direction = model.dimension, model.direction[transition]
+    direction = model.direction[transition]
     if model.steep[mode] == 1 and direction != 0:
         value = abs(guard_value(model, transition, t, x, work.scalar))
-        size, square = abs(work.gradient[n]) * size_of_time(model, t), 0.0
-        for i in range(n):
-            size += abs(work.gradient[i]) * run.scale[i]
-            square += work.gradient[i] * work.gradient[i]
-        band = ROUNDING_OF_STATE * EPSILON * size
-        if square > 0.0 and value <= LEFT_BEHIND * band:
+        band = gradient_band(model, run, t, work.gradient)
+        if value <= LEFT_BEHIND * band:
             place = work.rounding[PLACE]
-            for i in range(n):
-                place[i] = x[i] + direction * (value + band) * work.gradient[i] / square
+            displace(model, x, direction * (value + band), work.gradient, place)
             model.field_jacobian(mode, t, place, model.parameters, work.jacobian)
             return
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)

@@ -13,7 +13,7 @@ and its level has reached the guard ``h`` there.
 
 from numba import njit
 
-from hybrid.kernels.events.guards import error_band, guard_speed, guard_value, rounding_band
+from hybrid.kernels.events.guards import displace, error_band, guard_speed, guard_value, rounding_band
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -86,11 +86,7 @@ def speed_displaced(model, transition, mode, t, x, distance, work):
 
     ``work.gradient`` is current, and tells where that is.
     """
-    n, square = model.dimension, 0.0
-    for i in range(n):
-        square += work.gradient[i] * work.gradient[i]
-    for i in range(n):
-        work.state[i] = x[i] + (distance * work.gradient[i] / square if square > 0.0 else 0.0)
+    displace(model, x, distance, work.gradient, work.state)
     model.field(mode, t, work.state, model.parameters, work.field_after)
     return guard_speed(model, transition, t, work.state, work.field_after, work.gradient)
 

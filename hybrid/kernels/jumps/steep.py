@@ -10,9 +10,8 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import change_of_rate
-from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_speed, size_of_time
+from hybrid.kernels.events.guards import displace, gradient_band, guard_speed
 from hybrid.kernels.types.codes import RUNGE_KUTTA
-from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # Slopes are compared at the distance of rounding from the guard, and so many times farther.
@@ -24,11 +23,8 @@ GROWS = 1.02
 @njit(**KERNEL)
 def rates_beside(model, run, mode, t, distance, tangents, out, work):
     """Rates of the tangent vectors at a ``distance`` from the guard with the gradient ``work.gradient``."""
-    n, square = model.dimension, 0.0
-    for i in range(n):
-        square += work.gradient[i] * work.gradient[i]
-    for i in range(n):
-        work.state[i] = run.y[i] + (distance * work.gradient[i] / square if square > 0.0 else 0.0)
+    n = model.dimension
+    displace(model, run.y, distance, work.gradient, work.state)
     model.field_jacobian(mode, t, work.state, model.parameters, work.jacobian)
     for start in range(n, n * (1 + tangents), n):
         for i in range(n):
@@ -46,10 +42,7 @@ def is_lost(model, method, run, mode, transition, side, tangents, work):
         return False
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = abs(guard_speed(model, transition, t, run.y, work.field, work.gradient))
-    size = abs(work.gradient[n]) * size_of_time(model, t)
-    for i in range(n):
-        size += abs(work.gradient[i]) * run.scale[i]
-    distance = ROUNDING_OF_STATE * EPSILON * size
+    distance = gradient_band(model, run, t, work.gradient)
     rates_beside(model, run, mode, t, side * distance, tangents, work.new, work)
     rates_beside(model, run, mode, t, side * FARTHER * distance, tangents, work.trial, work)
     for start in range(n, n * (1 + tangents), n):
