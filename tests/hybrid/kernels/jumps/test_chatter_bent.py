@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
+from tests.hybrid.exact import derivative_of
 
 SOLVERS = {
     "Taylor": Taylor(),
@@ -71,19 +72,6 @@ def exact(x, p, t1):
     return [wall(t1, z, p, mp.sin), mp.mpf(0), w, r, z]
 
 
-def exact_derivative(x0, p, t1):
-    with mp.workdps(50):
-        h, columns = mp.mpf(10) ** -20, []
-        for j in range(len(x0)):
-            ends = []
-            for moved in (h, -h):
-                x = [mp.mpf(value) for value in x0]
-                x[j] += moved
-                ends.append(exact(x, p, mp.mpf(t1)))
-            columns.append([float((up - down) / (2 * h)) for up, down in zip(*ends, strict=True)])
-    return np.array(columns).T
-
-
 def balls(count, shake):
     rng = np.random.default_rng(7)
     for _ in range(count):
@@ -109,6 +97,6 @@ def test_tangent_map(solver, shake):
         with mp.workdps(30):
             end = [float(value) for value in exact([mp.mpf(value) for value in x0], p, mp.mpf(t1))]
         np.testing.assert_allclose(arc.x[-1], end, rtol=0, atol=2e-6)
-        wanted = exact_derivative(x0, p, t1)
+        wanted = derivative_of(exact, x0, p, t1)
         largest = ACCURACY * np.abs(wanted).max()
         np.testing.assert_allclose(arc.fundamental, wanted, rtol=0, atol=largest, err_msg=f"{p}, {x0}")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
+from tests.hybrid.exact import derivative_of
 
 NAMES = ("q", "v", "w", "r", "k", "z")
 UNITS = {f"u{name}": 1.0 for name in NAMES} | {"u": 1.0}
@@ -65,19 +66,6 @@ def exact(x, p, t1):
     return [mp.mpf(0), mp.mpf(0), w + p["f"] * (z * left + p["d"] * left**2 / 2), r, k, z + p["d"] * left]
 
 
-def exact_derivative(x0, p, t1):
-    with mp.workdps(50):
-        h, columns = mp.mpf(10) ** -20, []
-        for j in range(len(x0)):
-            ends = []
-            for moved in (h, -h):
-                x = [mp.mpf(value) for value in x0]
-                x[j] += moved
-                ends.append(exact(x, p, mp.mpf(t1)))
-            columns.append([float((up - down) / (2 * h)) for up, down in zip(*ends, strict=True)])
-    return np.array(columns).T
-
-
 def balls(count):
     rng = np.random.default_rng(4)
     for _ in range(count):
@@ -116,7 +104,7 @@ def test_tangent_map(solver, accuracy):
             end = [float(value) for value in exact([mp.mpf(value) for value in x0], p, mp.mpf(t1))]
         size = max(1.0, np.abs(end).max())
         np.testing.assert_allclose(arc.x[-1] / units, end, rtol=0, atol=1e-10 * size)
-        wanted = exact_derivative(x0, p, t1)
+        wanted = derivative_of(exact, x0, p, t1)
         found = arc.fundamental / units[:, None] * units
         np.testing.assert_allclose(
             found, wanted, rtol=0, atol=accuracy * np.abs(wanted).max(), err_msg=str(x0)
