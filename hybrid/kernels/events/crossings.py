@@ -17,8 +17,10 @@ from hybrid.kernels.events.guards import (
     size_of_time,
     was_left_behind,
 )
+from hybrid.kernels.events.hidden import hidden_until, sample
 from hybrid.kernels.events.onset import (
     BY_SPEED,
+    BY_STEP,
     JUMPING,
     has_just_fired,
     is_zero,
@@ -26,7 +28,7 @@ from hybrid.kernels.events.onset import (
     side_is_certain,
 )
 from hybrid.kernels.events.path import rounding_of_start, state_at, time_at
-from hybrid.kernels.events.sampled import NOWHERE, SETTLED, sample, sampled_change
+from hybrid.kernels.events.sampled import NOWHERE, SETTLED, sampled_change
 from hybrid.kernels.events.touches import note_touch
 from hybrid.kernels.types.codes import (
     HIGH,
@@ -249,13 +251,28 @@ def _returns(model, run, transition, path, order, clock, start, pace, side, on_g
 
 @njit(**KERNEL)
 def first_change(
-    model, method, run, transition, path, order, clock, start, pace, length, side, on_guard, exact, work
+    model,
+    method,
+    run,
+    transition,
+    path,
+    order,
+    clock,
+    start,
+    pace,
+    length,
+    side,
+    on_guard,
+    hidden,
+    exact,
+    work,
 ):
     """First change of sign of a guard in its transition's direction, for variables in ``[0, length]``.
 
     ``side`` is the sign before; for a guard that is zero at the start, it is the sign that the guard takes
-    from there. Returns ``(place, side after, proved)``. The place is ``NOWHERE`` if the guard does not change
-    its sign before ``proved``; the step is to be cut to ``proved``.
+    from there. Up to the place ``hidden`` its signs are noise. Returns ``(place, side after, proved)``. The
+    place is ``NOWHERE`` if the guard does not change its sign before ``proved``; the step is to be cut to
+    ``proved``.
     """
     direction, proved = model.direction[transition], length
     pieces, top = 0, 0
@@ -270,7 +287,7 @@ def first_change(
         base, tilt = known_part(value, 0.5 * (row[LEAST_SLOPE] + row[MOST_SLOPE]), on_guard)
         leaves = on_guard == BY_SPEED and side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
     stack = work.intervals
-    stack[0, 0], stack[0, 1] = SETTLED * length if on_guard > 0 else 0.0, length
+    stack[0, 0], stack[0, 1] = max(hidden, SETTLED * length) if on_guard > 0 else 0.0, length
     if on_guard == JUMPING:
         # By rounding the state may still be before the jump.
         beyond = rounding_of_start(path, model.dimension, run.scale, clock, size_of_time(model, start), pace)
@@ -418,16 +435,32 @@ def first_change(
 
 
 @njit(**KERNEL)
-def crossing_on_path(model, method, run, transition, path, order, clock, start, pace, length, exact, work):
+def crossing_on_path(
+    model, method, run, transition, path, order, clock, start, pace, length, end, exact, work
+):
     """``first_change`` from the side that the run knows; ``sampled_change`` if the guard has no program.
 
+    ``end`` is the value of the guard at the end of the step, which the path may hold with other rounding.
     Returns the share of the step at which the guard crosses, its side after the crossing or at the end, and
-    the share of the step that is proved.
+    the share of the step that is proved. The guard is no longer held to be zero at the start of the step,
+    unless it rests there.
     """
-    side, on_guard = run.side[transition], run.on_guard[transition]
+    side, on_guard, hidden = run.side[transition], run.on_guard[transition], 0.0
+    if on_guard == BY_STEP:
+        hidden, rests = hidden_until(
+            model, method, run, transition, path, order, clock, start, pace, length, end, exact, work
+        )
+        if rests:
+            return NO_ROOT, side, 1.0
+    run.on_guard[transition] = 0
+    if hidden == length:
+        after = 1 if end > 0.0 else (-1 if end < 0.0 else side)
+        crosses = crosses_towards(model.direction[transition], after) and side * after < 0
+        again = has_just_fired(run, transition, on_guard)
+        return (0.0 if crosses and not again else NO_ROOT), after, 1.0
     if not has_program(model, transition):
         place, side, proved = sampled_change(
-            model, run, transition, path, order, clock, start, pace, length, side, on_guard, work
+            model, run, transition, path, order, clock, start, pace, length, side, on_guard, hidden, work
         )
     else:
         place, side, proved = first_change(
@@ -443,6 +476,7 @@ def crossing_on_path(model, method, run, transition, path, order, clock, start, 
             length,
             side,
             on_guard,
+            hidden,
             exact,
             work,
         )

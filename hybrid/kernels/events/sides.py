@@ -246,6 +246,8 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             # together with the first jump, and has not been stopped there.
             stopped = order == BY_STEP and zero[transition] != BY_STEP
             crossed, pending = False, pending and was_on and order > 0 and not stopped
+            # A run that starts on the guard has crossed nothing, whichever side the next step shows.
+            flat = flat or (came == STARTED and order == BY_STEP)
         side[transition], zero[transition] = 0 if flat else now, order
         due[transition] = 1 if crossed or pending else 0
         if due[transition] == 1 and chosen == NO_TRANSITION and allowed(model, transition, t, x, work.scalar):

@@ -69,8 +69,8 @@ def turn_at_end(coefficients, degree, rounding, stack):
 
 
 @njit(**KERNEL)
-def note_touches(run, transition, degree, known_roots, theta, band, work):
-    """Note the touches of a guard that is a polynomial on the step, up to its first crossing ``theta``.
+def note_touches(run, transition, degree, known_roots, start, theta, band, work):
+    """Note the touches of a guard that is a polynomial on a step, from ``start`` to its crossing ``theta``.
 
     ``work.polynomial`` holds the guard divided by the step's variable for each known root at the start.
     """
@@ -81,7 +81,7 @@ def note_touches(run, transition, degree, known_roots, theta, band, work):
     for i in range(degree + 1):
         size = max(size, abs(coefficients[i]))
     rounding = ROUNDING * EPSILON * size
-    touch, depth, way, start = NO_ROOT, 0.0, 1, 0.0
+    touch, depth, way = NO_ROOT, 0.0, 1
     # The derivative has fewer roots than the polynomial.
     for _ in range(2 * degree):
         place, value, kind = next_turn(coefficients, degree, start, work.stack)

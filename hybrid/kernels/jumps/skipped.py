@@ -55,7 +55,7 @@ def way_is_free(model, method, run, turn, span, work):
         side = 1 if value > 0.0 else -1
         if has_program(model, other):
             place, _, _ = first_change(
-                model, method, run, other, path, 1, -1, t, span, 1.0, side, 0, True, work
+                model, method, run, other, path, 1, -1, t, span, 1.0, side, 0, 0.0, True, work
             )
             crossed = place != NOWHERE
         else:

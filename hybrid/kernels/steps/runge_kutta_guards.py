@@ -19,6 +19,7 @@ from hybrid.kernels.events.guards import (
     guard_value,
     rounding_band,
 )
+from hybrid.kernels.events.hidden import hidden_share
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.resolution import (
     MARGIN,
@@ -28,7 +29,6 @@ from hybrid.kernels.events.resolution import (
     keeps_sign,
     underflows,
 )
-from hybrid.kernels.events.sampled import rests
 from hybrid.kernels.events.touches import (
     forget_touches,
     note_touch,
@@ -143,9 +143,11 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
             continue
         on_guard = run.on_guard[transition]
         side = run.side[transition]
+        end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard == BY_STEP else 0.0
         if model.affine_guard[transition] == 1:
             start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
             degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
+            error, hidden = error_band(method, run, work.gradient, model.dimension), 0.0
             if on_guard > 0:
                 band, farthest = rounding_on_step(model, run, transition, t, h, work), 0.0
                 for i in range(degree + 1):
@@ -153,20 +155,23 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
                 if farthest <= band:
                     continue
                 run.on_guard[transition] = 0
-                if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
-                    side = 0
-            for _ in range(on_guard):
+                if on_guard == BY_STEP:
+                    hidden = hidden_share(work.polynomial, degree, band, error, end, work.stack)
+                    if has_just_fired(run, transition, on_guard):
+                        side = 0
+            known_roots = on_guard if on_guard != BY_STEP else 0
+            for _ in range(known_roots):
                 degree = divide_by_theta(work.polynomial, degree)
-            band = error_band(method, run, work.gradient, model.dimension)
-            if stays(work.polynomial, degree, side, band):
+            if stays(work.polynomial, degree, side, error):
                 continue
             theta, side = first_crossing(
                 work.polynomial, degree, side, model.direction[transition], work.stack
             )
-            note_touches(run, transition, degree, on_guard, theta, band, work)
+            if on_guard == BY_STEP:
+                theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0
+                degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
+            note_touches(run, transition, degree, known_roots, hidden, theta, error, work)
         else:
-            if rests(model, run, transition, work.path, degree_of_path, -1, t, h, 1.0, work):
-                continue
             theta, side, share = crossing_on_path(
                 model,
                 method,
@@ -178,10 +183,10 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
                 t,
                 h,
                 1.0,
+                end,
                 False,
                 work,
             )
-            run.on_guard[transition] = 0
             proved = min(proved, share)
         if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
             continue

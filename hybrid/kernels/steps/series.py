@@ -31,13 +31,8 @@ from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.events.touches import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
-from hybrid.kernels.steps.series_guards import (
-    earliest_on_series,
-    expanded_at,
-    powers_on_step,
-    time_of,
-    to_bernstein,
-)
+from hybrid.kernels.steps.series_guards import earliest_on_series, powers_on_step, to_bernstein
+from hybrid.kernels.steps.series_roots import expanded_at, time_of
 from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,

@@ -7,7 +7,6 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import (
     NO_ROOT,
-    SETTLED,
     bracket_crossing,
     crosses_towards,
     halve,
@@ -18,11 +17,12 @@ from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
+    guard_value,
     rounding_band,
     size_of_time,
 )
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
-from hybrid.kernels.events.path import time_at, value_at
+from hybrid.kernels.events.path import time_at
 from hybrid.kernels.events.resolution import (
     MARGIN,
     UNDERFLOW,
@@ -31,8 +31,8 @@ from hybrid.kernels.events.resolution import (
     keeps_sign,
     underflows,
 )
-from hybrid.kernels.events.sampled import rests
 from hybrid.kernels.events.touches import forget_touches, note_touches, share_with_one_touch
+from hybrid.kernels.steps.series_roots import root_between
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
@@ -44,12 +44,10 @@ from hybrid.kernels.types.codes import (
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Safety factor for the estimated error of the last step towards a root.
-UNSEEN = 64.0
-# Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
-MOST_CORRECTIONS = 60
 # Number of terms at the end of a series by which its error is judged: some may be zero.
 TAIL_OF_GUARD = 5
+# Rounding of a series, as a share of the sum of the magnitudes of its terms.
+ROUNDING_OF_TERMS = 64.0 * EPSILON
 # High powers of a series are left out of a proof if their sum is below this share of the size of the guard.
 NEGLIGIBLE = 0.003
 
@@ -128,6 +126,18 @@ def powers_on_step(series, column, order, h, known_roots, coefficients):
 
 
 @njit(**INLINE)
+def leading_power(series, column, order, h, known_roots, size):
+    """The lowest power of a series, not below ``known_roots``, that is more than rounding on the step ``h``.
+
+    ``size`` is the sum of the magnitudes of all terms.
+    """
+    power = h**known_roots
+    while known_roots < order and abs(series[known_roots, column]) * power <= ROUNDING_OF_TERMS * size:
+        known_roots, power = known_roots + 1, power * h
+    return known_roots
+
+
+@njit(**INLINE)
 def beyond_known_roots(series, column, h, known_roots, size):
     """The sum of the magnitudes of all terms without the known ones, and the power of ``h`` in the next."""
     power = 1.0
@@ -144,7 +154,7 @@ def keeps_half(first, value, size):
     With ``size`` the sum of the magnitudes of its terms, those that take it down on the way come to
     ``(size - value) / 2``.
     """
-    return first > size - value + 64.0 * EPSILON * size
+    return first > size - value + ROUNDING_OF_TERMS * size
 
 
 @njit(**INLINE)
@@ -164,7 +174,7 @@ def leading_powers(series, column, order, power, known_roots, size, coefficients
             break
         power *= h
     # Including the rounding of this sum.
-    return degree, max(rest, 0.0) + 64.0 * EPSILON * size
+    return degree, max(rest, 0.0) + ROUNDING_OF_TERMS * size
 
 
 @njit(**INLINE)
@@ -209,115 +219,6 @@ def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
         halve(stack, top, degree)
         top += 1
     return CLEAR, 0.0, 1.0, 0
-
-
-@njit(**INLINE)
-def expanded_at(series, column, first, order, s):
-    """Value, derivative and half the second one of a series divided by its variable to the power ``first``.
-
-    Horner's scheme in ``s**2`` for even and for odd terms, which do not wait for each other.
-    """
-    square = s * s
-    even, even_slope, even_bend = 0.0, 0.0, 0.0
-    odd, odd_slope, odd_bend = 0.0, 0.0, 0.0
-    top = order
-    if (order - first) % 2 == 0:
-        even = series[order, column]
-        top = order - 1
-    for o in range(top, first, -2):
-        odd_bend = odd_bend * square + odd_slope
-        odd_slope = odd_slope * square + odd
-        odd = odd * square + series[o, column]
-        even_bend = even_bend * square + even_slope
-        even_slope = even_slope * square + even
-        even = even * square + series[o - 1, column]
-    value = even + s * odd
-    slope = odd + 2.0 * (s * even_slope + square * odd_slope)
-    bend = even_slope + s * (3.0 * odd_slope + 4.0 * (s * even_bend + square * odd_bend))
-    return value, slope, bend
-
-
-@njit(**KERNEL)
-def time_of(series, clock, order, h, span):
-    """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
-    low, high = 0.0, h
-    # The clock may start at speed zero; the place then grows like the root of the time.
-    s = h * math.sqrt(min(max(span / value_at(series, clock, order, h), 0.0), 1.0))
-    if s == 0.0:
-        return s
-    for _ in range(100):
-        value, slope, _ = expanded_at(series, clock, 0, order, s)
-        misfit = value - span
-        if misfit > 0.0:
-            high = s
-        else:
-            low = s
-        newton = s - misfit / slope
-        if not low < newton < high:
-            newton = 0.5 * (low + high)
-        if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
-            return newton
-        s = newton
-    return s
-
-
-@njit(**KERNEL)
-def root_between(series, column, order, known_roots, h, low, high, left, right):
-    """The one root of a series in an open interval of the step ``h``.
-
-    ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
-    variable for each known root at 0; in the end it is taken as it is, which at 0 is zero up to rounding
-    only; but not to a root at 0, where the step begins.
-    """
-    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right)
-    for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
-        value, slope, _ = expanded_at(series, column, 0, order, s)
-        shift = -value / slope if slope != 0.0 else 0.0
-        if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
-            break
-        s += shift
-        if abs(shift) <= EPSILON * s:
-            break
-    return s
-
-
-@njit(**INLINE)
-def simple_root_of(series, column, order, known_roots, h, low, high, left, right):
-    """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
-
-    The error after a step of Halley's is about the cube of the step, over the square of the length on which
-    the guard bends: where that is rounding, it need not be looked at.
-    """
-    s, last = low + (high - low) * (left / (left - right)), high - low
-    if not low < s < high:
-        s = 0.5 * (low + high)
-    for _ in range(100):
-        value, slope, bend = expanded_at(series, column, known_roots, order, s)
-        if value == 0.0:
-            return s
-        if (value > 0.0) == (left > 0.0):
-            low = s
-        else:
-            high = s
-        shift = -value / slope if slope != 0.0 else math.inf
-        curve = bend / slope if slope != 0.0 else math.inf
-        # Far from the root, next to a turning point, Halley's steps would be as short as the slope is small.
-        if abs(shift * curve) < 0.5:
-            shift /= 1.0 + shift * curve
-        closer, change = s + shift, abs(shift)
-        # The steps of the method shrink here; a step that does not shrink is rounding.
-        if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
-            return s
-        if low < closer < high:
-            if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
-                return closer
-        else:
-            # A bisection says nothing of how the steps of the method shrink.
-            closer, change = 0.5 * (low + high), math.inf
-        if high - low <= EPSILON * high:
-            return closer
-        s, last = closer, change
-    return s
 
 
 @njit(**INLINE)
@@ -405,16 +306,14 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         keep_side(run, transition)
         on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
-            if rests(model, run, transition, series, order, clock, t, 1.0, h, work):
-                continue
-            theta, side, share = crossing_on_path(
-                model, method, run, transition, series, order, clock, t, 1.0, h, kind == EXACT, work
-            )
-            run.on_guard[transition] = 0
-            proved = min(proved, share)
             later = time_at(series, order, clock, t, 1.0, h)
             for i in range(model.dimension):
                 work.trial[i] = series[order + 1, i]
+            end = guard_value(model, transition, later, work.trial, work.scalar)
+            theta, side, share = crossing_on_path(
+                model, method, run, transition, series, order, clock, t, 1.0, h, end, kind == EXACT, work
+            )
+            proved = min(proved, share)
             if underflows(model, transition, t, run.y, later, work.trial, work.scalar):
                 continue
             if not is_resolved_by_series(model, run, transition, -1, order, t, h, clock, on_guard, work):
@@ -439,6 +338,8 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
         # The root of a guard that is zero without speed begins to grow like its variable, too.
         known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
+        if on_guard == BY_STEP:
+            known = leading_power(series, column, order, h, known, size)
         size, power = beyond_known_roots(series, column, h, known, size)
         if on_guard > 0:
             if size <= rounding:
@@ -481,7 +382,7 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, known, h, theta * h, end * h, *ends) / h
-        note_touches(run, transition, degree, known, theta, band, work)
+        note_touches(run, transition, degree, known, 0.0, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
         if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):

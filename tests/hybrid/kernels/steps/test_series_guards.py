@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.kernels.steps import series_guards
+from hybrid.kernels.steps import series_guards, series_roots
 from hybrid.kernels.types.codes import HIGHEST_ORDER as ORDER
 
 _judge, _to_bernstein, _leading = (
@@ -17,8 +17,8 @@ _judge, _to_bernstein, _leading = (
     series_guards.leading_powers,
 )
 _expanded_at, _root_between, _keeps_half = (
-    series_guards.expanded_at,
-    series_guards.root_between,
+    series_roots.expanded_at,
+    series_roots.root_between,
     series_guards.keeps_half,
 )
 CLEAR, CROSSES, UNKNOWN = series_guards.CLEAR, series_guards.CROSSES, series_guards.UNKNOWN

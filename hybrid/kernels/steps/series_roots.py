@@ -1,0 +1,124 @@
+"""Roots of a guard that is a series, and the place on a step where its clock shows a time."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import SETTLED
+from hybrid.kernels.events.path import value_at
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
+
+# Safety factor for the estimated error of the last step towards a root.
+UNSEEN = 64.0
+# Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
+MOST_CORRECTIONS = 60
+
+
+@njit(**INLINE)
+def expanded_at(series, column, first, order, s):
+    """Value, derivative and half the second one of a series divided by its variable to the power ``first``.
+
+    Horner's scheme in ``s**2`` for even and for odd terms, which do not wait for each other.
+    """
+    square = s * s
+    even, even_slope, even_bend = 0.0, 0.0, 0.0
+    odd, odd_slope, odd_bend = 0.0, 0.0, 0.0
+    top = order
+    if (order - first) % 2 == 0:
+        even = series[order, column]
+        top = order - 1
+    for o in range(top, first, -2):
+        odd_bend = odd_bend * square + odd_slope
+        odd_slope = odd_slope * square + odd
+        odd = odd * square + series[o, column]
+        even_bend = even_bend * square + even_slope
+        even_slope = even_slope * square + even
+        even = even * square + series[o - 1, column]
+    value = even + s * odd
+    slope = odd + 2.0 * (s * even_slope + square * odd_slope)
+    bend = even_slope + s * (3.0 * odd_slope + 4.0 * (s * even_bend + square * odd_bend))
+    return value, slope, bend
+
+
+@njit(**KERNEL)
+def time_of(series, clock, order, h, span):
+    """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
+    low, high = 0.0, h
+    # The clock may start at speed zero; the place then grows like the root of the time.
+    s = h * math.sqrt(min(max(span / value_at(series, clock, order, h), 0.0), 1.0))
+    if s == 0.0:
+        return s
+    for _ in range(100):
+        value, slope, _ = expanded_at(series, clock, 0, order, s)
+        misfit = value - span
+        if misfit > 0.0:
+            high = s
+        else:
+            low = s
+        newton = s - misfit / slope
+        if not low < newton < high:
+            newton = 0.5 * (low + high)
+        if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
+            return newton
+        s = newton
+    return s
+
+
+@njit(**KERNEL)
+def root_between(series, column, order, known_roots, h, low, high, left, right):
+    """The one root of a series in an open interval of the step ``h``.
+
+    ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
+    variable for each known root at 0; in the end it is taken as it is, which at 0 is zero up to rounding
+    only; but not to a root at 0, where the step begins.
+    """
+    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right)
+    for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
+        value, slope, _ = expanded_at(series, column, 0, order, s)
+        shift = -value / slope if slope != 0.0 else 0.0
+        if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
+            break
+        s += shift
+        if abs(shift) <= EPSILON * s:
+            break
+    return s
+
+
+@njit(**INLINE)
+def simple_root_of(series, column, order, known_roots, h, low, high, left, right):
+    """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
+
+    The error after a step of Halley's is about the cube of the step, over the square of the length on which
+    the guard bends: where that is rounding, it need not be looked at.
+    """
+    s, last = low + (high - low) * (left / (left - right)), high - low
+    if not low < s < high:
+        s = 0.5 * (low + high)
+    for _ in range(100):
+        value, slope, bend = expanded_at(series, column, known_roots, order, s)
+        if value == 0.0:
+            return s
+        if (value > 0.0) == (left > 0.0):
+            low = s
+        else:
+            high = s
+        shift = -value / slope if slope != 0.0 else math.inf
+        curve = bend / slope if slope != 0.0 else math.inf
+        # Far from the root, next to a turning point, Halley's steps would be as short as the slope is small.
+        if abs(shift * curve) < 0.5:
+            shift /= 1.0 + shift * curve
+        closer, change = s + shift, abs(shift)
+        # The steps of the method shrink here; a step that does not shrink is rounding.
+        if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
+            return s
+        if low < closer < high:
+            if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
+                return closer
+        else:
+            # A bisection says nothing of how the steps of the method shrink.
+            closer, change = 0.5 * (low + high), math.inf
+        if high - low <= EPSILON * high:
+            return closer
+        s, last = closer, change
+    return s
