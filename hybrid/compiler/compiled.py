@@ -252,6 +252,7 @@ class CompiledSystem:
             **_program_runners(bool(self.emitted.programs.rows)),
             first_forcing=_indices(self.emitted.first_forcing),
             forcing_component=_indices(self.emitted.forcing_component),
+            forcing_kind=_indices(self.emitted.forcing_kind),
             first_residue=_indices(self.emitted.first_residue),
             residue_component=_indices(self.emitted.residue_component),
             **_slopes(self.emitted.slope_columns),

@@ -166,6 +166,7 @@ def _emitted(system: HybridSystem) -> Emitted:
         ),
         first_forcing=tuple(accumulate(map(len, pulses), initial=0)),
         forcing_component=tuple(each.component for each in forcing),
+        forcing_kind=tuple(each.kind for each in forcing),
         first_residue=tuple(accumulate(map(len, residual), initial=0)),
         residue_component=tuple(each.component for each in cancelling),
         slope_columns=tuple(slope_columns(each, n) for each in jacobians),

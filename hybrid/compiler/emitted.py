@@ -5,10 +5,7 @@ from __future__ import annotations
 import attrs
 
 from hybrid.compiler.opaque import OpaqueFunction
-from hybrid.kernels.types.codes import PROPAGATORS
-
-# A component of a forcing: some parts of the field saturate in the state, so its series is compared with it.
-OF_STATE = -2
+from hybrid.kernels.types.codes import IN_TIME, PROPAGATORS
 
 
 @attrs.frozen
@@ -123,6 +120,8 @@ class Emitted:
         By mode: the first of its forcings, and behind them the number of all.
     forcing_component
         By forcing: the component of the state whose rate it is a term of, or -1.
+    forcing_kind
+        By forcing: a part in time, terms in the state, or the arguments of exponentials in these.
     first_residue
         By mode: the first of its residues, which are rates that may cancel to their rounding, and behind them
         the number of all.
@@ -164,6 +163,7 @@ class Emitted:
     programs: Programs
     first_forcing: tuple[int, ...]
     forcing_component: tuple[int, ...]
+    forcing_kind: tuple[int, ...]
     first_residue: tuple[int, ...]
     residue_component: tuple[int, ...]
     slope_columns: tuple[tuple[tuple[int, ...], ...], ...]
@@ -187,7 +187,7 @@ class Emitted:
 
     def has_forcing(self, mode: int) -> bool:
         """Whether the field of a mode has parts that depend on time alone and are bounded over each step."""
-        return any(self.forcing_component[i] != OF_STATE for i in self._forcings(mode))
+        return any(self.forcing_kind[i] == IN_TIME for i in self._forcings(mode))
 
     def is_fragile(self, mode: int) -> bool:
         """Whether the series of a mode may fail where its field does not.
@@ -204,6 +204,6 @@ class Emitted:
         """Whether all forcing of a mode can be bounded, so that no pulse in time is stepped over."""
         first, guards = self.programs.first, len(self.affine_guard)
         return self.traced_field[mode] and all(
-            first[guards + i] < first[guards + i + 1] or self.forcing_component[i] == OF_STATE
+            first[guards + i] < first[guards + i + 1] or self.forcing_kind[i] != IN_TIME
             for i in self._forcings(mode)
         )

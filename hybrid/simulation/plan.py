@@ -135,10 +135,11 @@ def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[A
         step = load_kernels("hybrid.kernels.steps.runge_kutta").runge_kutta_step
     else:
         step = load_kernels("hybrid.kernels.steps.step").no_step
-    explained_step, explained_series = Absent(), Absent()
+    explained_step, explained_attempt, explained_series = Absent(), Absent(), Absent()
     if forced:
         forcing = load_kernels("hybrid.kernels.steps.forcing")
-        explained_step, explained_series = forcing.explained_step, forcing.explained_series
+        explained_step, explained_attempt = forcing.explained_step, forcing.explained_attempt
+        explained_series = forcing.explained_series
     parts = Parts(
         runge_kutta_step=step,
         enter=corners.enter,
@@ -150,6 +151,7 @@ def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[A
     attempts = Attempts(
         attempt_implicit=vars(load_kernels(module))[name],
         explained_step=explained_step,
+        explained_attempt=explained_attempt,
         explained_series=explained_series,
     )
     return parts, attempts

@@ -1,4 +1,4 @@
-"""Parts of a vector field that depend on time and parameters alone and could hide a pulse from a solver.
+"""Parts of a vector field that could hide a pulse from a solver, in time alone or in the state.
 
 A component of the state that grows at a constant rate, such as the phase of an oscillator, tells the time as
 well, and so does one that only resets change.
@@ -16,8 +16,8 @@ import attrs
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1
 
-from hybrid.compiler.emitted import OF_STATE
 from hybrid.compiler.taylor.roots import is_multiple
+from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
 from hybrid.symbolic.expressions import Absolute, Maximum, Together
 from hybrid.symbolic.nodes import degree_of, mentions, nodes_of, once
 from hybrid.symbolic.signs import simplified
@@ -29,6 +29,10 @@ MOST_FACTORS = 8
 FACTORS_OF_HARMONIC = 2
 # Used instead of a component of the state if the forcing is not simply a term of the component's rate.
 NO_COMPONENT = -1
+# Functions that are flat to all digits if their argument is far from zero, on one side at least.
+EXPONENTIAL = (sympy.exp, sympy.tanh, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
+# Functions that switch once between two values.
+SWITCHES = (sympy.tanh, sympy.erf)
 # Functions that may be flat to all digits and change a little further on.
 SATURATING = (sympy.tanh, sympy.atan, sympy.exp, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
 # A sum counts as a factor. A single exponential does not, since it makes no product narrower.
@@ -37,14 +41,15 @@ SUMS_OF_EXPONENTIALS = (sympy.sinh, sympy.cosh, expm1)
 
 @attrs.frozen
 class Forcing:
-    """An expression in times and parameters, and the component with this term in its rate or NO_COMPONENT.
+    """An expression that may have pulses, and the component with this term in its rate or NO_COMPONENT.
 
-    Without an expression, with the component OF_STATE, it stands for parts that saturate in the state, or
-    that grow exponentially in time.
+    It depends on times and parameters alone, or is of a ``kind`` in the state, which may be without one: the
+    series is compared with a field that saturates.
     """
 
-    expression: sympy.Expr | None
+    expression: sympy.Basic | None
     component: int
+    kind: int = IN_TIME
 
 
 @attrs.frozen
@@ -77,7 +82,9 @@ def times_of(field: Sequence[sympy.Expr], symbols: Symbols) -> Times:
 def forcings(
     field: Sequence[sympy.Expr] | None, known: Sequence[sympy.Expr], symbols: Symbols
 ) -> tuple[Forcing, ...]:
-    """The largest parts of a field in times and parameters alone, without their harmless terms.
+    """The largest parts of a field in times and parameters alone, and terms that may be pulses in the state.
+
+    Those in times alone are without their harmless terms.
 
     Empty for a field that was not traced. ``known`` are guards that are positive in the mode. Its series hold
     the roots of guards.
@@ -93,9 +100,59 @@ def forcings(
     )
     times = times_of(field, symbols)
     found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, times))
-    if not found and any(_saturates(entry, symbols.variables, roots) for entry in field):
-        found[Forcing(None, OF_STATE)] = None
+    if any(_saturates(entry, symbols.variables, roots) for entry in field):
+        found.update(dict.fromkeys(_in_state(field, [each.expression for each in found], symbols)))
     return tuple(found)
+
+
+def _in_state(
+    field: Sequence[sympy.Expr], in_time: Sequence[sympy.Expr | None], symbols: Symbols
+) -> Iterator[Forcing]:
+    """The arguments of exponentials in the terms of a field that may be pulses, and these terms.
+
+    The tails of a quotient of polynomials, or of a root, are never flat to all digits.
+    """
+    terms = [
+        [
+            term
+            for term in sympy.Add.make_args(entry)
+            if term not in in_time
+            and exponents_of(term, symbols.variables)
+            and not is_harmless(term, symbols.variables)
+        ]
+        for entry in field
+    ]
+    terms = [[] if _is_switch(entry, symbols.variables) else entry for entry in terms]
+    exponents = dict.fromkeys(
+        each for entry in terms for term in entry for each in exponents_of(term, symbols.variables)
+    )
+    yield Forcing(sympy.Tuple(*exponents) if exponents else None, NO_COMPONENT, ARGUMENTS)
+    for i, entry in enumerate(terms):
+        if entry:
+            yield Forcing(sympy.Add(*entry), i, TERMS)
+
+
+def _is_switch(terms: Sequence[sympy.Expr], variables: tuple[sympy.Symbol, ...]) -> bool:
+    """Whether terms are one smooth switch, as ``tanh(v/w)`` of friction: two are needed for a pulse."""
+    if len(terms) != 1:
+        return False
+    factors = sympy.Mul.make_args(terms[0])
+    switches = [each for each in factors if isinstance(each, SWITCHES)]
+    if len(switches) != 1:
+        return False
+    degree = degree_of(switches[0].args[0], frozenset(variables))
+    return degree == 1 and is_harmless(terms[0] / switches[0], variables)
+
+
+def exponents_of(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> list[sympy.Expr]:
+    """The arguments of the exponentials in an expression, and of functions that are made of them."""
+    found = [node.args[0] for node in nodes_of(EXPONENTIAL, expression)]
+    found += [
+        power.exp * sympy.log(power.base)
+        for power in nodes_of(sympy.Pow, expression)
+        if mentions(power.exp, variables) and not mentions(power.base, variables)
+    ]
+    return [each for each in found if mentions(each, variables)]
 
 
 @once

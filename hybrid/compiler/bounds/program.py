@@ -113,8 +113,14 @@ class _Writer:
         return self.rows
 
     def checked(self) -> list[int]:
-        """One number per row: 1 for a subexpression that could hide a pulse and for the last row, else 0."""
+        """One number per row: 1 for a subexpression that could hide a pulse and for the last row, else 0.
+
+        If several expressions were written, the 1 stands for these.
+        """
         marks = [0] * (len(self.rows) - 1) + [1]
+        several = [each for each in self.places if isinstance(each, sympy.Tuple)]
+        if several:
+            return [int(row in {self.places[each] for each in several[0]}) for row in range(len(self.rows))]
         for expression, row in self.places.items():
             if not is_harmless(expression, self.times):
                 marks[row] = 1
@@ -204,6 +210,7 @@ class _Writer:
 
     RULES: ClassVar[dict[type[sympy.Basic], Callable[..., int]]] = {
         sympy.Add: _sum,
+        sympy.Tuple: lambda self, *several: [self.place(each) for each in several][-1],
         sympy.Mul: _product,
         sym.Select: _select,
         log2: lambda self, u: self.place(sympy.log(u) / sympy.log(2)),

@@ -68,7 +68,13 @@ def _read(path: Path) -> Emitted | None:
         found: dict[str, Any] = json.loads(content)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
         of_modes = ("autonomous", "discontinuities", "traced_field", "steep", "steep_inside")
-        parts = ("first_forcing", "forcing_component", "first_residue", "residue_component")
+        parts = (
+            "first_forcing",
+            "forcing_component",
+            "forcing_kind",
+            "first_residue",
+            "residue_component",
+        )
         for name in (*of_transitions, *of_modes, "timed_guard", *parts):
             found[name] = tuple(found[name])
         found["crossing"] = tuple(map(tuple, found["crossing"]))

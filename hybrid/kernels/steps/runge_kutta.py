@@ -282,6 +282,12 @@ def runge_kutta_step(task, remaining):
             accept(model, method, run, tangents, 0.0, correction, work)
             return GO_ON, correction
         return GO_ON, 0.0
+    if is_forced(model, mode):
+        explained = attempts.explained_attempt(model, method, run, h, work)
+        if explained < h:
+            run.rejected += 1
+            run.next_step = explained
+            return GO_ON, 0.0
     fired, correction, whole = NO_TRANSITION, 0.0, h
     if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
         h, correction, fired = find_event(task, h)

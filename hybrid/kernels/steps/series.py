@@ -33,7 +33,7 @@ from hybrid.kernels.events.touches import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.steps.series_guards import earliest_on_series, powers_on_step, to_bernstein
 from hybrid.kernels.steps.series_roots import expanded_at, time_of
-from hybrid.kernels.steps.step import rates_by_jacobian
+from hybrid.kernels.steps.step import moves_nothing, rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
@@ -385,7 +385,7 @@ def series_step(task, remaining):
             order, h, regular = within_floats(
                 series, n, start, stride, groups, order, rtol, atol, exact, work.weights
             )
-    if not h > 0.0:
+    if not h > 0.0 or (model.fragile[mode] == 1 and clock < 0 and moves_nothing(model, run, series, h)):
         return NON_FINITE, 0.0
     if clock < 0:
         h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))

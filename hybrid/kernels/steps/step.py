@@ -4,9 +4,10 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.slopes import change_of_rate, whole_jacobian
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR, Pair
-from hybrid.kernels.types.layout import Method, Model, Task, Work
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Task, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # At the start of a run, a state below this many tolerances counts as this large.
@@ -214,3 +215,14 @@ def no_step(task, remaining):
 def no_attempt(model, method, mode, t, h, y, tangents, work):
     """Stands in for the implicit step where the method is explicit."""
     return math.nan
+
+
+@njit(**KERNEL)
+def moves_nothing(model, run, series, h):
+    """Whether a step moves neither state nor time by their rounding: terms near overflow make it so short."""
+    if model.timed[run.mode] == 1 and h > EPSILON * measured_time(model, run, run.mode):
+        return False
+    for i in range(model.dimension):  # noqa: SIM110 (no generators in kernels)
+        if abs(series[1, i]) * h > EPSILON * abs(series[0, i]):
+            return False
+    return True

@@ -71,3 +71,7 @@ MOST_SLOPE = 3
 LOW_MIDDLE = 4
 HIGH_MIDDLE = 5
 REGISTERS = 6
+
+# What a forcing stands for: a part in time, terms in the state that may be pulses, or the arguments of the
+# exponentials in these.
+IN_TIME, TERMS, ARGUMENTS = range(3)

@@ -60,10 +60,11 @@ class Model(Structure):
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0. ``fragile``
     is 1 for a mode whose series may be undefined where its field is not. ``first_forcing[m]`` is the first
     forcing of mode ``m``, whose program is behind those of all transitions; ``forcing_component`` is the
-    component of the state whose rate a forcing is a term of, or -1. Residues are rates that may cancel to
-    their rounding: ``first_residue[m]`` is the first of mode ``m``, their programs are behind those of all
-    forcings, and ``residue_component`` is the component that one is the rate of. The residues of guards,
-    those of their terms that may cancel so, have programs behind them.
+    component of the state whose rate a forcing is a term of, or -1; ``forcing_kind`` is one of those in
+    ``codes``. Residues are rates that may cancel to their rounding: ``first_residue[m]`` is the first of mode
+    ``m``, their programs are behind those of all forcings, and ``residue_component`` is the component that
+    one is the rate of. The residues of guards, those of their terms that may cancel so, have programs behind
+    them.
     ``field_jacobian`` writes its last column, and in row ``i`` of mode ``m`` the columns
     ``slope_column[first_slope[m, i]:first_slope[m, i + 1]]``: all others are zero.
     ``steep`` is 1 for a mode whose field has powers of its guards that may have an infinite slope at the
@@ -98,6 +99,7 @@ class Model(Structure):
     spread: SPREAD
     first_forcing: INDICES
     forcing_component: INDICES
+    forcing_kind: INDICES
     first_residue: INDICES
     residue_component: INDICES
     first_slope: INDEX_MATRIX
@@ -345,12 +347,13 @@ class Record(
 class Attempts(Structure):
     """What a step may need: parts that are not compiled where they are not called.
 
-    ``attempt_implicit`` is the step of an implicit method; ``explained_step`` and ``explained_series``
-    shorten a step so that no pulse of the forcing is hidden from it.
+    ``attempt_implicit`` is the step of an implicit method; ``explained_step``, ``explained_attempt`` and
+    ``explained_series`` shorten a step so that no pulse of the field is hidden from it.
     """
 
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
     explained_step: function(REAL, Model, Method, Run, REAL, Work)
+    explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
     explained_series: function(REAL, Model, Method, Run, INTEGER, INTEGER, INTEGER, REAL, Work)
 
 

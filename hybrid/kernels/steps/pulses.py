@@ -1,0 +1,226 @@
+"""Whether an expression has a pulse on a step that samples of the step do not show.
+
+The expression is bounded over the step by interval arithmetic. The step is *explained* if between two samples
+the expression stays in the range of these two, give or take a share of what the samples differ by. All
+subexpressions that could hide a pulse are held to this: two switches may each be explained, and their
+difference be a pulse.
+
+Where the expression is monotone, its ends explain it: one evaluation on intervals is all a step costs.
+"""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.types.codes import (
+    HIGH,
+    HIGH_MIDDLE,
+    LEAST_SLOPE,
+    LOW,
+    LOW_MIDDLE,
+    MOST_SLOPE,
+)
+from hybrid.kernels.types.options import INLINE, KERNEL
+
+# Verdicts on a piece of a step.
+EXPLAINED, NOISY, UNKNOWN, HIDDEN = range(4)
+# A range is rounding if it is at most this many times as wide as the range at one point.
+FLAT = 4.0
+# An arbitrary place of the step.
+ELSEWHERE = 0.3819
+# The expression may leave the range of neighbouring samples by this share of the largest difference of
+# samples: a resolved maximum lies a little above them, and error control sees the differences of the samples.
+BETWEEN = 0.25
+# The same for an expression in the state, whose bounds are wider.
+BETWEEN_IN_STATE = 1.0
+# Shares of the tolerance that may remain unseen, on the whole step and on one piece.
+SHARE = 0.1
+SHARE_OF_PIECE = 0.01
+# Largest number of pieces of a step, and of the part between two samples for an expression in the state.
+MOST_PIECES = 400
+MOST_PIECES_IN_STATE = 64
+
+
+@njit(**INLINE)
+def _is_monotone(row):
+    return row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
+
+
+@njit(**KERNEL)
+def is_steady(model, program, path, order, clock, start, h, negligible, work):
+    """Whether no row that is checked turns round on a step of length ``h``, or the forcing is negligible.
+
+    Rounding does not count as a turn. Returned second is the range of the forcing if it turns by rounding.
+    """
+    programs, registers = model.programs, work.registers
+    first = programs.first[program]
+    last = model.bound(programs, program, path, order, clock, start, 1.0, 0.5 * h, 0.5 * h, registers)
+    row = registers[last]
+    if row[HIGH] - row[LOW] <= negligible:
+        return True, 0.0
+    if not row[HIGH] - row[LOW] < math.inf:
+        return False, 0.0
+    doubtful, widths = False, work.samples[0]
+    for place in range(last + 1):
+        row, widths[place] = registers[place], 0.0
+        if programs.checked[first + place] == 1 and not _is_monotone(row):
+            doubtful, widths[place] = True, row[HIGH] - row[LOW]
+            if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
+                return False, 0.0
+    if doubtful:
+        # The middle may lie within rounding of a jump, another place will not.
+        model.bound(programs, program, path, order, clock, start, 1.0, ELSEWHERE * h, 0.0, registers)
+        for place in range(last + 1):
+            row = registers[place]
+            if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
+                return False, 0.0
+    return True, widths[last]
+
+
+@njit(**KERNEL)
+def _take_samples(model, program, path, order, clock, start, nodes, h, work):
+    """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
+
+    The last row takes the largest low end and the smallest high end of each.
+    """
+    samples = work.samples
+    common = samples[samples.shape[0] - 1]
+    for j in range(len(nodes)):
+        last = model.bound(
+            model.programs, program, path, order, clock, start, 1.0, nodes[j] * h, 0.0, work.registers
+        )
+        for place in range(last + 1):
+            low, high = work.registers[place, LOW_MIDDLE], work.registers[place, HIGH_MIDDLE]
+            samples[j, 2 * place], samples[j, 2 * place + 1] = low, high
+            common[2 * place] = low if j == 0 else max(common[2 * place], low)
+            common[2 * place + 1] = high if j == 0 else min(common[2 * place + 1], high)
+
+
+@njit(**INLINE)
+def _sampled_range(a, b, c, d):
+    """The range surely between the samples ``[a, b]`` and ``[c, d]``; all between if both are uncertain."""
+    one, other = min(b, d), max(a, c)
+    return min(one, other), max(one, other)
+
+
+@njit(**INLINE)
+def _beyond(row, j, place, work):
+    """How far a row may leave the range of the samples ``j`` and ``j + 1``."""
+    one, other = work.samples[j], work.samples[j + 1]
+    i = 2 * place
+    low, high = _sampled_range(one[i], one[i + 1], other[i], other[i + 1])
+    return max(low - row[LOW], row[HIGH] - high)
+
+
+@njit(**KERNEL)
+def _judged(programs, first, last, j, whole, length, negligible, tolerance, between, work):
+    """Whether a piece between the samples ``j`` and ``j + 1``, which has just been bounded, is explained.
+
+    HIDDEN if its middle is certain to lie beyond what they explain, NOISY if rounding alone explains it.
+    """
+    samples, common = work.samples, work.samples[work.samples.shape[0] - 1]
+    verdict = EXPLAINED
+    # The last row is the forcing itself: if that is negligible, so are its parts.
+    for place in range(last, -1, -1):
+        if programs.checked[first + place] == 0:
+            continue
+        row, i = work.registers[place], 2 * place
+        # For a sample within rounding of a jump, it is unknown which side the method has seen.
+        low, high = _sampled_range(samples[j, i], samples[j, i + 1], samples[j + 1, i], samples[j + 1, i + 1])
+        if place == last:
+            beyond = _beyond(row, j, last, work)
+            if beyond <= negligible or beyond * length <= tolerance:
+                return EXPLAINED
+        elif not row[HIGH] - row[LOW] < math.inf:
+            # This part may be unused, such as the other branch of a choice.
+            continue
+        if whole and _is_monotone(row) and row[HIGH] - row[LOW] < math.inf:
+            continue
+        slack = between * max(common[i] - common[i + 1], 0.0)
+        one, other = samples[j, i + 1] - samples[j, i], samples[j + 1, i + 1] - samples[j + 1, i]
+        rounding = min(row[HIGH_MIDDLE] - row[LOW_MIDDLE], max(one, other))
+        noise = FLAT * rounding if rounding < math.inf else 0.0
+        if row[LOW] < low - slack - noise or row[HIGH] > high + slack + noise:
+            if row[HIGH_MIDDLE] < low - slack - noise or row[LOW_MIDDLE] > high + slack + noise:
+                return HIDDEN
+            verdict = UNKNOWN
+        elif row[LOW] < low - slack or row[HIGH] > high + slack:
+            verdict = max(verdict, NOISY)
+    return verdict
+
+
+@njit(**INLINE)
+def _unseen(row, noise, length, tolerance):
+    """What the rounding of a forcing, whose bounds are ``row``, may add to its integral over a piece.
+
+    If the forcing has no tolerance, its factor in the field is unknown. Then the result is infinite if much
+    of the forcing is rounding, and otherwise zero.
+    """
+    if tolerance > 0.0:
+        return noise * length
+    return math.inf if noise > BETWEEN * max(abs(row[LOW]), abs(row[HIGH])) else 0.0
+
+
+@njit(**KERNEL)
+def first_hidden(model, program, path, order, clock, start, nodes, h, tolerance, finest, of_state, work):
+    """The length on which a forcing is explained, of a step ``h``, and the first unexplained place after it.
+
+    Both are ``h`` if all of it is explained. ``tolerance`` is that of the forcing's integral. Returned third
+    is the most that a piece adds to that, as far as bounds can tell, which rounding explains or which is as
+    short as the rounding of time.
+
+    An expression ``of_state`` varies with every step, and its bounds may be wide: it is unexplained only
+    where the middle of a piece is certain to be.
+    """
+    programs = model.programs
+    between = BETWEEN_IN_STATE if of_state else BETWEEN
+    first, negligible = programs.first[program], SHARE * tolerance / h
+    steady, noise = is_steady(model, program, path, order, clock, start, h, negligible, work)
+    if steady:
+        return h, h, _unseen(work.registers[programs.first[program + 1] - 1 - first], noise, h, tolerance)
+    last = programs.first[program + 1] - 1 - first
+    _take_samples(model, program, path, order, clock, start, nodes, h, work)
+    stack, pieces, limit, coarse = work.intervals, 0, MOST_PIECES, 0.0
+    for j in range(len(nodes) - 1):
+        top, whole = 0, True
+        if of_state:
+            pieces, limit = 0, MOST_PIECES_IN_STATE
+        stack[0, 0], stack[0, 1] = nodes[j] * h, nodes[j + 1] * h
+        while top >= 0:
+            low, high = stack[top, 0], stack[top, 1]
+            middle = 0.5 * (low + high)
+            radius = max(high - middle, middle - low)
+            last = model.bound(
+                programs, program, path, order, clock, start, 1.0, middle, radius, work.registers
+            )
+            pieces += 1
+            verdict = _judged(
+                programs,
+                first,
+                last,
+                j,
+                whole,
+                high - low,
+                negligible,
+                SHARE_OF_PIECE * tolerance,
+                between,
+                work,
+            )
+            whole = False
+            if verdict == UNKNOWN and pieces < limit:
+                if not (low < middle < high and high - low > finest and top < stack.shape[0] - 1):
+                    if tolerance > 0.0:
+                        beyond = _beyond(work.registers[last], j, last, work)
+                        coarse = max(coarse, beyond * (high - low))
+                    top -= 1
+                    continue
+                stack[top, 0], stack[top + 1, 0], stack[top + 1, 1] = middle, low, middle
+                top += 1
+            elif verdict == HIDDEN or (verdict == UNKNOWN and not of_state):
+                return low, middle, coarse
+            else:
+                if verdict == NOISY:
+                    row = work.registers[last]
+                    coarse = max(coarse, _unseen(row, _beyond(row, j, last, work), high - low, tolerance))
+                top -= 1
+    return h, h, coarse

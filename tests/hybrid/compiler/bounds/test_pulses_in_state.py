@@ -1,0 +1,105 @@
+"""Narrow pulses of a field in the state: bumps that a mass passes in a small part of a step."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy
+from scipy.integrate import quad
+
+from hybrid import DOP853, HybridSystem, Mode, RadauIIA, Taylor, Tsit5, simulate
+from hybrid.compiler.bounds.forcing import Forcing, forcings
+from hybrid.kernels.types.codes import ARGUMENTS, TERMS
+from hybrid.symbolic.tracing import model_symbols
+
+SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5(), "RadauIIA": RadauIIA()}
+# Bumps of the height and width one, and their integrals from one side to the other.
+BUMPS = {
+    "gauss": (lambda z: np.exp(-z * z), np.sqrt(np.pi)),
+    "sech": (lambda z: 1 / np.cosh(z), np.pi),
+    "square of sech": (lambda z: 1 / np.cosh(z) ** 2, 2.0),
+    "two switches": (lambda z: 0.5 * (np.tanh(z + 1) - np.tanh(z - 1)), 2.0),
+    "two logistics": (lambda z: 1 / (1 + np.exp(-z - 2)) - 1 / (1 + np.exp(2 - z)), 4.0),
+    "power": (lambda z: 10.0 ** (-z * z), np.sqrt(np.pi / np.log(10))),
+}
+
+
+@cache
+def slope(bump):
+    """A mass in a plane potential with a narrow step at ``a``, of the height ``jump``."""
+    function, area = BUMPS[bump]
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"a": 1.0, "w": 1e-3, "jump": 0.5, "g": 0.1},
+        modes=[
+            Mode(
+                "m",
+                lambda t, x, p: (x.v, -p.g * x.q - p.jump / (p.w * area) * function((x.q - p.a) / p.w)),
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("bump", BUMPS)
+def test_a_narrow_bump_of_the_field_is_not_stepped_over(bump, solver):
+    """The energy changes by the height of the step, however narrow the bump is."""
+    random = np.random.default_rng(len(bump))
+    for width in (1e-2, 1e-3, 1e-4):
+        speed, a, jump = random.uniform(1.2, 2.0), random.uniform(0.3, 1.0), random.uniform(0.1, 0.5)
+        parameters = {"a": a, "w": width, "jump": jump, "g": 0.1}
+        arc = simulate(
+            slope(bump),
+            (-0.5, speed),
+            (0.0, 2.0 / speed + 1.5),
+            parameters=parameters,
+            solver=SOLVERS[solver],
+        )
+        q, v = arc.x[-1]
+        assert arc.status.ok
+        assert q > a + 40 * width
+        lost = 0.5 * (speed**2 - v**2) + 0.05 * (0.25 - q * q)
+        assert np.isclose(lost, jump, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("bump", BUMPS)
+def test_the_integrals_of_the_bumps(bump):
+    function, area = BUMPS[bump]
+    assert np.isclose(quad(function, -30, 30, points=[-2, 0, 2])[0], area, rtol=1e-9)
+
+
+def test_a_field_whose_series_overflows_is_taken_on_by_another_method():
+    """Far from its pulse ``1/cosh`` has a series whose terms overflow one after the other."""
+    for start in np.linspace(-0.24, -0.12, 13):
+        parameters = {"a": 0.5, "w": 1e-3, "jump": 0.1, "g": 1.0}
+        arc = simulate(slope("sech"), (start, 1.0), (0.0, 1.0), parameters=parameters)
+        exact = simulate(slope("sech"), (start, 1.0), (0.0, 1.0), parameters=parameters, solver=DOP853())
+        assert arc.status.ok
+        assert arc.steps < 100
+        assert np.allclose(arc.x[-1], exact.x[-1], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("term", "arguments"),
+    [
+        (lambda x, y: sympy.exp(-(x**2)) * y, lambda x, y: [-(x**2)]),
+        (lambda x, y: 1 / sympy.cosh(x - 2), lambda x, y: [x - 2]),
+        (lambda x, y: sympy.tanh(x) ** 2, lambda x, y: [x]),
+        (lambda x, y: 2 ** (-(x**2)), lambda x, y: [-(x**2) * sympy.log(2)]),
+        # One switch is no pulse, and exponentials of affine functions are none.
+        (lambda x, y: 3 * y * sympy.tanh(x), None),
+        (lambda x, y: sympy.exp(x - y) * sympy.exp(-x), None),
+        (lambda x, y: x**3 * sympy.sin(y), None),
+        # The tails of a power show.
+        (lambda x, y: (x**2 + y**2) ** sympy.Rational(-3, 2), None),
+    ],
+)
+def test_which_terms_may_be_pulses(term, arguments):
+    symbols = model_symbols(2, 1)
+    x, y = symbols.x
+    found = [each for each in forcings([y, x + term(x, y)], [], symbols) if each.expression is not None]
+    if arguments is None:
+        assert found == []
+    else:
+        assert found[0] == Forcing(sympy.Tuple(*arguments(x, y)), -1, ARGUMENTS)
+        assert found[1:] == [Forcing(term(x, y), 1, TERMS)]
