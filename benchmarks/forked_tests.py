@@ -1,16 +1,19 @@
 """Run chosen tests on a copy of the sources in which one file is changed, each time in a fork of a process.
 
 That process has imported the packages that the library rests on, but not the library, so that a run of a
-small test takes about a second.
+small test takes about a second. After a change of a kernel, only the kernel modules that contain that kernel
+are compiled again.
 """
 
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import resource
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -32,6 +35,19 @@ NOT_TRACING = (
     *("hybrid/accuracy", "hybrid/display", "hybrid/orbits", "hybrid/plot", "hybrid/simulation"),
     *("hybrid/solvers", "hybrid/sweep", "hybrid/testing", "lyapunov"),
 )
+# Kernels that only other kernels use, so that models serve again, and kernels that do not contain the change.
+KERNELS = tuple(
+    f"hybrid/kernels/{each}" for each in ("arithmetic/", "drive", "evaluate", "events/", "jumps/", "steps/")
+)
+# Prints the hash that names the stored models, and of each kernel module its hash and its sources.
+HASHES = """\
+import json
+from hybrid.compiler.cache import loader, store
+kernels = {
+    each: [loader.kernels_key(each), list(map(str, loader._own_sources(each)))] for each in loader.ALL_KERNELS
+}
+print(json.dumps([store._compiler(), kernels]))
+"""
 # What a run says that did not end in time.
 ENDLESS = "did not end"
 # Limit of the time of day, in limits of the processor time.
@@ -60,6 +76,9 @@ class Copy:
 
         users = Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False))
         _link(Path(os.environ.get("HYBRID_CACHE_DIR", users)), self.cache)
+        environment = {**os.environ, "PYTHONPATH": str(self.folder)}
+        found = subprocess.check_output([sys.executable, "-c", HASHES], env=environment, text=True)
+        self._models, self._kernels = json.loads(found)
 
     def failing(self, tests: Sequence[str], seconds: int, changed: Path | None, source: str) -> str | None:
         """The first of the tests that fails if ``changed`` has this source; None if all pass.
@@ -67,14 +86,15 @@ class Copy:
         The string may also be ``ENDLESS`` or the way in which the process died.
         """
         if changed is None:
-            return self._forked(tests, seconds, self.cache, tracing=False)
+            return self._forked(tests, seconds, self.cache)
         path = self.folder / changed
         before = path.read_bytes()
         path.write_text(source, encoding="utf-8")
-        tracing = not str(changed).startswith(NOT_TRACING)
         try:
-            if not tracing:
-                return self._forked(tests, seconds, self.cache, tracing=False)
+            if str(changed).startswith(KERNELS):
+                return self._forked(tests, seconds, self.cache, kernel=path)
+            if str(changed).startswith(NOT_TRACING):
+                return self._forked(tests, seconds, self.cache)
             with tempfile.TemporaryDirectory(dir=self._holder.name) as name:
                 cache = Path(name) / "cache"
                 _link(self.cache, cache)
@@ -82,7 +102,15 @@ class Copy:
         finally:
             path.write_bytes(before)
 
-    def _forked(self, tests: Sequence[str], seconds: int, cache: Path, *, tracing: bool) -> str | None:
+    def _forked(
+        self,
+        tests: Sequence[str],
+        seconds: int,
+        cache: Path,
+        *,
+        tracing: bool = False,
+        kernel: Path | None = None,
+    ) -> str | None:
         answer = self.folder.parent / "answer"
         answer.unlink(missing_ok=True)
         child = os.fork()
@@ -91,7 +119,7 @@ class Copy:
             try:
                 os.setsid()
                 resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-                status = self._test(tests, answer, cache, tracing)
+                status = self._test(tests, answer, cache, tracing, kernel)
             except BaseException:
                 traceback.print_exc()
                 sys.stderr.flush()
@@ -115,7 +143,9 @@ class Copy:
             return None
         return answer.read_text(encoding="utf-8") if answer.exists() else f"died ({code})"
 
-    def _test(self, tests: Sequence[str], answer: Path, cache: Path, tracing: bool) -> int:
+    def _test(
+        self, tests: Sequence[str], answer: Path, cache: Path, tracing: bool, kernel: Path | None
+    ) -> int:
         os.chdir(self.folder)
         sys.path.insert(0, str(self.folder))
         sys.dont_write_bytecode = True
@@ -144,6 +174,8 @@ class Copy:
             from hybrid.compiler.cache import store
 
             vars(store)["_tracer"] = lambda: "unchanged"
+        if kernel:
+            self._keep_kernels_without(kernel)
         options = [
             "-x",
             "-q",
@@ -157,6 +189,23 @@ class Copy:
             "--no-header",
         ]
         return int(pytest.main([*options, *tests], plugins=[FirstFailure()]))
+
+    def _keep_kernels_without(self, changed: Path) -> None:
+        """Name stored models and the kernels that do not contain the change as before the change."""
+        from hybrid.compiler.cache import loader, second_process, store
+
+        new_key = loader.kernels_key
+
+        def key(module: str = loader.DRIVER) -> str:
+            old_key, sources = self._kernels[module]
+            # The listed sources are those of the module's own package.
+            unchanged = module.startswith("hybrid.") and str(changed) not in sources
+            return str(old_key) if unchanged else new_key(module)
+
+        vars(loader)["kernels_key"] = key
+        vars(store)["_compiler"] = lambda: self._models
+        # The second process would name them otherwise.
+        vars(second_process)["start"] = lambda modules: None
 
 
 def _link(source: Path, target: Path) -> None:
