@@ -76,8 +76,8 @@ class Copy:
 
         users = Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False))
         _link(Path(os.environ.get("HYBRID_CACHE_DIR", users)), self.cache)
-        environment = {**os.environ, "PYTHONPATH": str(self.folder)}
-        found = subprocess.check_output([sys.executable, "-c", HASHES], env=environment, text=True)
+        # The interpreter looks for modules in the folder that it starts in.
+        found = subprocess.check_output([sys.executable, "-c", HASHES], cwd=self.folder, text=True)
         self._models, self._kernels = json.loads(found)
 
     def failing(self, tests: Sequence[str], seconds: int, changed: Path | None, source: str) -> str | None:
