@@ -1,19 +1,16 @@
 """Run chosen tests on a copy of the sources in which one file is changed, each time in a fork of a process.
 
 That process has imported the packages that the library rests on, but not the library, so that a run of a
-small test takes about a second. After a change of a kernel, only the kernel modules that contain that kernel
-are compiled again.
+small test takes about a second. For changes of kernels it has compiled all kernels too.
 """
 
 from __future__ import annotations
 
 import importlib
-import json
 import os
 import resource
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -24,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common import ROOT
+from benchmarks.compiled_kernels import CompiledKernels, forget_all
 
 COPIED = ("hybrid", "lyapunov", "models", "tests", "docs", "benchmarks", "pyproject.toml", "README.md")
 IMPORTED = (
@@ -39,15 +37,7 @@ NOT_TRACING = (
 KERNELS = tuple(
     f"hybrid/kernels/{each}" for each in ("arithmetic/", "drive", "evaluate", "events/", "jumps/", "steps/")
 )
-# Prints the hash that names the stored models, and of each kernel module its hash and its sources.
-HASHES = """\
-import json
-from hybrid.compiler.cache import loader, store
-kernels = {
-    each: [loader.kernels_key(each), list(map(str, loader._own_sources(each)))] for each in loader.ALL_KERNELS
-}
-print(json.dumps([store._compiler(), kernels]))
-"""
+IN_MODELS = ("hybrid/kernels/arithmetic/doubled.py", "hybrid/kernels/arithmetic/operations.py")
 # What a run says that did not end in time.
 ENDLESS = "did not end"
 # Limit of the time of day, in limits of the processor time.
@@ -76,9 +66,7 @@ class Copy:
 
         users = Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False))
         _link(Path(os.environ.get("HYBRID_CACHE_DIR", users)), self.cache)
-        # The interpreter looks for modules in the folder that it starts in.
-        found = subprocess.check_output([sys.executable, "-c", HASHES], cwd=self.folder, text=True)
-        self._models, self._kernels = json.loads(found)
+        self._kernels: CompiledKernels | None = None
 
     def failing(self, tests: Sequence[str], seconds: int, changed: Path | None, source: str) -> str | None:
         """The first of the tests that fails if ``changed`` has this source; None if all pass.
@@ -87,11 +75,14 @@ class Copy:
         """
         if changed is None:
             return self._forked(tests, seconds, self.cache)
+        kernel = str(changed).startswith(KERNELS) and str(changed) not in IN_MODELS
+        if kernel:
+            self._kernels = self._kernels or CompiledKernels(self.folder)
         path = self.folder / changed
         before = path.read_bytes()
         path.write_text(source, encoding="utf-8")
         try:
-            if str(changed).startswith(KERNELS):
+            if kernel:
                 return self._forked(tests, seconds, self.cache, kernel=path)
             if str(changed).startswith(NOT_TRACING):
                 return self._forked(tests, seconds, self.cache)
@@ -170,12 +161,14 @@ class Copy:
                 if report.failed and not answer.exists():
                     answer.write_text(report.nodeid, encoding="utf-8")
 
+        if self._kernels and kernel:
+            self._kernels.change(kernel)
+        else:
+            forget_all()
         if not tracing:
             from hybrid.compiler.cache import store
 
             vars(store)["_tracer"] = lambda: "unchanged"
-        if kernel:
-            self._keep_kernels_without(kernel)
         options = [
             "-x",
             "-q",
@@ -189,23 +182,6 @@ class Copy:
             "--no-header",
         ]
         return int(pytest.main([*options, *tests], plugins=[FirstFailure()]))
-
-    def _keep_kernels_without(self, changed: Path) -> None:
-        """Name stored models and the kernels that do not contain the change as before the change."""
-        from hybrid.compiler.cache import loader, second_process, store
-
-        new_key = loader.kernels_key
-
-        def key(module: str = loader.DRIVER) -> str:
-            old_key, sources = self._kernels[module]
-            # The listed sources are those of the module's own package.
-            unchanged = module.startswith("hybrid.") and str(changed) not in sources
-            return str(old_key) if unchanged else new_key(module)
-
-        vars(loader)["kernels_key"] = key
-        vars(store)["_compiler"] = lambda: self._models
-        # The second process would name them otherwise.
-        vars(second_process)["start"] = lambda modules: None
 
 
 def _link(source: Path, target: Path) -> None:
