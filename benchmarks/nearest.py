@@ -86,6 +86,7 @@ NEAREST = {
         "kernels/events/test_refused.py",
     ),
     "hybrid/kernels/events/derivatives.py": (
+        "kernels/events/test_guards.py",
         "kernels/events/test_curvature.py",
         "kernels/events/test_rounding_of_slopes.py",
         "kernels/events/test_touches.py",
