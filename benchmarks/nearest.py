@@ -60,7 +60,7 @@ NEAREST = {
         "compiler/test_emit.py",
         "solvers/test_taylor.py",
     ),
-    "hybrid/compiler/steep.py": ("solvers/test_steep_fields.py", "compiler/test_emit.py"),
+    "hybrid/compiler/steep.py": ("simulation/test_infinite_slopes.py", "compiler/test_surfaces.py"),
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/taylor/loops.py": ("compiler/taylor/test_series.py",),
     "hybrid/compiler/whole_numbers.py": ("system/test_periodicity.py", "test_arguments.py"),

@@ -34,6 +34,7 @@ def test_times():
         # The largest size divided by the largest speed.
         ([6.0, 5.0], 0.0, -1, 1.0, 3.0),
         ([5.0, 6.0], 0.0, -1, 1.0, 3.0),
+        ([0.1, 0.3], 0.0, -1, 1.0, 0.15),
         # Time is rounded too, along a clock or at a pace.
         ([1.0, 1.0], 8.0, 2, 1.0, 16.0),
         ([1.0, 1.0], 8.0, -1, 4.0, 2.0),

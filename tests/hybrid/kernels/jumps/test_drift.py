@@ -32,6 +32,7 @@ def test_tangent_vectors_are_multiplied_by_the_exponential():
         ({(1, 1): -3.0}, 3, 9.0),
         ({(0, 1): 2.0, (1, 0): -8.0}, 2, 8.0),
         ({(0, 1): 2.0, (1, 2): 4.0, (2, 0): -27.0}, 3, 18.0),
+        ({(0, 1): 0.5, (1, 2): 0.25, (2, 0): -1.0}, 3, 1.5),
         ({(0, 1): 2.0, (1, 2): 4.0}, 3, 0.0),
         ({(0, 2): 0.5, (2, 0): 0.5, (1, 1): 0.25}, 3, 1.5),
     ],
@@ -49,7 +50,7 @@ def run():
     return SimpleNamespace(
         phase=2.0,
         y=np.array([1.0, -1.0]),
-        scale=np.array([1.0, 100.0]),
+        scale=np.array([2.0, 100.0]),
         trail=np.zeros((3, 3)),
         restitution=0.6,
         mode=4,
@@ -81,19 +82,19 @@ def test_the_share_of_tangent_vectors_that_is_rounding(run, work):
     run.trail[:] = 0.0
     run.trail[drift.BEFORE, 2] = 0.5
     found = stubbed.rounding_of_tangents(model(None), run, 0, 0.2, work)
-    assert found == pytest.approx(3e-16 / (0.25 * 0.5 * 0.2 * 0.4), rel=1e-14)
+    assert found == pytest.approx(3e-16 / (0.25 * 0.5 * 0.2 * 0.4), rel=1e-14, abs=0.0)
 
 
 @pytest.mark.parametrize(
     ("change", "noise", "straight"),
     [
         (0.0, 0.0, True),
-        # Of the first component's size 1, the second, of size 100, adds 100 times the change in half a unit.
-        (1.9e-12, 0.0, True),
-        (2.1e-12, 0.0, False),
-        (-2.1e-12, 0.0, False),
-        (1.9e-6, 1e-4, True),
-        (2.1e-6, 1e-4, False),
+        # To the first component, of size 2, the second, of size 100, adds 50 times the change.
+        (3.9e-12, 0.0, True),
+        (4.1e-12, 0.0, False),
+        (-4.1e-12, 0.0, False),
+        (3.9e-6, 1e-4, True),
+        (4.1e-6, 1e-4, False),
     ],
 )
 def test_a_jacobian_that_changes_until_the_limit(run, work, change, noise, straight):
@@ -101,10 +102,10 @@ def test_a_jacobian_that_changes_until_the_limit(run, work, change, noise, strai
         assert mode == 3
         at_limit = t == 2.5 and x[0] == 1.0 and x[1] == 1.0
         assert at_limit or (t == 2.0 and x[1] == -1.0)
-        return [[-2.0, 7.0 + change * at_limit, 5.0 * t], [0.0, -1.0, 0.0]]
+        return [[-2.0, change * at_limit, 5.0 * t], [0.0, -1.0, 0.0]]
 
     assert kernels.is_straight(model(slopes), run, 3, 0.5, noise, work) is straight
-    assert work.jacobian[0, 1] == 7.0 + change
+    assert work.jacobian[0, 1] == change
 
 
 @pytest.mark.parametrize(

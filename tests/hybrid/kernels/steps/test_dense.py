@@ -46,3 +46,16 @@ def test_states_at_times():
     # Places 0, 1/2, 0 in the first step, and 0, 1/2, 1 in the second.
     assert states[:, 0].tolist() == pytest.approx([1.0, 3.0, 1.0, -3.0, -2.5, -2.0], rel=1e-14)
     assert states[:, 1].tolist() == [5.0, 4.5, 5.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("time", "place"), [(2.5, 0.25), (6.0, 1.0), (99.0, 1.0)])
+def test_a_step_that_comes_first_and_times_beyond_its_end(time, place):
+    """The columns of the state have a higher degree than the clock."""
+    coefficients = np.zeros((2, 4, 2))
+    coefficients[1, :, 0] = [1.0, 0.0, 0.0, 64.0]
+    coefficients[1, 1, 1] = 4.0
+    states, steps = np.zeros((1, 1)), np.zeros(1, dtype=np.int64)
+    start, span = np.array([0.0, 1.5]), np.array([1.5, 4.0])
+    kernels.states_at(np.array([time]), start, np.zeros(2), span, coefficients, states, steps)
+    assert steps.tolist() == [1]
+    assert states[0, 0] == 1.0 + 64.0 * place**3
