@@ -72,7 +72,7 @@ class TestAlongAPath:
             assert (side, length) == (sign, 2.0)
         # In the other direction, and before it, nothing fires; the side that is reached is known.
         assert self.change(guard, -sign, direction=-sign) == (NOWHERE, sign, 2.0)
-        assert self.change(guard, -sign, length=0.9 * (root + 1.0)) == (NOWHERE, -sign, 0.9 * (root + 1.0))
+        assert self.change(guard, -sign, length=0.99 * (root + 1.0)) == (NOWHERE, -sign, 0.99 * (root + 1.0))
 
     def test_a_side_that_is_not_known_is_that_of_the_first_sample(self):
         place, side, _ = self.change(lambda x: 0.25 - x if x > -1.0 else 0.0, 0)
@@ -95,3 +95,31 @@ class TestAlongAPath:
         # Known from its speed, a guard on which the run starts crosses where it comes back.
         place, side, _ = self.change(lambda x: x + 0.99 if x > -1.0 else 1e-20, -1, on_guard=BY_SPEED)
         assert (place, side) == (pytest.approx(0.01, rel=1e-13), 1)
+
+
+def rests(guard, *, on_guard=BY_STEP, length=2.0):
+    """Whether the same state rests on a guard whose rounding is 0.125."""
+
+    def write(transition, t, x, parameters, scalar):
+        scalar[0] = guard(x[0])
+
+    model = SimpleNamespace(dimension=1, parameters=None, guard=write, guard_gradient=lambda *arguments: None)
+    work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1), gradient=np.zeros(2))
+    run = SimpleNamespace(on_guard=np.array([0, on_guard]))
+    kernels = plain(sampled, rounding_band=lambda *arguments: 0.125)
+    return bool(kernels.rests(model, run, 1, np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, length, work))
+
+
+def test_a_state_rests_on_a_guard_that_stays_zero():
+    assert rests(lambda x: 0.125)
+    assert rests(lambda x: -0.125)
+    assert not rests(lambda x: 0.0, on_guard=BY_SPEED)
+    assert not rests(lambda x: 0.0, on_guard=0)
+    # Eight places are looked at, the last one at the end of the part of the step.
+    for place in np.arange(1, 9) / 4:
+        for value in (0.126, -0.126):
+            assert not rests(lambda x, place=place, value=value: value if x == place - 1.0 else 0.0)
+    for place in (0.0, 0.3, 2.25):
+        assert rests(lambda x, place=place: 1.0 if x == place - 1.0 else 0.0)
+    assert not rests(lambda x: 1.0 if x == 0.0 else 0.0, length=1.0)
+    assert rests(lambda x: 1.0 if x == 0.125 else 0.0, length=1.0)
