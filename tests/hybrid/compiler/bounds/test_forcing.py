@@ -445,33 +445,3 @@ def test_what_saturates_in_the_state_or_is_flat_at_first(field, saturates):
     wanted = (Forcing(None, OF_STATE),) if saturates else ()
     assert forcings([symbols.x[1], field(*symbols.x)], [], symbols) == wanted
     assert forcings([symbols.x[1], field(symbols.p[0], 2 * symbols.p[0])], [], symbols) == ()
-
-
-@cache
-def in_turn():
-    """Three modes from 300 to 300, each with a pulse of its own."""
-
-    def lagging(k):
-        return lambda t, x, p: (-x.x + SHAPES["gauss"](t, P(A=p.A, a=p.a + 300.0 * k, w=p.w)),)
-
-    return HybridSystem(
-        state=("x",),
-        parameters={"A": 1.0, "a": 100.0, "w": 0.01},
-        modes=[Mode(f"m{k}", lagging(k)) for k in range(3)],
-        transitions=[
-            Transition(f"m{k}", f"m{k + 1}", Guard(lambda t, x, p, k=k: t - 300.0 * (k + 1), +1))
-            for k in range(2)
-        ],
-    )
-
-
-@pytest.mark.parametrize("solver", SOLVERS, ids=str)
-@pytest.mark.parametrize("k", range(3))
-@pytest.mark.parametrize("after", [1.0, 10.0, 30.0, 100.0])
-def test_each_mode_answers_its_own_pulse(after, k, solver):
-    """After a long rest, one unit of time after its pulse; that the mode before is calm says nothing."""
-    place = after + 300.0 * k
-    arc = simulate(in_turn(), (0.0,), (0.0, place + 1.0), mode="m0", parameters={"a": after}, solver=solver)
-    assert len(arc.jumps) == k
-    expected = exact_lag("gauss", place + 1.0, {"A": 1.0, "a": place, "w": 0.01})
-    assert arc.x[-1, 0] == pytest.approx(expected, rel=0, abs=allowed_error("gauss", solver, 1.0, 0.01))
