@@ -226,10 +226,12 @@ def side_of(value, *, speed=0.0, acceleration=0.0, direction=1, before=0, was_on
 
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_the_side_of_a_guard(sign):
-    # Beyond its band the value decides, within the speed, then the acceleration.
-    assert side_of(1.1 * sign, speed=-sign) == (sign, 0)
-    assert side_of(-0.9 * sign, speed=sign, acceleration=-sign) == (sign, BY_SPEED)
-    assert side_of(-0.9 * sign, acceleration=sign) == (sign, BY_ACCELERATION)
+    for direction in (-1, 0, 1):
+        # Beyond its band the value decides, within the speed, then the acceleration.
+        given = {"direction": direction, "before": -sign, "was_on": True}
+        assert side_of(1.1 * sign, speed=-sign, **given) == (sign, 0)
+        assert side_of(-0.9 * sign, speed=sign, acceleration=-sign, **given) == (sign, BY_SPEED)
+        assert side_of(-0.9 * sign, acceleration=sign, **given) == (sign, BY_ACCELERATION)
     # If none does, the side is the near one unless it was known before.
     for direction in (-1, 1):
         assert side_of(0.9 * sign, direction=direction) == (-direction, BY_STEP)
