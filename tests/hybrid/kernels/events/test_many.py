@@ -76,7 +76,7 @@ def test_a_single_mode_may_be_left_at_once_but_not_started_beyond_a_guard():
 @pytest.mark.parametrize("kind", [RUNGE_KUTTA, TAYLOR, EXACT, DESINGULARISED, ROOTED])
 def test_a_mode_that_is_named(kind):
     """It may start beyond its guards, except where its series hold their roots."""
-    for named, beyond in ((0, 2), (1, 1)):
+    for named, beyond in ((0, 0), (0, 2), (1, 1)):
         kinds = [RUNGE_KUTTA, RUNGE_KUTTA]
         kinds[named] = kind
         assert start({}, named=named, kinds=kinds) == named

@@ -203,3 +203,12 @@ def test_the_last_jumps_among_which_are_all_transitions(fired, turn):
     for back, transition in enumerate(recent):
         run.recent[(run.jumps - 1 - back) % 8] = transition
     assert plain(skipped).jumps_in_turn(run) == turn
+
+
+def test_a_run_that_has_jumped_less_often_than_it_can_remember():
+    """What was never written there is no transition."""
+    run = SimpleNamespace(jumps=3, recent=np.zeros(8, dtype=np.int64), visits=np.zeros((8, 1)))
+    run.recent[:3] = 5
+    assert plain(skipped).jumps_in_turn(run) == 1
+    run.recent[0] = 4
+    assert plain(skipped).jumps_in_turn(run) == 3
