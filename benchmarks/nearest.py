@@ -66,6 +66,7 @@ NEAREST = {
     "hybrid/compiler/whole_numbers.py": ("system/test_periodicity.py", "test_arguments.py"),
     "hybrid/errors.py": ("test_arguments.py", "sweep/test_points.py", "compiler/test_opaque.py"),
     "hybrid/kernels/arithmetic/columns.py": ("compiler/taylor/test_series.py",),
+    "hybrid/kernels/arithmetic/slopes.py": ("kernels/events/test_guards.py",),
     "hybrid/kernels/arithmetic/operations.py": ("kernels/events/test_proved_crossings.py",),
     "hybrid/kernels/drive.py": (
         "simulation/test_simulate.py",
@@ -100,6 +101,7 @@ NEAREST = {
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_crossings.py",
     ),
+    "hybrid/kernels/events/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
     "hybrid/kernels/events/initial_mode.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
@@ -203,6 +205,7 @@ NEAREST = {
         "kernels/events/test_grazing.py",
         "kernels/events/test_proved_crossings.py",
     ),
+    "hybrid/kernels/steps/series_roots.py": ("kernels/steps/test_series_guards.py",),
     "hybrid/kernels/steps/step.py": ("accuracy/test_order.py", "simulation/test_simulate.py"),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),

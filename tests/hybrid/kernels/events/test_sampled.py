@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Taylor, Transition, simulate
-from hybrid.kernels.events import sampled
+from hybrid.kernels.events import hidden, sampled
 from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
 from hybrid.kernels.events.sampled import NOWHERE, SAMPLES
 from tests.hybrid.kernels.plain import plain
@@ -45,7 +45,7 @@ def test_a_dip_around_each_sample_fires_in_and_out(place):
 class TestAlongAPath:
     """The state runs from -1 to 1, evenly; the guard is a function of it, scaled by its slope along time."""
 
-    def change(self, guard, side, *, direction=0, on_guard=0, fired=False, length=2.0):
+    def change(self, guard, side, *, direction=0, on_guard=0, fired=False, length=2.0, hidden=0.0):
         def write(transition, t, x, parameters, scalar):
             assert abs(t - 10.0 - 0.5 * (x[0] + 1.0)) < 1e-14
             scalar[0] = guard(x[0])
@@ -55,7 +55,7 @@ class TestAlongAPath:
         work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
         path = np.array([[-1.0], [1.0]])
         found = plain(sampled).sampled_change(
-            model, run, 1, path, 1, -1, 10.0, 0.5, length, side, on_guard, work
+            model, run, 1, path, 1, -1, 10.0, 0.5, length, side, on_guard, hidden, work
         )
         assert run.unproved == 5
         return found
@@ -96,30 +96,29 @@ class TestAlongAPath:
         place, side, _ = self.change(lambda x: x + 0.99 if x > -1.0 else 1e-20, -1, on_guard=BY_SPEED)
         assert (place, side) == (pytest.approx(0.01, rel=1e-13), 1)
 
-
-def rests(guard, *, on_guard=BY_STEP, length=2.0):
-    """Whether the same state rests on a guard whose rounding is 0.125."""
-
-    def write(transition, t, x, parameters, scalar):
-        scalar[0] = guard(x[0])
-
-    model = SimpleNamespace(dimension=1, parameters=None, guard=write, guard_gradient=lambda *arguments: None)
-    work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1), gradient=np.zeros(2))
-    run = SimpleNamespace(on_guard=np.array([0, on_guard]))
-    kernels = plain(sampled, rounding_band=lambda *arguments: 0.125)
-    return bool(kernels.rests(model, run, 1, np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, length, work))
+    def test_signs_that_are_noise_are_not_looked_at(self):
+        """The guard is sampled from that place on."""
+        place, side, _ = self.change(lambda x: -1.0 if x < -0.5 else x - 0.25, 0, hidden=0.5)
+        assert (place, side) == (pytest.approx(1.25, rel=1e-15), 1)
+        assert self.change(lambda x: -1.0 if x < -0.5 else 1.0, 1, hidden=0.5) == (NOWHERE, 1, 2.0)
 
 
-def test_a_state_rests_on_a_guard_that_stays_zero():
-    assert rests(lambda x: 0.125)
-    assert rests(lambda x: -0.125)
-    assert not rests(lambda x: 0.0, on_guard=BY_SPEED)
-    assert not rests(lambda x: 0.0, on_guard=0)
-    # Eight places are looked at, the last one at the end of the part of the step.
+def test_how_far_a_guard_comes_from_zero_at_eight_places():
+    def farthest(guard, place):
+        def write(transition, t, x, parameters, scalar):
+            scalar[0] = guard(x[0])
+
+        model = SimpleNamespace(dimension=1, parameters=None, guard=write)
+        work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
+        kernels = plain(hidden, has_program=lambda *arguments: False)
+        return kernels.farthest_from_zero(model, 1, np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, place, work)
+
     for place in np.arange(1, 9) / 4:
-        for value in (0.126, -0.126):
-            assert not rests(lambda x, place=place, value=value: value if x == place - 1.0 else 0.0)
+        for value in (0.5, -0.5):
+            assert (
+                farthest(lambda x, place=place, value=value: value if x == place - 1.0 else 0.0, 2.0) == 0.5
+            )
     for place in (0.0, 0.3, 2.25):
-        assert rests(lambda x, place=place: 1.0 if x == place - 1.0 else 0.0)
-    assert not rests(lambda x: 1.0 if x == 0.0 else 0.0, length=1.0)
-    assert rests(lambda x: 1.0 if x == 0.125 else 0.0, length=1.0)
+        assert farthest(lambda x, place=place: 1.0 if x == place - 1.0 else 0.0, 2.0) == 0.0
+    assert farthest(lambda x: 3.0 if x == 0.0 else -1.0, 1.0) == 3.0
+    assert farthest(lambda x: np.nan if x == 0.0 else -1.0, 2.0) == np.inf

@@ -215,7 +215,7 @@ def test_a_root_is_one_of_the_whole_series(known_roots, rounding):
     series[:, 0] = 0.0
     series[known_roots, 0], series[known_roots + 1, 0] = -1.0, 1.0
     series[0, 0] += rounding
-    found = plain(series_guards).root_between(series, 0, 3, known_roots, 2.0, 0.5, 1.5, -0.5, 0.5)
+    found = plain(series_roots).root_between(series, 0, 3, known_roots, 2.0, 0.5, 1.5, -0.5, 0.5)
     # To first order; for ``s - 1`` that is exact.
     assert found == pytest.approx(1.0 - rounding, rel=0, abs=1e-15 if known_roots == 0 else 1e-17 / 1e-2)
 
@@ -223,14 +223,14 @@ def test_a_root_is_one_of_the_whole_series(known_roots, rounding):
 def test_a_root_is_not_moved_to_the_start_of_a_step():
     """A value of rounding at the start, as large as the guard where it turns, is none of the way."""
     series = np.array([[-0.5], [-1.0], [1.0]])
-    found = plain(series_guards).root_between(series, 0, 2, 1, 2.0, 0.5, 1.5, -0.5, 0.5)
+    found = plain(series_roots).root_between(series, 0, 2, 1, 2.0, 0.5, 1.5, -0.5, 0.5)
     assert found == 1.0
 
 
 @pytest.mark.parametrize("span", [0.0, 1e-9, 0.3, 1.0, 3.0, 4.0])
 def test_the_place_where_a_clock_shows_a_time(span):
     """The clock ``3 s + s^2``, and one that starts at speed zero, ``s^2``; places end with the step."""
-    time_of = plain(series_guards).time_of
+    time_of = plain(series_roots).time_of
     even = np.array([[9.0, 0.0], [9.0, 3.0], [9.0, 1.0]])
     assert time_of(even, 1, 2, 1.0, span) == pytest.approx(
         (np.sqrt(9.0 + 4.0 * span) - 3.0) / 2.0, rel=1e-6 if span == 1e-9 else 1e-14, abs=0.0
