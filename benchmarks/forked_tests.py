@@ -1,7 +1,7 @@
 """Run chosen tests on a copy of the sources in which one file is changed, each time in a fork of a process.
 
 That process has imported the packages that the library rests on, but not the library, so that a run of a
-small test takes about a second.
+small test takes about a second. For changes of kernels it has compiled all kernels too.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common import ROOT
+from benchmarks.compiled_kernels import CompiledKernels, forget_all
 
 COPIED = ("hybrid", "lyapunov", "models", "tests", "docs", "benchmarks", "pyproject.toml", "README.md")
 IMPORTED = (
@@ -32,6 +33,11 @@ NOT_TRACING = (
     *("hybrid/accuracy", "hybrid/display", "hybrid/orbits", "hybrid/plot", "hybrid/simulation"),
     *("hybrid/solvers", "hybrid/sweep", "hybrid/testing", "lyapunov"),
 )
+# Kernels that only other kernels use, so that models serve again, and kernels that do not contain the change.
+KERNELS = tuple(
+    f"hybrid/kernels/{each}" for each in ("arithmetic/", "drive", "evaluate", "events/", "jumps/", "steps/")
+)
+IN_MODELS = ("hybrid/kernels/arithmetic/doubled.py", "hybrid/kernels/arithmetic/operations.py")
 # What a run says that did not end in time.
 ENDLESS = "did not end"
 # Limit of the time of day, in limits of the processor time.
@@ -60,6 +66,7 @@ class Copy:
 
         users = Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False))
         _link(Path(os.environ.get("HYBRID_CACHE_DIR", users)), self.cache)
+        self._kernels: CompiledKernels | None = None
 
     def failing(self, tests: Sequence[str], seconds: int, changed: Path | None, source: str) -> str | None:
         """The first of the tests that fails if ``changed`` has this source; None if all pass.
@@ -67,14 +74,18 @@ class Copy:
         The string may also be ``ENDLESS`` or the way in which the process died.
         """
         if changed is None:
-            return self._forked(tests, seconds, self.cache, tracing=False)
+            return self._forked(tests, seconds, self.cache)
+        kernel = str(changed).startswith(KERNELS) and str(changed) not in IN_MODELS
+        if kernel:
+            self._kernels = self._kernels or CompiledKernels(self.folder)
         path = self.folder / changed
         before = path.read_bytes()
         path.write_text(source, encoding="utf-8")
-        tracing = not str(changed).startswith(NOT_TRACING)
         try:
-            if not tracing:
-                return self._forked(tests, seconds, self.cache, tracing=False)
+            if kernel:
+                return self._forked(tests, seconds, self.cache, kernel=path)
+            if str(changed).startswith(NOT_TRACING):
+                return self._forked(tests, seconds, self.cache)
             with tempfile.TemporaryDirectory(dir=self._holder.name) as name:
                 cache = Path(name) / "cache"
                 _link(self.cache, cache)
@@ -82,7 +93,15 @@ class Copy:
         finally:
             path.write_bytes(before)
 
-    def _forked(self, tests: Sequence[str], seconds: int, cache: Path, *, tracing: bool) -> str | None:
+    def _forked(
+        self,
+        tests: Sequence[str],
+        seconds: int,
+        cache: Path,
+        *,
+        tracing: bool = False,
+        kernel: Path | None = None,
+    ) -> str | None:
         answer = self.folder.parent / "answer"
         answer.unlink(missing_ok=True)
         child = os.fork()
@@ -91,7 +110,7 @@ class Copy:
             try:
                 os.setsid()
                 resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-                status = self._test(tests, answer, cache, tracing)
+                status = self._test(tests, answer, cache, tracing, kernel)
             except BaseException:
                 traceback.print_exc()
                 sys.stderr.flush()
@@ -115,7 +134,9 @@ class Copy:
             return None
         return answer.read_text(encoding="utf-8") if answer.exists() else f"died ({code})"
 
-    def _test(self, tests: Sequence[str], answer: Path, cache: Path, tracing: bool) -> int:
+    def _test(
+        self, tests: Sequence[str], answer: Path, cache: Path, tracing: bool, kernel: Path | None
+    ) -> int:
         os.chdir(self.folder)
         sys.path.insert(0, str(self.folder))
         sys.dont_write_bytecode = True
@@ -140,6 +161,10 @@ class Copy:
                 if report.failed and not answer.exists():
                     answer.write_text(report.nodeid, encoding="utf-8")
 
+        if self._kernels and kernel:
+            self._kernels.change(kernel)
+        else:
+            forget_all()
         if not tracing:
             from hybrid.compiler.cache import store
 

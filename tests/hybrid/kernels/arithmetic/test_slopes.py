@@ -2,12 +2,28 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
 import models
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
+from hybrid.kernels.arithmetic import slopes
 from hybrid.simulation.trajectory import start
+
+_opposites, _change, _spread = slopes.jacobian_with_opposites, slopes.change_of_rate, slopes.spread_of_rate
+
+
+@njit
+def opposites(model, mode, t, x, out):
+    _opposites(model, mode, t, x, out)
+
+
+@njit
+def changes_and_spreads(model, mode, jacobian, direction, sizes, out):
+    for i in range(model.dimension):
+        out[i, 0] = _change(model, mode, i, jacobian, direction)
+        out[i, 1] = _spread(model, mode, i, jacobian, sizes)
 
 
 def chain(n, push=0.0, e=0.8):
@@ -108,3 +124,28 @@ def test_a_hit_of_a_large_system_costs_no_matrix():
     rows = compile_system(chain(30)).emitted.slope_columns[0]
     assert max(map(len, rows)) == 3
     assert simulate(chain(30), np.linspace(0.0, 0.45, 60), (0.0, 1.0)).status
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_sums_over_the_cells_that_are_not_left_alone(name):
+    """They are those over whole rows, and each cell whose opposite is none of them is zero."""
+    system = CASES[name][0]()
+    compiled, n = compile_system(system), system.dimension
+    model = compiled.model()
+    kernel = load_kernels("hybrid.kernels.steps.step").jacobian_at
+    rng = np.random.default_rng(4)
+    for mode, rows in enumerate(compiled.emitted.slope_columns):
+        x, direction = rng.normal(size=n), rng.normal(size=n)
+        whole, found, sums = np.empty((n, n + 1)), np.full((n, n + 1), np.nan), np.empty((n, 2))
+        kernel(model, mode, 0.3, x, whole)
+        opposites(model, mode, 0.3, x, found)
+        held = np.zeros((n, n), dtype=bool)
+        for i, columns in enumerate(rows):
+            held[i, list(columns)] = True
+        expected = np.where(held | held.T, whole[:, :n], np.nan)
+        np.testing.assert_array_equal(found[:, :n], expected)
+        changes_and_spreads(model, mode, found, direction, np.abs(direction), sums)
+        np.testing.assert_allclose(sums[:, 0], whole[:, :n] @ direction, rtol=1e-14, atol=1e-14)
+        np.testing.assert_allclose(
+            sums[:, 1], np.abs(whole[:, :n]) @ np.abs(direction), rtol=1e-14, atol=1e-14
+        )

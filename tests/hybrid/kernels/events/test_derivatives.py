@@ -23,6 +23,7 @@ SHAPES = {
     "bowl": (lambda z: -np.cosh(z) + 1.0, (-1, -1), {BY_ACCELERATION}),
     # Speed and acceleration change sign within rounding.
     "cube that turns": (lambda z: z**3 - 1e-29 * z, (1, -1), {BY_STEP}),
+    "flat below": (lambda z: np.maximum(z, 0.0) ** 3, (1, -1), {BY_SPEED, BY_STEP}),
     "two slopes": (lambda z: np.where(z > 0.0, 3.0 * z, z), (1, -1), {BY_SPEED}),
 }
 SIZE = 0.7
@@ -55,6 +56,14 @@ def test_a_flat_guard_goes_where_every_state_within_rounding_goes(shape, rate):
         assert order in orders or (roundings == 0.0 and order == BY_STEP)
         # The next step shows what the point does not.
         assert order == BY_STEP or found == expected[0 if rate > 0.0 else 1]
+
+
+@pytest.mark.parametrize(("rate", "found"), [(1.0, (1, BY_SPEED)), (-1.0, (0, BY_STEP))])
+def test_a_guard_that_is_flat_on_one_side_has_the_speed_of_a_moment_later(rate, found):
+    """Speed and acceleration are zero at the edge; what came before the edge does not count."""
+    x = np.array([SIZE, SIZE])
+    run = start(ramp("flat below"), x, 0.0, mode="run", parameters={"r": rate}, solver=DOP853())
+    assert side(run.model, run.run, 0.0, x, run.work) == found
 
 
 @cache

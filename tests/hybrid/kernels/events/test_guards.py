@@ -1,6 +1,7 @@
 """How far rounding and tolerances move a guard, its speed and its acceleration, compared with NumPy."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hybrid import DOP853, Guard, HybridSystem, Mode, Transition
 from hybrid.kernels.events import derivatives, guards
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.simulation.trajectory import start
+from tests.hybrid.kernels.plain import plain
 
 _band, _smooth, _tolerated = guards.rounding_band, guards.smooth_band, guards.error_band
 _speed, _speed_rounding = guards.guard_speed, derivatives.speed_rounding
@@ -192,3 +194,62 @@ def test_terms_that_cancel_leave_their_own_rounding():
     bands_of_residues(trajectory.model, trajectory.run, t, x, trajectory.work, out)
     assert out[0, 0] == pytest.approx(16 * EPSILON * 1e9, rel=1e-2, abs=0.0)
     assert out[1, 0] == pytest.approx(16 * EPSILON * 1e9, rel=1e-2, abs=0.0)
+
+
+def jacobian_place(value, *, steep=1, direction=1):
+    """Where the Jacobian is evaluated for the guard ``2 (x0 - 1)``, whose rounding is 0.5, at ``x0 = 1``."""
+    places = []
+    kernels = plain(
+        guards,
+        guard_value=lambda *arguments: value,
+        gradient_band=lambda *arguments: 0.5,
+    )
+    model = SimpleNamespace(
+        dimension=2,
+        parameters=None,
+        direction=[9, direction],
+        steep=[0, 0, steep],
+        field_jacobian=lambda mode, t, x, parameters, out: places.append(x.copy()),
+    )
+    work = SimpleNamespace(
+        scalar=None, jacobian=None, gradient=np.array([2.0, 0.0, 7.0]), rounding=np.zeros((4, 2))
+    )
+    kernels.slopes_at_guard(model, None, 1, 2, 0.0, np.array([1.0, 5.0]), work)
+    [[moved, other]] = places
+    assert other == 5.0
+    return moved - 1.0
+
+
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_a_root_of_a_guard_has_its_slope_beyond_the_guard(direction):
+    """There it is zero. The guard is moved by its value and by its rounding, to the far side."""
+    for value in (0.0, 0.75, -0.75):
+        assert jacobian_place(value, direction=direction) == direction * (abs(value) + 0.5) / 2.0
+    # Away from the guard, and in a mode without such roots, the slope is that of the state.
+    assert jacobian_place(8.01, direction=direction) == jacobian_place(-8.01, direction=direction) == 0.0
+    assert jacobian_place(7.99, direction=direction) != 0.0
+    assert jacobian_place(0.0, direction=direction, steep=0) == jacobian_place(0.0, direction=0) == 0.0
+
+
+def test_a_guard_that_rounding_has_left_behind_moves_back():
+    def left(value, speed, side):
+        kernels = plain(guards, guard_value=lambda *arguments: value, rounding_band=lambda *arguments: 0.5)
+        return bool(
+            kernels.was_left_behind(None, None, 0, 0.0, None, speed, side, SimpleNamespace(scalar=None))
+        )
+
+    for side in (-1, 1):
+        assert left(-7.9 * side, 1e-9 * side, side)
+        assert not left(-8.1 * side, 1e-9 * side, side)
+        assert not left(-7.9 * side, -1e-9 * side, side)
+        assert not left(-7.9 * side, 0.0, side)
+
+
+def test_a_state_beside_a_guard():
+    """Displaced along the gradient; a guard of time alone moves no state."""
+    displace, out = plain(guards).displace, np.zeros(2)
+    model = SimpleNamespace(dimension=2)
+    displace(model, np.array([1.0, 2.0]), 5.0, np.array([3.0, -4.0, 9.0]), out)
+    np.testing.assert_allclose(out, [1.6, 1.2], rtol=1e-15)
+    displace(model, np.array([1.0, 2.0]), 5.0, np.array([0.0, 0.0, 9.0]), out)
+    assert out.tolist() == [1.0, 2.0]

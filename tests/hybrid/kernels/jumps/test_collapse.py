@@ -3,6 +3,7 @@
 import math
 from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from hybrid import (
     Transition,
     simulate,
 )
+from hybrid.kernels.jumps import collapse as module
+from tests.hybrid.kernels.plain import plain
 
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
 METHODS = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
@@ -205,3 +208,72 @@ def test_a_restitution_that_depends_on_the_speed_is_not_followed():
     parameters = {"m0": 1.0, "m1": 1e5, "e0": 0.5}
     arc = simulate(bent, (0.1, 1.0, 0.0, -1.0), (0.0, 5.0), parameters=parameters)
     assert arc.status.code == StatusCode.STUCK
+
+
+class TestDoubling:
+    """Rounds of the map ``x -> D x + d``."""
+
+    D, SHIFT = np.array([[0.5, 0.25], [0.0, -0.75]]), np.array([1.0, 7.0])
+    LIMIT = np.linalg.solve(np.eye(2) - D, SHIFT)
+
+    def followed(self, matrix=D, stops=10**9, before=1.0):
+        asked = []
+
+        def fires_in_turn(model, run, turn, start, rounds, work):
+            assert turn == 3
+            asked.append(rounds)
+            work.new[:] = matrix @ start + self.SHIFT
+            return len(asked) < stops
+
+        def round_jacobian(model, run, turn, start, out, work):
+            out[:] = matrix
+
+        kernels = plain(module, fires_in_turn=fires_in_turn, round_jacobian=round_jacobian)
+        names = ("trial", "new", "error", "settled", "state")
+        work = SimpleNamespace(
+            **{name: np.zeros(2) for name in names}, saltation=np.zeros((2, 2)), sizes=np.zeros((2, 2))
+        )
+        model = SimpleNamespace(dimension=2)
+        rounds = kernels.follow_doubling(model, None, 3, np.array([1e3, -9.0]), before, work)
+        return rounds, asked, work.settled
+
+    def test_the_limit_is_a_fixed_point(self):
+        rounds, asked, limit = self.followed()
+        np.testing.assert_allclose(limit, self.LIMIT, rtol=1e-12)
+        # Until the moves of all rounds are rounding: 0.75^128 is 1e-16.
+        assert rounds in (128.0, 256.0)
+        assert asked[:4] == [1.0, 2.0, 4.0, 8.0]
+        assert asked[-1] == rounds
+        # A start that has come from many rounds has their rounding.
+        assert self.followed(before=32.0)[1][:7] == [32.0, 32.0, 32.0, 32.0, 32.0, 32.0, 64.0]
+
+    @pytest.mark.parametrize("stops", [1, 2, 5])
+    def test_no_limit_if_the_order_changes(self, stops):
+        assert self.followed(stops=stops)[0] == 0.0
+
+    def test_no_limit_if_all_goes_on(self):
+        rounds, asked, _ = self.followed(np.diag([1.0, -0.5]))
+        assert rounds == 0.0
+        assert len(asked) == module.MOST_DOUBLINGS + 1
+
+
+@pytest.mark.parametrize(
+    ("fired", "here", "turn"),
+    [
+        ([3, 4], 60, 2),
+        ([3], 48, 1),
+        ([3], 47, 0),
+        ([3, 4, 3, 5], 60, 4),
+        ([3, 4, 6], 60, 0),
+        ([3, 4, 7], 60, 0),
+        (range(3, 6), 60, 3),
+        ([*[3] * 15, 4], 60, 16),
+        ([*[3] * 16, 4], 60, 0),
+    ],
+)
+def test_transitions_that_fire_in_turn_at_one_instant(fired, here, turn):
+    """Transition 6 leads to another mode, and 7 fires in both directions."""
+    recent = np.resize(list(fired), 64)
+    model = SimpleNamespace(target=np.array([0] * 6 + [1, 0]), direction=np.array([1] * 7 + [0]))
+    run = SimpleNamespace(jumps=64, jumps_here=here, recent=recent, visits=np.zeros((64, 1)), mode=0)
+    assert plain(module).round_at_once(model, run) == turn

@@ -1,11 +1,15 @@
 """Guards reached at one instant: both fire, and where their order matters the status says so."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
+from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
+from hybrid.kernels.jumps import corner as module
+from tests.hybrid.kernels.plain import plain
 
 
 @cache
@@ -121,3 +125,44 @@ class TestThreeBalls:
         arc = simulate(three_balls(masses, 0.5), (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0), (0.0, 2.0))
         m = np.array(masses)
         assert arc.x[-1, 3:] @ m == pytest.approx(m[0] - m[2], abs=1e-14)
+
+
+def turns_back(before, *, side=1, order=0, speed=0.0, acceleration=0.0, leads=False):
+    """Rounding of the speed is 0.5, and that of the acceleration 0.25."""
+    asked = []
+
+    def leads_to_guard(model, run, transition, mode, t, x, side, work):
+        asked.append(side)
+        return leads
+
+    kernels = plain(
+        module,
+        guard_speed=lambda *arguments: speed,
+        speed_rounding=lambda *arguments: 0.5,
+        guard_acceleration=lambda *arguments: acceleration,
+        acceleration_rounding=lambda *arguments: 0.25,
+        leads_to_guard=leads_to_guard,
+    )
+    model = SimpleNamespace(field=lambda *arguments: None, parameters=None)
+    run = SimpleNamespace(on_guard=[0, order], side=[0, side], mode=0, phase=0.0, y=None)
+    work = SimpleNamespace(field=None, gradient=None)
+    answer = bool(kernels.turns_back(model, run, 1, before, work))
+    assert set(asked) <= {before}
+    return answer
+
+
+@pytest.mark.parametrize("before", [-1, 1])
+def test_a_guard_that_only_touches(before):
+    # A speed beyond rounding tells, unless the field leads to the guard from both sides.
+    assert turns_back(before, speed=0.6 * before, acceleration=-9.0 * before)
+    assert not turns_back(before, speed=0.6 * before, leads=True)
+    assert not turns_back(before, speed=-0.6 * before, acceleration=9.0 * before)
+    # Within rounding the acceleration tells, if that is no rounding itself.
+    for speed in (0.4, -0.4):
+        assert turns_back(before, speed=speed, acceleration=0.3 * before)
+        assert not turns_back(before, speed=speed, acceleration=0.2 * before)
+        assert not turns_back(before, speed=speed, acceleration=-0.3 * before)
+    # A guard that is known to move on by its speed has not turned.
+    assert not turns_back(before, speed=0.6 * before, order=BY_SPEED, side=-before)
+    assert turns_back(before, speed=0.6 * before, order=BY_SPEED, side=before)
+    assert turns_back(before, speed=0.6 * before, order=BY_STEP, side=-before)

@@ -1,6 +1,7 @@
 """What a jump does to tangent vectors: any number of them, at a start, in a chain, and where a mass rests."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition,
 from hybrid.kernels.jumps import jump
 from hybrid.simulation.trajectory import start
 from lyapunov import lyapunov_spectrum
+from tests.hybrid.kernels.plain import plain
 
 SOLVERS = pytest.mark.parametrize(
     "solver", [Taylor(), DOP853(rtol=1e-12, atol=1e-14)], ids=["Taylor", "DOP853"]
@@ -303,3 +305,53 @@ def test_the_sizes_of_the_terms_of_a_saltation_matrix(unit):
     np.testing.assert_allclose(
         run.work.sizes, np.abs(matrix) + np.outer(terms, np.abs(g)) / abs(speed), rtol=1e-13
     )
+
+
+def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():
+    """A jump multiplies two vectors of three states; each image may be off by the sizes of its own terms."""
+    saltation = np.array([[1.0, -2.0, 0.0], [0.0, 3.0, 0.5], [4.0, 0.0, -1.0]])
+    sizes = np.array([[1.0, 5.0, 7.0], [2.0, 3.0, 1.0], [4.0, 9.0, 6.0]])
+    vectors = np.array([[0.6, 0.0, -0.8], [0.0, -1.0, 0.0]])
+    calls = []
+
+    def orthonormalise(y, n, tangents, growth, terms, images):
+        calls.append((y[3:].copy(), terms.copy(), images))
+        growth[0] += 10.0 ** len(calls)
+
+    kernels = plain(jump, orthonormalise=orthonormalise)
+
+    def carried(orthonormal, apart, strain=0.0):
+        calls.clear()
+        run = SimpleNamespace(
+            y=np.array([9.0, 8.0, 7.0, *vectors.ravel()]),
+            growth=np.zeros(2),
+            log_determinant=1.0,
+            strain=strain,
+        )
+        work = SimpleNamespace(
+            saltation=saltation,
+            sizes=sizes,
+            jacobian=np.zeros((3, 4)),
+            reset_jacobian=np.zeros((3, 4)),
+            state=np.zeros(3),
+            rounding=np.zeros((4, 3)),
+        )
+        added = kernels.carry_tangents(SimpleNamespace(dimension=3), run, 2, orthonormal, apart, work)
+        images = np.array([vectors @ saltation.T])
+        np.testing.assert_allclose(run.y[3:], images.ravel(), rtol=1e-15)
+        np.testing.assert_array_equal(run.y[:3], [9.0, 8.0, 7.0])
+        assert run.log_determinant == pytest.approx(1.0 + np.log(abs(np.linalg.det(saltation))), rel=1e-14)
+        return added, run.strain
+
+    # The growth that the second call finds is that of the jump alone.
+    assert carried(True, True) == (100.0, 0.0)
+    (before, _, first), (after, terms, second) = calls
+    assert (first, second) == (False, True)
+    np.testing.assert_array_equal(before, vectors.ravel())
+    np.testing.assert_allclose(after, (vectors @ saltation.T).ravel(), rtol=1e-15)
+    np.testing.assert_allclose(terms[:2, :3], np.abs(vectors) @ sizes.T, rtol=1e-15)
+    # Without need, nothing is made orthonormal, and the strain adds up.
+    assert carried(False, True)[0] == carried(True, False)[0] == 0.0
+    assert not calls
+    assert carried(True, False, strain=0.5)[1] - carried(True, False)[1] == pytest.approx(0.5, rel=1e-12)
+    assert carried(True, False, strain=1e9) == (100.0, 0.0)

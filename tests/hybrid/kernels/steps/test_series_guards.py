@@ -10,6 +10,7 @@ from numba import njit
 
 from hybrid.kernels.steps import series_guards, series_roots
 from hybrid.kernels.types.codes import HIGHEST_ORDER as ORDER
+from tests.hybrid.kernels.plain import plain
 
 _judge, _to_bernstein, _leading = (
     series_guards.judge_leading,
@@ -203,3 +204,36 @@ def test_a_root_that_rounding_puts_on_the_other_side_of_an_end():
             powers = math.cos(1.3 * root) * sine - math.sin(1.3 * root) * cosine
             found = _root_with_ends(powers, 0.5, 1.0, *ends)
             assert found == pytest.approx(end, abs=max(4e-16, abs(beyond)))
+
+
+@pytest.mark.parametrize("known_roots", [0, 1, 2])
+@pytest.mark.parametrize("rounding", [1e-9, -1e-9, 0.0])
+def test_a_root_is_one_of_the_whole_series(known_roots, rounding):
+    """A guard that is known to be zero at the start is divided by the place; what is left there counts."""
+    # ``rounding + s^k (s - 1)``, and a second column that must not matter.
+    series = np.full((4, 2), 7.0)
+    series[:, 0] = 0.0
+    series[known_roots, 0], series[known_roots + 1, 0] = -1.0, 1.0
+    series[0, 0] += rounding
+    found = plain(series_roots).root_between(series, 0, 3, known_roots, 2.0, 0.5, 1.5, -0.5, 0.5)
+    # To first order; for ``s - 1`` that is exact.
+    assert found == pytest.approx(1.0 - rounding, rel=0, abs=1e-15 if known_roots == 0 else 1e-17 / 1e-2)
+
+
+def test_a_root_is_not_moved_to_the_start_of_a_step():
+    """A value of rounding at the start, as large as the guard where it turns, is none of the way."""
+    series = np.array([[-0.5], [-1.0], [1.0]])
+    found = plain(series_roots).root_between(series, 0, 2, 1, 2.0, 0.5, 1.5, -0.5, 0.5)
+    assert found == 1.0
+
+
+@pytest.mark.parametrize("span", [0.0, 1e-9, 0.3, 1.0, 3.0, 4.0])
+def test_the_place_where_a_clock_shows_a_time(span):
+    """The clock ``3 s + s^2``, and one that starts at speed zero, ``s^2``; places end with the step."""
+    time_of = plain(series_roots).time_of
+    even = np.array([[9.0, 0.0], [9.0, 3.0], [9.0, 1.0]])
+    assert time_of(even, 1, 2, 1.0, span) == pytest.approx(
+        (np.sqrt(9.0 + 4.0 * span) - 3.0) / 2.0, rel=1e-6 if span == 1e-9 else 1e-14, abs=0.0
+    )
+    still = np.array([[9.0, 0.0], [9.0, 0.0], [9.0, 1.0]])
+    assert time_of(still, 1, 2, 2.0, span) == pytest.approx(np.sqrt(span), rel=1e-14, abs=0.0)

@@ -1,0 +1,57 @@
+"""Columns of powers along a step, evaluated, and the part of a step that is rounding of its start."""
+
+import numpy as np
+import pytest
+
+from hybrid.kernels.events import path
+from hybrid.kernels.types.layout import EPSILON
+from tests.hybrid.kernels.plain import plain
+
+kernels = plain(path)
+# Two components and a clock: 1 + 2 s - 4 s^2, 3 - s and 0.5 s + 2 s^2.
+PATH = np.array([[1.0, 3.0, 0.0], [2.0, -1.0, 0.5], [-4.0, 0.0, 2.0]])
+
+
+def test_values():
+    assert kernels.value_at(PATH, 0, 2, 0.5) == 1.0
+    assert kernels.value_at(PATH, 0, 1, 0.5) == 2.0
+    assert kernels.value_at(PATH, 1, 2, 2.0) == 1.0
+    assert kernels.value_at(PATH, 1, 0, 2.0) == 3.0
+    out = np.array([7.0, 7.0, 7.0])
+    kernels.state_at(PATH, 2, 2, -1.0, out)
+    assert out.tolist() == [-5.0, 4.0, 7.0]
+
+
+def test_times():
+    assert kernels.time_at(PATH, 2, 2, 10.0, 99.0, 2.0) == 19.0
+    assert kernels.time_at(PATH, 2, 0, 10.0, 99.0, 0.5) == 11.0
+    assert kernels.time_at(PATH, 2, -1, 10.0, -3.0, 2.0) == 4.0
+
+
+@pytest.mark.parametrize(
+    ("scale", "time_scale", "clock", "pace", "place"),
+    [
+        # The largest size divided by the largest speed.
+        ([6.0, 5.0], 0.0, -1, 1.0, 3.0),
+        ([5.0, 6.0], 0.0, -1, 1.0, 3.0),
+        ([0.1, 0.3], 0.0, -1, 1.0, 0.15),
+        # Time is rounded too, along a clock or at a pace.
+        ([1.0, 1.0], 8.0, 2, 1.0, 16.0),
+        ([1.0, 1.0], 8.0, -1, 4.0, 2.0),
+        ([1.0, 1.0], 8.0, -1, 0.0, 0.5),
+        ([1.0, 1.0], 8.0, -1, 100.0, 0.5),
+    ],
+)
+def test_how_far_along_a_step_its_start_may_lie(scale, time_scale, clock, pace, place):
+    found = kernels.rounding_of_start(PATH, 2, np.array(scale), clock, time_scale, pace)
+    assert found == path.ROUNDING * EPSILON * place
+
+
+def test_components_at_rest_do_not_move_the_start():
+    still = np.array([[1.0, 2.0], [0.0, 0.5]])
+    assert (
+        kernels.rounding_of_start(still, 2, np.array([9.0, 3.0]), -1, 0.0, 1.0)
+        == path.ROUNDING * EPSILON * 6.0
+    )
+    still[1] = 0.0
+    assert kernels.rounding_of_start(still, 2, np.array([9.0, 3.0]), -1, 0.0, 1.0) == 0.0

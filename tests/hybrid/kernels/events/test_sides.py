@@ -1,0 +1,257 @@
+"""Sides of guards, rule by rule: what a mode inherits, what a landing crosses, what lies beside a jump."""
+
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hybrid.kernels.events import sides
+from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
+from hybrid.kernels.types.codes import NO_TRANSITION
+from hybrid.kernels.types.layout import EPSILON
+from tests.hybrid.kernels.plain import plain
+
+kernels = plain(sides)
+
+
+def integers(*values):
+    return np.array(values, dtype=np.int64)
+
+
+class TestInherit:
+    """Transitions 0 to 2 leave the mode just left; 3 has just been entered, and watches surface 7."""
+
+    def inherited(self, surfaces, orientations, directions, side, due, zero, own_direction=1):
+        model = SimpleNamespace(
+            first_outgoing=integers(0, 3),
+            outgoing=integers(0, 1, 2),
+            surface=integers(*surfaces, 7),
+            orientation=integers(*orientations, -1),
+            direction=integers(*directions, own_direction),
+        )
+        arrays = (integers(*side, 5), integers(*due, 5), integers(*zero, 5))
+        known = kernels.inherit(model, 0, 3, *arrays)
+        return known, *(int(each[3]) for each in arrays)
+
+    def test_of_no_guard_that_is_the_same(self):
+        found = self.inherited((1, 2, 3), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (2, 2, 2))
+        assert found == (False, 0, 0, 0)
+
+    def test_the_side_is_turned_with_the_guard(self):
+        """The new guard is minus the old one, so that falling there is rising here."""
+        found = self.inherited((1, 7, 3), (1, 1, 1), (1, -1, 1), (1, 1, 1), (1, 1, 1), (0, 2, 3))
+        assert found == (True, -1, 1, 2)
+        # In the other direction the side is known all the same, but nothing is due.
+        found = self.inherited((1, 7, 3), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (0, 2, 3))
+        assert found == (True, -1, 0, 2)
+        found = self.inherited((1, 7, 3), (1, -1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (0, 2, 3))
+        assert found == (True, 1, 1, 2)
+
+    def test_a_crossing_is_due_only_if_no_transition_has_fired_for_it(self):
+        for due, pending in (((1, 1, 0), 1), ((1, 0, 0), 0), ((0, 1, 0), 0)):
+            found = self.inherited((7, 7, 3), (-1, -1, 1), (1, 1, 1), (1, 1, 1), due, (1, 3, 9))
+            assert found == (True, 1, pending, 3)
+
+    @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+    def test_the_side_for_the_same_direction_counts(self, order):
+        """On a guard at rest each direction has its own near side."""
+        directions, side = np.array([1, -1])[list(order)], np.array([-1, 1])[list(order)]
+        found = self.inherited((7, 7, 3), (-1, -1, 1), (*directions, 1), (*side, 0), (0, 0, 0), (3, 3, 0))
+        assert found == (True, -1, 0, 3)
+
+    def test_an_unknown_side_is_no_side(self):
+        found = self.inherited((7, 7, 3), (-1, -1, 1), (1, -1, 1), (0, 1, 0), (0, 0, 0), (0, 0, 0))
+        assert found == (True, 0, 0, 0)
+        found = self.inherited((7, 7, 3), (-1, -1, 1), (-1, 1, 1), (1, 0, 0), (0, 0, 0), (0, 0, 0))
+        assert found == (True, 1, 0, 0)
+
+
+def crossed(direction, *, paired=0, known=True, own=False, was_on=False, before, now, order=0):
+    model = SimpleNamespace(direction=integers(direction), paired=integers(paired))
+    return bool(kernels.crossed_by_landing(model, 0, known, own, was_on, before, now, order))
+
+
+class TestLanding:
+    @pytest.mark.parametrize("direction", [-1, 1])
+    def test_a_guard_with_a_direction(self, direction):
+        for before, now in product((-1, 0, 1), repeat=2):
+            before, now = direction * before, direction * now
+            through = before == -direction and now == direction
+            assert crossed(direction, before=before, now=now) == through
+            # Its own reset fires it again only if the state was put on the guard, off which it moves.
+            assert not crossed(direction, before=before, now=now, own=True)
+            for own in (False, True):
+                leaves = now == direction
+                assert crossed(direction, before=before, now=now, own=own, order=BY_SPEED) == leaves
+            # If it was on the guard already, the guard is known to have been there.
+            again = crossed(direction, before=before, now=now, was_on=True, order=BY_SPEED)
+            assert again == through
+            # A guard that the mode before did not have: beyond is crossed, unless another one watches it too.
+            assert crossed(direction, before=before, now=now, known=False) == (now == direction)
+            assert not crossed(direction, before=before, now=now, known=False, paired=1)
+
+    def test_a_guard_that_fires_both_ways(self):
+        for before, now, own in product((-1, 0, 1), (-1, 0, 1), (False, True)):
+            expected = not own and before * now == -1
+            assert crossed(0, before=before, now=now, own=own) == expected
+            assert crossed(0, before=before, now=now, own=own, order=BY_SPEED) == expected
+
+
+def moving(guard, **others):
+    """One state, which moves at a speed of 2."""
+
+    def write(transition, t, x, parameters, scalar):
+        scalar[0] = guard(t, x[0])
+
+    return SimpleNamespace(dimension=1, parameters=None, guard=write, period=0.0, **others), SimpleNamespace(
+        field=np.array([2.0]), state=np.zeros(1), scalar=np.zeros(1)
+    )
+
+
+def test_the_sign_of_a_guard_a_moment_away():
+    for moment, sign in ((0.5, 1), (-0.5, -1), (0.0, 0)):
+        model, work = moving(lambda t, x: x - 1.0 + 4.0 * (t - 3.0))
+        assert kernels.sign_at(model, 0, 3.0, np.array([1.0]), moment, work) == sign
+        assert work.state[0] == 1.0 + 2.0 * moment
+        model, work = moving(lambda t, x: 8.0 * (t - 3.0) - (x - 1.0))
+        assert kernels.sign_at(model, 0, 3.0, np.array([1.0]), moment, work) == sign
+
+
+@pytest.mark.parametrize(
+    ("edge", "expected"),
+    [(0.0, (-1, 1)), (20.0, (-1, 1)), (-300.0, (-1, 1)), (4000.0, (-1, 1)), (5000.0, (7, 7))],
+)
+def test_signs_on_both_sides_of_a_jump(edge, expected):
+    """The jump is looked for up to 16^3 times the rounding of the state, which is 1 here."""
+    model, work = moving(lambda t, x: -1.0 if x - 1.0 < edge * EPSILON else 1.0)
+    run = SimpleNamespace(scale=np.array([1.0]))
+    found = kernels.signs_beside_jump(model, run, 0, 0.0, np.array([1.0]), 7, work)
+    assert found == expected
+    model, work = moving(lambda t, x: 1.0 if x - 1.0 < edge * EPSILON else -1.0)
+    found = kernels.signs_beside_jump(model, run, 0, 0.0, np.array([1.0]), 7, work)
+    assert found == tuple(-each if abs(each) == 1 else each for each in expected)
+
+
+def test_at_the_end_of_an_instant_nothing_is_due_in_its_mode():
+    model = SimpleNamespace(first_outgoing=integers(0, 2, 4), outgoing=integers(3, 0, 2, 1))
+    due = integers(1, 1, 1, 1)
+    kernels.end_instant(model, 0, due)
+    assert due.tolist() == [0, 1, 1, 0]
+    due = integers(1, 1, 1, 1)
+    kernels.end_instant(model, 1, due)
+    assert due.tolist() == [1, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("values", "refused", "expected"),
+    [
+        # Beyond by more than the band of 0.5, in the direction of each, and allowed; the first counts.
+        ((0.6, -0.6), (), 4),
+        ((0.4, -0.6), (), 2),
+        ((0.6, -0.6), (4,), 2),
+        ((-0.6, 0.6), (), NO_TRANSITION),
+        ((0.4, -0.4), (), NO_TRANSITION),
+        ((0.6, -0.6), (4, 2), NO_TRANSITION),
+    ],
+)
+def test_transitions_that_fire_only_at_a_start(values, refused, expected):
+    given = dict(zip((4, 2), values, strict=True))
+    stubbed = plain(
+        sides,
+        guard_value=lambda model, transition, t, x, scalar: given[transition],
+        rounding_band=lambda *arguments: 0.5,
+        allowed=lambda model, transition, t, x, scalar: transition not in refused,
+    )
+    model = SimpleNamespace(
+        first_at_start=integers(0, 1, 3), at_start=integers(9, 4, 2), direction=integers(0, 0, -1, 0, 1)
+    )
+    run, work = SimpleNamespace(y=np.zeros(1)), SimpleNamespace(scalar=np.zeros(1))
+    assert stubbed.beyond_at_start(model, run, 1, 0.0, work) == expected
+
+
+class TestHeld:
+    """A mass at rest at ``q = 1`` on the guard ``q - 1``, pushed with ``a``; the reset scales its speed."""
+
+    def held(self, a, keeps, towards, unit=1.0):
+        def field(mode, t, x, parameters, out):
+            out[0], out[1] = x[1], a * unit
+
+        def reset(transition, t, x, parameters, out):
+            assert t > 5.0
+            out[0], out[1] = x[0], keeps * x[1]
+
+        def guard_gradient(transition, t, x, parameters, out):
+            out[0], out[1], out[2] = 1.0, 0.0, 0.0
+
+        model = SimpleNamespace(
+            dimension=2, parameters=None, field=field, reset=reset, guard_gradient=guard_gradient
+        )
+        work = SimpleNamespace(
+            **{name: np.zeros(2) for name in ("settled", "state", "field_after")},
+            gradient=np.array([1.0, 0.0, 0.0]),
+        )
+        work.field = np.array([0.0, a * unit])
+        run = SimpleNamespace(scale=np.array([unit, unit]))
+        return bool(kernels.is_held(model, run, 0, 0, 5.0, np.array([unit, 0.0]), towards, work))
+
+    @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+    @pytest.mark.parametrize("a", [2.0, -2.0])
+    def test_a_reset_holds_if_it_takes_the_speed_away(self, a, unit):
+        for keeps, holds in ((0.0, True), (-0.5, True), (0.9e-3, True), (1.1e-3, False), (1.0, False)):
+            assert self.held(a, keeps, np.sign(a), unit) is holds
+            # A push to the near side needs no holding.
+            assert self.held(a, keeps, -np.sign(a), unit) is False
+
+    def test_nothing_holds_where_nothing_pushes(self):
+        assert self.held(0.0, 0.0, 1) is False
+
+
+def side_of(value, *, speed=0.0, acceleration=0.0, direction=1, before=0, was_on=False, band=1.0, jumps=0):
+    stubbed = plain(
+        sides,
+        guard_value=lambda *arguments: value,
+        guard_speed=lambda *arguments: speed,
+        rounding_band=lambda *arguments: band,
+        has_program=lambda *arguments: jumps > 0,
+        smooth_band=lambda *arguments: 0.1,
+        speed_sign=lambda *arguments: float(np.sign(arguments[6])),
+        may_jump=lambda *arguments: jumps > 1,
+        acceleration_sign=lambda *arguments: float(np.sign(acceleration)),
+    )
+    model = SimpleNamespace(direction=integers(direction))
+    work = SimpleNamespace(scalar=None, field=None, gradient=None)
+    return stubbed.side_of(model, None, 0, 0, 0.0, None, before, was_on, work)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_the_side_of_a_guard(sign):
+    for direction in (-1, 0, 1):
+        # Beyond its band the value decides, within the speed, then the acceleration.
+        given = {"direction": direction, "before": -sign, "was_on": True}
+        assert side_of(1.1 * sign, speed=-sign, **given) == (sign, 0)
+        assert side_of(-0.9 * sign, speed=sign, acceleration=-sign, **given) == (sign, BY_SPEED)
+        assert side_of(-0.9 * sign, acceleration=sign, **given) == (sign, BY_ACCELERATION)
+    # If none does, the side is the near one unless it was known before.
+    for direction in (-1, 1):
+        assert side_of(0.9 * sign, direction=direction) == (-direction, BY_STEP)
+        assert side_of(0.9, direction=direction, before=sign) == (-direction, BY_STEP)
+        assert side_of(0.9, direction=direction, before=sign, was_on=True) == (sign, BY_STEP)
+    assert side_of(0.9, direction=0, before=sign) == (sign, BY_STEP)
+    # A guard without a value keeps its side.
+    assert side_of(np.nan, speed=-sign, before=sign) == (sign, 0)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_the_side_of_a_guard_that_jumps(sign):
+    jumping = sides.JUMPING
+    # Much larger than its gradient tells: it jumps, and its sign is its side if no other is known.
+    assert side_of(0.5 * sign, speed=-sign, jumps=1) == (sign, jumping)
+    assert side_of(0.5 * sign, speed=-sign, jumps=1, before=-sign) == (sign, jumping)
+    assert side_of(0.5 * sign, speed=sign, jumps=1, before=-sign, was_on=True) == (-sign, jumping)
+    assert side_of(0.5 * sign, speed=-sign, jumps=1, was_on=True) == (sign, jumping)
+    # As small as its gradient tells: its speed counts.
+    assert side_of(0.3 * sign, speed=-sign, jumps=1) == (-sign, BY_SPEED)
+    # In the middle of a jump.
+    assert side_of(0.3, acceleration=sign, jumps=2, before=sign, was_on=True) == (sign, jumping)
+    assert side_of(0.3, acceleration=sign, jumps=2, direction=-1) == (1, BY_STEP)

@@ -1,0 +1,127 @@
+"""Whether tangent vectors lose digits at a guard, for slopes that are known powers of the distance."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hybrid.kernels.jumps import steep
+from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA
+from tests.hybrid.kernels.plain import plain
+
+BAND = 1e-16
+GRADIENT = np.array([0.0, -2.0, 0.0])
+
+
+class World:
+    """Two states, whose rates change with each other; the slope is a function of the guard."""
+
+    def __init__(self, slope, *, speed=0.5, rtol=1e-6, stuck=1, propagator=RUNGE_KUTTA):
+        def field_jacobian(mode, t, x, parameters, out):
+            assert mode == 1
+            out[0, 1] = slope(self.places[-1])
+            out[1, 0] = 0.25 * out[0, 1]
+
+        self.places = []
+        self.kernels = plain(
+            steep,
+            guard_speed=self.guard_speed,
+            gradient_band=lambda model, run, t, gradient: BAND,
+            displace=self.displace,
+        )
+        self.speed = speed
+        self.model = SimpleNamespace(
+            dimension=2,
+            parameters=None,
+            steep=np.array([0, stuck]),
+            propagator=np.array([0, propagator]),
+            field=lambda *arguments: None,
+            field_jacobian=field_jacobian,
+            first_slope=np.array([[0, 0, 0], [0, 1, 2]]),
+            slope_column=np.array([1, 0]),
+            direction=np.array([1, -1, 1, -1, 1]),
+            surface=np.array([0, 1, 2, 1, 0]),
+            first_outgoing=np.array([0, 1, 4]),
+            outgoing=np.array([0, 4, 2, 3]),
+        )
+        self.method = SimpleNamespace(rtol=rtol)
+        self.run = SimpleNamespace(phase=0.0, mode=1, y=np.array([0.0, 1.0, 3.0, 4.0]))
+        self.work = SimpleNamespace(
+            **{name: np.zeros(n) for name, n in (("new", 4), ("trial", 4), ("field", 2), ("state", 2))},
+            jacobian=np.zeros((2, 3)),
+            gradient=np.zeros(3),
+        )
+
+    def guard_speed(self, model, transition, t, x, field, gradient):
+        self.asked = transition
+        gradient[:] = GRADIENT
+        return self.speed
+
+    def displace(self, model, x, distance, gradient, out):
+        np.testing.assert_array_equal(gradient, GRADIENT)
+        self.places.append(distance)
+        out[:] = 1.0
+
+    def lost(self, side=1.0):
+        answer = self.kernels.is_lost(self.model, self.method, self.run, 1, 3, side, 1, self.work)
+        return bool(answer)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_slopes_are_compared_at_rounding_and_farther(side):
+    world = World(lambda z: 1e3 * abs(z) ** -0.5)
+    assert world.lost(side)
+    assert world.places == [side * BAND, side * 16.0 * BAND]
+    # The vector is (3, 4); its first component changes at 4 times the slope, the other at 3/4 of it.
+    np.testing.assert_allclose(world.work.new[2:], [4e11, 0.75e11], rtol=1e-12)
+    np.testing.assert_allclose(world.work.trial[2:], [1e11, 0.1875e11], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("slope", "speed", "rtol", "lost"),
+    [
+        # Over the rounding ``d`` ``4 K sqrt(d)`` is lost, beside the vector's size, ``3 + 5 / sqrt(2)``.
+        (lambda z: 164.0 * abs(z) ** -0.5, 1.0, 1e-6, True),
+        (lambda z: 163.0 * abs(z) ** -0.5, 1.0, 1e-6, False),
+        # It takes longer at half of the speed, in either direction; a looser tolerance allows it.
+        (lambda z: 163.0 * abs(z) ** -0.5, 0.5, 1e-6, True),
+        (lambda z: 163.0 * abs(z) ** -0.5, -0.5, 1e-6, True),
+        (lambda z: 164.0 * abs(z) ** -0.5, -1.0, 1e-6, True),
+        (lambda z: 163.0 * abs(z) ** -0.5, 0.5, 1e-5, False),
+        # Large, but no larger at the guard than beside it.
+        (lambda z: 1e20, 1.0, 1e-6, False),
+        (lambda z: -1e20 * abs(z) ** -0.5, 1.0, 1e-6, True),
+        (lambda z: 1e20 * abs(z) ** 0.5, 1.0, 1e-6, False),
+    ],
+)
+def test_what_is_lost(slope, speed, rtol, lost):
+    assert World(slope, speed=speed, rtol=rtol).lost() is lost
+
+
+def test_modes_without_steep_powers_or_with_series_lose_nothing():
+    def steepest(z):
+        return 1e9 * abs(z) ** -0.5
+
+    assert World(steepest).lost()
+    assert not World(steepest, stuck=0).lost()
+    assert not World(steepest, propagator=EXACT).lost()
+
+
+def test_the_way_to_a_guard_is_on_its_near_side():
+    for transition, side in ((2, -1.0), (3, 1.0)):
+        world = World(lambda z: 1e9 * abs(z) ** -0.5)
+        assert world.kernels.is_steep(world.model, world.method, world.run, transition, 1, world.work)
+        assert world.asked == transition
+        assert world.places[0] == side * BAND
+
+
+def test_the_way_from_a_guard_is_that_of_the_transition_on_it():
+    """Transition 1 has fired; of those that leave mode 1, only 3 watches the same guard, and it falls."""
+    world = World(lambda z: 1e9 * abs(z) ** -0.5)
+    assert world.kernels.is_steep_behind(world.model, world.method, world.run, 1, 1, world.work)
+    assert world.asked == 3
+    assert world.places == [BAND, 16.0 * BAND]
+    world.model.surface[1] = 7
+    assert not world.kernels.is_steep_behind(world.model, world.method, world.run, 1, 1, world.work)
+    world = World(lambda z: 1e20)
+    assert not world.kernels.is_steep_behind(world.model, world.method, world.run, 1, 1, world.work)

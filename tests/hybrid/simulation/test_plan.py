@@ -1,0 +1,101 @@
+"""What all runs of a system by one solver share: which kernels run, in which modes, and how many are kept."""
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER, RUNGE_KUTTA
+from hybrid.kernels.types.layout import Attempts
+from hybrid.simulation import plan
+from hybrid.simulation.memory import MOST_LAYOUTS
+from hybrid.solvers.solver import Solver
+
+
+class Lookalike:
+    """Has a tableau, and is no solver."""
+
+    tableau = hybrid.DOP853.tableau
+
+
+@pytest.fixture
+def compiled():
+    """A mode with an exact series, and one that cannot be traced."""
+
+    def branching(t, x, p):
+        return (-x.q if x.q > 0.0 else x.q,)
+
+    return hybrid.compile_system(
+        hybrid.HybridSystem(
+            state=("q",),
+            modes=[
+                hybrid.Mode("free", lambda t, x, p: (-x.q,)),
+                hybrid.Mode("branching", branching, jacobian=lambda t, x, p: [[-1.0 if x.q > 0.0 else 1.0]]),
+            ],
+            transitions=[
+                hybrid.Transition("free", "branching", hybrid.Guard(lambda t, x, p: x.q - 1.0, +1)),
+                hybrid.Transition("branching", "free", hybrid.Guard(lambda t, x, p: x.q + 1.0, -1)),
+            ],
+        )
+    )
+
+
+@pytest.mark.parametrize("solver", [Solver(), Lookalike(), hybrid.DOP853, 0])
+def test_what_is_no_solver_is_refused(solver):
+    with pytest.raises(hybrid.ArgumentError, match="solver must be a solver object"):
+        plan.check_solver(solver)
+
+
+def test_solvers_are_taken_as_they_are():
+    assert plan.check_solver(None) is plan.DEFAULT_SOLVER
+    solver = hybrid.Tsit5(rtol=1e-5)
+    assert plan.check_solver(solver) is solver
+
+
+@pytest.mark.parametrize(
+    ("solver", "by_steps", "kinds", "order", "degree"),
+    [
+        (hybrid.Taylor(), None, [EXACT, RUNGE_KUTTA], "series", HIGHEST_ORDER),
+        (hybrid.Taylor(), 0, [RUNGE_KUTTA, RUNGE_KUTTA], 0, 7),
+        (hybrid.DOP853(), None, [RUNGE_KUTTA, RUNGE_KUTTA], 0, 7),
+        (hybrid.Tsit5(), None, [RUNGE_KUTTA, RUNGE_KUTTA], 0, 4),
+    ],
+)
+def test_how_modes_are_advanced(compiled, solver, by_steps, kinds, order, degree):
+    made = plan.plan_of(compiled, solver, 0, by_steps)
+    assert made.model.propagator.tolist() == kinds
+    assert list(made.propagators) == ["free", "branching"]
+    assert made.method.order == (solver.series_order if order == "series" else 0)
+    assert made.degree == degree
+    assert plan.plan_of(compiled, solver, 0, by_steps) is made
+    assert plan.plan_of(compiled, solver, 1, by_steps) is not made
+    assert (made.task.tangents, made.task.orthonormal) == (0, 0)
+
+
+def test_the_kernels_view_of_a_solver():
+    solver = hybrid.Tsit5(rtol=1e-5, atol=1e-7, max_step=0.5)
+    method = plan.kernel_method(solver, False)
+    assert (method.rtol, method.atol, method.max_step) == (1e-5, 1e-7, 0.5)
+    assert method.exponent == 1.0 / solver.tableau.error_order == 0.2
+    assert (method.implicit, plan.kernel_method(hybrid.RadauIIA(), False).implicit) == (0, 1)
+    np.testing.assert_array_equal(method.b, solver.tableau.b)
+
+
+def test_what_a_run_does_not_need_is_not_loaded():
+    absent = ("hybrid.kernels.steps.step", "no_attempt")
+    for steps in (False, True):
+        for forced in (False, True):
+            parts, attempts = plan.driver_parts(steps, absent, forced)
+            name = "runge_kutta_step" if steps else "no_step"
+            assert parts.runge_kutta_step.name == name
+            assert isinstance(attempts, Attempts)
+            assert bool(attempts.explained_step.address) == bool(attempts.explained_series.address) == forced
+
+
+def test_plans_of_the_last_solvers_are_kept(compiled):
+    compiled.plans.clear()
+    solvers = [hybrid.Taylor(rtol=1e-10 * (1.0 + k)) for k in range(MOST_LAYOUTS + 2)]
+    made = [plan.plan_of(compiled, solver, 0) for solver in solvers]
+    assert len(compiled.plans) == MOST_LAYOUTS
+    assert plan.plan_of(compiled, solvers[-1], 0) is made[-1]
+    assert plan.plan_of(compiled, solvers[2], 0) is made[2]
+    assert plan.plan_of(compiled, solvers[1], 0) is not made[1]
