@@ -13,8 +13,9 @@ from hybrid.kernels.types.codes import EXACT
 from hybrid.kernels.types.options import KERNEL
 
 EPSILON = 2.0**-52
-# A step past a jump moves the state by less than this share of its size.
+# A step past a jump moves the state by less than this share of its size, and by fewer relative tolerances.
 SHORT = 0.03
+IN_TOLERANCES = 1e7
 # A jump changes a rate by more than this share of it.
 LEAST = 1e-6
 # On a step with a hidden jump, the change of a rate times the step is less than so many tolerances.
@@ -42,12 +43,13 @@ def look_back(model, method, run, span, work):
     for i in range(model.dimension):
         moved += abs(run.y[i] - work.departure[i])
         size += max(abs(run.y[i]), abs(work.departure[i]))
-    if not 0.0 < moved < SHORT * size:
+    if not 0.0 < moved < min(SHORT, IN_TOLERANCES * method.rtol) * size:
         return
     # At one time: a jump at a time that no state moves does nothing to tangent vectors.
-    if jumps_between(model, method, run, run.phase, span, work) or jumps_between(
-        model, method, run, run.phase + span, span, work
-    ):
+    jumps = jumps_between(model, method, run, run.phase, span, work)
+    if not jumps and model.timed[run.mode] == 1:
+        jumps = jumps_between(model, method, run, run.phase + span, span, work)
+    if jumps:
         run.field_jumps += 1
         run.jumped_in = run.mode
 
