@@ -149,8 +149,8 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
 
 
 def discontinuous_status(jumps: Mapping[str, str]) -> Status:
-    """Status of a run with tangent vectors if fields jump; ``jumps`` maps modes to the places."""
-    places = [f"the field of mode {mode!r} jumps where {where}" for mode, where in jumps.items()]
+    """Status of a run with tangent vectors if fields jump; ``jumps`` maps modes to the places, in words."""
+    places = [f"the field of mode {mode!r} jumps {where}" for mode, where in jumps.items()]
     return Status(
         StatusCode.DISCONTINUOUS_FIELD,
         f"Reached the end, but {', and '.join(places)}: tangent vectors, and results computed from them, are "

@@ -110,7 +110,10 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         return steep
     if trajectory.tangents and code == codes.DONE and any(trajectory.compiled.emitted.discontinuities):
         jumping = zip(trajectory.system.mode_names, trajectory.compiled.emitted.discontinuities, strict=True)
-        return discontinuous_status({mode: where for mode, where in jumping if where})
+        return discontinuous_status({mode: f"where {where}" for mode, where in jumping if where})
+    if trajectory.tangents and code == codes.DONE and run.field_jumps:
+        within = f"within {run.field_jumps} steps, or is steeper there than the steps resolve"
+        return discontinuous_status({trajectory.system.mode_names[run.jumped_in]: within})
     if trajectory.tangents and code == codes.DONE and run.indistinct:
         return Status(
             StatusCode.INDISTINCT_TANGENTS,

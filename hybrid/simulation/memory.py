@@ -60,6 +60,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "field_after": (n,),
         "state": (n,),
         "settled": (n,),
+        "departure": (n,),
         "saltation": (n, n),
         "sizes": (n, n),
         "rounding": (4, n),

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import sympy
 from sympy.codegen.cfunctions import exp2, expm1, hypot, log1p, log2, log10
+from sympy.core.parameters import distribute
 
 from hybrid.symbolic import expressions as sym
 from hybrid.symbolic.nodes import is_larger_than, nodes
@@ -86,7 +87,9 @@ def assignments(
     if not thorough or len(uses) > LARGE or any(is_larger_than(LARGE_TREE, each) for each in varying):
         reduced, printer = varying, _Printer(node for node, count in uses.items() if count > 1)
     else:
-        shared, reduced = sympy.cse(varying, symbols=sympy.numbered_symbols("c", real=True), list=True)
+        # With numbers distributed over sums, SymPy may mistake a sum for a product of its terms.
+        with distribute(False):
+            shared, reduced = sympy.cse(varying, symbols=sympy.numbered_symbols("c", real=True), list=True)
         printer = _Printer()
         for symbol, expression in shared:
             printer.assign(symbol.name, expression)

@@ -35,6 +35,8 @@ EXPONENTIAL = (sympy.exp, sympy.tanh, sympy.erf, sympy.sinh, sympy.cosh, expm1, 
 SWITCHES = (sympy.tanh, sympy.erf)
 # Functions that may be flat to all digits and change a little further on.
 SATURATING = (sympy.tanh, sympy.atan, sympy.exp, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
+# Functions with a branch point, beyond which their series goes on: that of ``arcsin(sin(q))`` is ``q``.
+BRANCHING = (sympy.asin, sympy.acos, sympy.acosh)
 # A sum counts as a factor. A single exponential does not, since it makes no product narrower.
 SUMS_OF_EXPONENTIALS = (sympy.sinh, sympy.cosh, expm1)
 
@@ -160,9 +162,10 @@ def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...], roots: fro
     """Whether an expression may change where its series is flat to all digits.
 
     ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so are ``x/sqrt(x**2 + 1e-16)``, ``(x/5)**40`` for
-    small ``x``, and ``exp(9*(t - 50))`` long before ``t = 50``. Roots of affine expressions are not: where
-    these vanish, the field is singular. Nor are quotients of polynomials of low degree: their series shows
-    poles that are not far closer to the orbit than the tolerance.
+    small ``x``, and ``exp(9*(t - 50))`` long before ``t = 50``. The triangle wave ``arcsin(sin(x))`` is all
+    but straight. Roots and arcs of affine expressions are not: at their branch points the field is singular.
+    Nor are quotients of polynomials of low degree: their series shows poles that are not far closer to the
+    orbit than the tolerance.
     """
     if not mentions(node, variables):
         return False
@@ -177,8 +180,9 @@ def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...], roots: fro
         mentions(node.exp, variables) or (node.exp.is_Integer and abs(node.exp) > MOST_FACTORS)
     ):
         return True
-    if node.is_Pow and not node.exp.is_Integer and node not in roots:
-        bases = node.base.args if isinstance(node.base, Maximum | Absolute) else (node.base,)
+    if isinstance(node, BRANCHING) or (node.is_Pow and not node.exp.is_Integer and node not in roots):
+        base = node.args[0]
+        bases = base.args if isinstance(base, Maximum | Absolute) else (base,)
         degrees = [degree_of(base, own) for base in bases]
         if any(degree is None or degree > 1 for degree in degrees):
             return True

@@ -191,6 +191,8 @@ COUNTERS = (
     "calm_cycle",
     "calm_wait",
     "steep_jumps",
+    "field_jumps",
+    "jumped_in",
 )
 NUMBERS = (
     "phase",
@@ -265,11 +267,12 @@ class Work(Structure):
 
     ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
     along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
-    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``saltation, sizes (n, n)``;
-    ``rounding (4, n)``, how far the rates move, and the place where a guard's derivatives are asked for;
-    ``path (d + 1, n)``, the powers of the step's interpolant; ``polynomial (q + 1,)`` of a guard, ``stack``
-    and ``intervals`` for its isolation; ``registers (r, 6)``, what is known of each row of a program, and
-    ``samples (nodes + 1, 2 r)`` the ranges of these rows at the nodes of a step and what they have in common.
+    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``departure (n,)``, the state
+    before the step; ``saltation, sizes (n, n)``; ``rounding (4, n)``, how far the rates move, and the place
+    where a guard's derivatives are asked for; ``path (d + 1, n)``, the powers of the step's interpolant;
+    ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
+    what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
+    nodes of a step and what they have in common.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -293,6 +296,7 @@ class Work(Structure):
     field_after: VECTOR
     state: VECTOR
     settled: VECTOR
+    departure: VECTOR
     saltation: MATRIX
     sizes: MATRIX
     rounding: MATRIX

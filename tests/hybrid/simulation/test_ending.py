@@ -144,7 +144,15 @@ def test_two_modes_send_the_state_back_across_one_guard(directions, orientation,
 def finished(tangents=2, **changes):
     """A run that has reached its end, with something to tell."""
     counted = dict.fromkeys(
-        ("singular_jumps", "order_mattered", "ill_conditioned", "indistinct", "steep_jumps"), 0
+        (
+            "singular_jumps",
+            "order_mattered",
+            "ill_conditioned",
+            "indistinct",
+            "steep_jumps",
+            "field_jumps",
+        ),
+        0,
     )
     emitted = SimpleNamespace(
         discontinuities=changes.pop("discontinuities", ((), ())),
@@ -165,6 +173,7 @@ def finished(tangents=2, **changes):
     [
         ({"singular_jumps": 2}, StatusCode.SINGULAR_SALTATION, "2 of 9 jumps had no saltation matrix"),
         ({"discontinuities": ((), ("x.q = 0",))}, StatusCode.DISCONTINUOUS_FIELD, "x.q = 0"),
+        ({"field_jumps": 4, "jumped_in": 1}, StatusCode.DISCONTINUOUS_FIELD, "mode 'b' jumps within 4 steps"),
         ({"steep_jumps": 1, "steep": ("", "x.q**0.7")}, StatusCode.INFINITE_SLOPE, "x.q**0.7"),
         ({"steep_inside": ("cbrt(x.v)", "")}, StatusCode.INFINITE_SLOPE, "cbrt(x.v)"),
         ({"indistinct": 3}, StatusCode.INDISTINCT_TANGENTS, "3 times the tangent vectors became parallel"),

@@ -44,7 +44,7 @@ def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes):
         **dict.fromkeys(("jacobian", "reset_jacobian"), (N, N + 1)),
         "gradient": (N + 1,),
         "scalar": (1,),
-        **dict.fromkeys(("field", "field_after", "state", "settled"), (N,)),
+        **dict.fromkeys(("field", "field_after", "state", "settled", "departure"), (N,)),
         **dict.fromkeys(("saltation", "sizes"), (N, N)),
         "rounding": (4, N),
         "path": (degree + 1, N),

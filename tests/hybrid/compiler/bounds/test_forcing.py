@@ -432,8 +432,11 @@ def test_forcing_that_rounding_of_time_hides_is_reported(w, factor, solver):
         (lambda x, y: x / sympy.sqrt(x**2 + sympy.Float(1e-16)), True),
         (lambda x, y: sympy.sqrt(sympy.sin(x)), True),
         (lambda x, y: sympy.sqrt(Maximum(x**2, y)), True),
+        (lambda x, y: sympy.asin(sympy.sin(x)), True),
+        (lambda x, y: y * sympy.acos(1 - x**2), True),
         # These vary wherever they are, or their series shows where they do.
         (lambda x, y: sympy.sqrt(x - 2 * y), False),
+        (lambda x, y: sympy.asin(x - 2 * y), False),
         (lambda x, y: sympy.sqrt(Maximum(x, y)), False),
         (lambda x, y: Absolute(x) ** sympy.Rational(3, 2), False),
         (lambda x, y: x**3 + x * y, False),

@@ -1,0 +1,110 @@
+"""Jumps of a field inside its mode that error control has hidden from the tangent vectors.
+
+Error control makes a step so short that a jump of the field on it moves the state by less than the
+tolerances. No derivative at a point shows the jump, so the tangent vectors pass it as if there were none. The
+same happens where a field is continuous, but steeper than the steps resolve. But the field itself differs
+between the two ends of such a step, and by far more than its derivatives there explain.
+"""
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.slopes import spread_of_rate
+from hybrid.kernels.types.codes import EXACT
+from hybrid.kernels.types.options import KERNEL
+
+EPSILON = 2.0**-52
+# A step past a jump moves the state by less than this share of its size, and by fewer relative tolerances.
+SHORT = 0.03
+IN_TOLERANCES = 1e7
+# A jump changes a rate by more than this share of it.
+LEAST = 1e-6
+# On a step with a hidden jump, the change of a rate times the step is less than so many tolerances.
+HIDDEN = 1e4
+# The step is halved so many times towards a jump; most of the change is still there after the first few, and
+# at some time it is so many times what the derivatives at the ends of the rest explain.
+HALVINGS = 10
+FEW_HALVINGS = 3
+UNEXPLAINED = 30.0
+
+
+@njit(**KERNEL)
+def leave(model, run, work):
+    """Keep the state before a step in ``work.departure (n,)``."""
+    for i in range(model.dimension):
+        work.departure[i] = run.y[i]
+
+
+@njit(**KERNEL)
+def look_back(model, method, run, span, work):
+    """After a step of length ``span``, from the clock's time, count it if the field has jumped on it."""
+    if model.propagator[run.mode] == EXACT:
+        return
+    moved, size = 0.0, 0.0
+    for i in range(model.dimension):
+        moved += abs(run.y[i] - work.departure[i])
+        size += max(abs(run.y[i]), abs(work.departure[i]))
+    if not 0.0 < moved < min(SHORT, IN_TOLERANCES * method.rtol) * size:
+        return
+    # At one time: a jump at a time that no state moves does nothing to tangent vectors.
+    jumps = jumps_between(model, method, run, run.phase, span, work)
+    if not jumps and model.timed[run.mode] == 1:
+        jumps = jumps_between(model, method, run, run.phase + span, span, work)
+    if jumps:
+        run.field_jumps += 1
+        run.jumped_in = run.mode
+
+
+@njit(**KERNEL)
+def jumps_between(model, method, run, t, span, work):
+    """Whether the field at the time ``t`` jumps between the state before the step and the one after it."""
+    model.field(run.mode, t, work.departure, model.parameters, work.field)
+    model.field(run.mode, t, run.y, model.parameters, work.field_after)
+    for i in range(model.dimension):
+        before, after = work.field[i], work.field_after[i]
+        change = abs(after - before)
+        tolerance = method.atol + method.rtol * max(abs(run.y[i]), abs(work.departure[i]))
+        some = change > LEAST * (abs(before) + abs(after))
+        if some and change * span < HIDDEN * tolerance and rate_jumps(model, run, t, i, before, after, work):
+            return True
+    return False
+
+
+@njit(**KERNEL)
+def rate_jumps(model, run, t, i, before, after, work):
+    """Whether the rate of component ``i``, given at the two ends of the step, jumps between them."""
+    n = model.dimension
+    low, high = work.trial, work.new
+    for j in range(n):
+        low[j], high[j] = work.departure[j], run.y[j]
+    most = 0.5 * abs(after - before)
+    for halvings in range(HALVINGS + 1):
+        change = abs(after - before)
+        if halvings >= FEW_HALVINGS:
+            if change < most:
+                return False
+            if change > UNEXPLAINED * explained_change(model, run.mode, t, i, low, high, work):
+                return True
+        for j in range(n):
+            work.error[j] = 0.5 * (low[j] + high[j])
+        model.field(run.mode, t, work.error, model.parameters, work.second_error)
+        between = work.second_error[i]
+        upper = abs(after - between) > abs(between - before)
+        for j in range(n):
+            if upper:
+                low[j] = work.error[j]
+            else:
+                high[j] = work.error[j]
+        before, after = (between, after) if upper else (before, between)
+    return False
+
+
+@njit(**KERNEL)
+def explained_change(model, mode, t, i, low, high, work):
+    """How much the rate of component ``i`` changes between two states, by its derivatives there."""
+    moves, total = work.state, 0.0
+    for j in range(model.dimension):
+        moves[j] = abs(high[j] - low[j]) + EPSILON * max(abs(low[j]), abs(high[j]))
+    for end in (low, high):
+        model.field_jacobian(mode, t, end, model.parameters, work.jacobian)
+        total += spread_of_rate(model, mode, i, work.jacobian, moves)
+    return total
