@@ -265,6 +265,7 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
+            abrupt=_indices(self.emitted.abrupt),
             fragile=_indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
             steep=_indices(bool(powers) for powers in self.emitted.steep),
             root=_indices(propagator.root for propagator in self.emitted.propagators),

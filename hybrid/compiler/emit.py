@@ -35,7 +35,7 @@ from hybrid.compiler.taylor.loops import padded
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import WIDE
-from hybrid.symbolic.continuity import jumps_of, may_jump
+from hybrid.symbolic.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.expressions import JUMPING, ONE, ZERO, Select
 from hybrid.symbolic.nodes import forget, mentions, nodes_of
@@ -173,6 +173,10 @@ def _emitted(system: HybridSystem) -> Emitted:
         traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,
+        abrupt=tuple(
+            field.expressions is None or any(may_be_abrupt(rate, symbols.x) for rate in field.expressions)
+            for field in fields
+        ),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
         discontinuities=tuple(
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))

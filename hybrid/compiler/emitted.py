@@ -134,6 +134,8 @@ class Emitted:
     surface, orientation
         By transition: the number of the guard's zero set, the same for guards that differ by a constant
         factor, and the sign of that factor.
+    abrupt
+        By mode: whether its field may change abruptly although no jump is known.
     autonomous
         By mode: whether the field is proved not to depend on time.
     discontinuities
@@ -170,6 +172,7 @@ class Emitted:
     traced_field: tuple[bool, ...]
     surface: tuple[int, ...]
     orientation: tuple[int, ...]
+    abrupt: tuple[bool, ...]
     autonomous: tuple[bool, ...]
     discontinuities: tuple[str, ...]
     proved_period: bool

@@ -19,7 +19,7 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.onset import BY_STEP
 from hybrid.kernels.events.resolution import rests_on_guard, underflows
 from hybrid.kernels.events.sides import side_of
-from hybrid.kernels.steps.hidden import leave, look_back
+from hybrid.kernels.steps.disguised_jumps import leave, look_back
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
@@ -190,10 +190,11 @@ def step(parts, task, remaining):
     """One step by the propagator of the mode; returns a code and the time that the step took."""
     model, run, work = task.model, task.run, task.work
     on_guard = remember_scale(model, run, work)
-    if task.tangents > 0:
+    watched = task.tangents > 0 and model.abrupt[run.mode] == 1
+    if watched:
         leave(model, run, work)
     code, span = step_by_propagator(parts, task, remaining)
-    if code == GO_ON and task.tangents > 0:
+    if code == GO_ON and watched:
         look_back(model, task.method, run, span, work)
     if code == GO_ON and run.pending != NO_TRANSITION:
         keep_scale(model, run, on_guard, run.phase + span, work)

@@ -49,6 +49,8 @@ from hybrid.symbolic.nodes import (
     symbols_of,
 )
 
+# Functions that change by their derivatives, other than sums, products and positive powers.
+GRADUAL = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh, sympy.log)
 ROUNDING = (Floor, Ceiling, Truncate)
 REMAINDERS = (Remainder, TruncatedRemainder)
 JUMPS = (Less, LessEqual, Sign, Step, *ROUNDING, *REMAINDERS, Atan2)
@@ -326,3 +328,14 @@ def _calls_others(function: Callable[..., Any], names: Iterable[str]) -> bool:
     used = [function.__globals__[name] for name in names if name in function.__globals__] + cells
     allowed = (ModuleType, BuiltinFunctionType, np.ufunc, type)
     return any(callable(each) and not isinstance(each, allowed) for each in used)
+
+
+def may_be_abrupt(expression: sympy.Expr, variables: Iterable[sympy.Symbol]) -> bool:
+    """Whether an expression may jump in disguise, or change like a jump: ``x/abs(x)``, ``tanh(1e12*x)``."""
+    for node in nodes(expression):
+        if node.is_Atom or node.is_Add or node.is_Mul or isinstance(node, GRADUAL):
+            continue
+        gradual = node.is_Pow and node.exp.is_positive
+        if not gradual and mentions(node, variables):
+            return True
+    return False

@@ -103,13 +103,13 @@ def forcings(
     times = times_of(field, symbols)
     found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, times))
     if any(_saturates(entry, symbols.variables, roots) for entry in field):
-        found.update(dict.fromkeys(_in_state(field, [each.expression for each in found], symbols)))
+        arguments, *terms = _in_state(field, symbols)
+        if terms or not found:
+            found.update(dict.fromkeys([arguments, *terms]))
     return tuple(found)
 
 
-def _in_state(
-    field: Sequence[sympy.Expr], in_time: Sequence[sympy.Expr | None], symbols: Symbols
-) -> Iterator[Forcing]:
+def _in_state(field: Sequence[sympy.Expr], symbols: Symbols) -> Iterator[Forcing]:
     """The arguments of exponentials in the terms of a field that may be pulses, and these terms.
 
     The tails of a quotient of polynomials, or of a root, are never flat to all digits.
@@ -118,15 +118,13 @@ def _in_state(
         [
             term
             for term in sympy.Add.make_args(entry)
-            if term not in in_time
-            and exponents_of(term, symbols.variables)
-            and not is_harmless(term, symbols.variables)
+            if exponents_of(term, symbols.x) and not is_harmless(term, symbols.variables)
         ]
         for entry in field
     ]
     terms = [[] if _is_switch(entry, symbols.variables) else entry for entry in terms]
     exponents = dict.fromkeys(
-        each for entry in terms for term in entry for each in exponents_of(term, symbols.variables)
+        each for entry in terms for term in entry for each in exponents_of(term, symbols.x)
     )
     yield Forcing(sympy.Tuple(*exponents) if exponents else None, NO_COMPONENT, ARGUMENTS)
     for i, entry in enumerate(terms):

@@ -67,7 +67,7 @@ def _read(path: Path) -> Emitted | None:
     try:
         found: dict[str, Any] = json.loads(content)
         of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        of_modes = ("autonomous", "discontinuities", "traced_field", "steep", "steep_inside")
+        of_modes = ("abrupt", "autonomous", "discontinuities", "traced_field", "steep", "steep_inside")
         parts = (
             "first_forcing",
             "forcing_component",

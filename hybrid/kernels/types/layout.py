@@ -58,13 +58,13 @@ class Model(Structure):
     ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
     surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0. ``fragile``
-    is 1 for a mode whose series may be undefined where its field is not. ``first_forcing[m]`` is the first
-    forcing of mode ``m``, whose program is behind those of all transitions; ``forcing_component`` is the
-    component of the state whose rate a forcing is a term of, or -1; ``forcing_kind`` is one of those in
-    ``codes``. Residues are rates that may cancel to their rounding: ``first_residue[m]`` is the first of mode
-    ``m``, their programs are behind those of all forcings, and ``residue_component`` is the component that
-    one is the rate of. The residues of guards, those of their terms that may cancel so, have programs behind
-    them.
+    is 1 for a mode whose series may be undefined where its field is not, ``abrupt`` for one whose field may
+    change abruptly. ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of
+    all transitions; ``forcing_component`` is the component of the state whose rate a forcing is a term of, or
+    -1; ``forcing_kind`` is one of those in ``codes``. Residues are rates that may cancel to their rounding:
+    ``first_residue[m]`` is the first of mode ``m``, their programs are behind those of all forcings, and
+    ``residue_component`` is the component that one is the rate of. The residues of guards, those of their
+    terms that may cancel so, have programs behind them.
     ``field_jacobian`` writes its last column, and in row ``i`` of mode ``m`` the columns
     ``slope_column[first_slope[m, i]:first_slope[m, i + 1]]``: all others are zero.
     ``steep`` is 1 for a mode whose field has powers of its guards that may have an infinite slope at the
@@ -112,6 +112,7 @@ class Model(Structure):
     propagator: INDICES
     degree: INDICES
     fragile: INDICES
+    abrupt: INDICES
     steep: INDICES
     root: INDICES
     field_before: INDICES

@@ -10,9 +10,9 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.types.codes import EXACT
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
-EPSILON = 2.0**-52
 # A step past a jump moves the state by less than this share of its size, and by fewer relative tolerances.
 SHORT = 0.03
 IN_TOLERANCES = 1e7
