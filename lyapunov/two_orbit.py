@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status, arguments
+from hybrid import ArgumentError, HybridSystem, Status, StatusCode, arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
@@ -22,6 +22,16 @@ from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from lyapunov.spectrum import INTERVALS_AT_ONCE, end_at, interval_length
 from lyapunov.statistics import running_tapered_mean
+
+# The renormalised companion has no digits left this many roundings of the state from the orbit, or so near
+# the least of all numbers.
+EPSILON = float(np.finfo(float).eps)
+LEAST_ROUNDINGS = 256.0
+LEAST_DISTANCE = 1e-290
+# Nor is its distance small beyond this share of the largest distance of the free companion, if it has grown
+# by so much.
+MOST_OF_RANGE = 0.03
+MOST_GROWTH = 100.0
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -56,7 +66,8 @@ class TwoOrbitExponents:
     separation, interval
         Distance at the start, and length of an interval in units of time.
     status
-        How the runs ended; the histories hold the completed intervals.
+        How the runs ended; the histories hold the completed intervals. INDISTINCT_TANGENTS if the
+        renormalised companion came within rounding of the orbit, or as far from it as two orbits can be.
 
     References
     ----------
@@ -196,7 +207,37 @@ def two_orbit_exponents(
         distances, status = _follow(reference, companions, separation, length, intervals, bar)
     free, renormalised = distances.T
     growths = _log_ratio(renormalised, separation) / length
+    if status.ok:
+        size = float(np.linalg.norm(reference.run.scale))
+        status = _judged(status, free, renormalised, separation, size)
     return TwoOrbitExponents(free.copy(), growths, separation, length, status)
+
+
+def _judged(
+    status: Status, free: np.ndarray, renormalised: np.ndarray, separation: float, size: float
+) -> Status:
+    """The status, unless the renormalised companion has lost its digits or has left its neighbourhood.
+
+    ``size`` is that of the state, whose rounding no distance resolves.
+    """
+    lost = int(np.sum(renormalised <= max(LEAST_ROUNDINGS * EPSILON * size, LEAST_DISTANCE)))
+    if lost:
+        return Status(
+            StatusCode.INDISTINCT_TANGENTS,
+            f"On {lost} of {len(free)} intervals the renormalised companion came within rounding of the "
+            "orbit. Its growth there is that of the rounding.",
+            "Give a shorter interval= or a larger separation=, or use lyapunov_spectrum.",
+        )
+    grown = renormalised > max(MOST_OF_RANGE * float(np.max(free)), MOST_GROWTH * separation)
+    far = int(np.sum(grown))
+    if far:
+        return Status(
+            StatusCode.INDISTINCT_TANGENTS,
+            f"On {far} of {len(free)} intervals the renormalised companion came as far from the orbit as "
+            "any two orbits do. Its growth there is not that of a small distance.",
+            "Give a shorter interval= or a smaller separation=, or use lyapunov_spectrum.",
+        )
+    return status
 
 
 def _log_ratio(distances: np.ndarray, before: np.ndarray | float) -> np.ndarray:

@@ -241,3 +241,41 @@ def test_distances_whose_squares_or_quotients_no_number_holds(rate, separation):
     np.testing.assert_allclose(result.single_piece, rate, rtol=1e-9)
     np.testing.assert_allclose(result.undivided, rate, rtol=1e-9)
     np.testing.assert_allclose(result.telescoped, rate, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rate", "interval", "word"),
+    [(-30.0, 2.0, "rounding"), (-30.0, 2 * np.pi, "rounding"), (-5.0, 2.0, None), (-30.0, 0.3, None)],
+)
+def test_a_companion_within_rounding_of_the_orbit_is_told(rate, interval, word):
+    def field(t, x, p):
+        return (p.rate * (x.a - np.cos(t)),)
+
+    system = hybrid.HybridSystem(
+        state=("a",), parameters={"rate": -1.0}, modes=[hybrid.Mode("m", field)], period=2 * np.pi
+    )
+    result = lyapunov.two_orbit_exponents(
+        system, (1.0,), parameters={"rate": rate}, intervals=20, interval=interval
+    )
+    if word is None:
+        assert result.status.ok
+        assert result.renormalised_exponent == pytest.approx(rate, rel=1e-3)
+    else:
+        assert result.status.code == hybrid.StatusCode.INDISTINCT_TANGENTS
+        assert word in result.status.message
+
+
+@pytest.mark.parametrize(("interval", "ok"), [(1.0, True), (50.0, False)])
+def test_a_companion_that_has_reached_the_size_of_the_attractor_is_told(interval, ok):
+    def lorenz(t, x, p):
+        return (10 * (x.y - x.x), 28 * x.x - x.y - x.x * x.z, x.x * x.y - 8 / 3 * x.z)
+
+    system = hybrid.HybridSystem(state=("x", "y", "z"), modes=[hybrid.Mode("m", lorenz)])
+    result = lyapunov.two_orbit_exponents(
+        system, (1.0, 1.0, 20.0), intervals=int(600 / interval), interval=interval, transient=5
+    )
+    assert result.status.ok == ok
+    if ok:
+        assert result.renormalised_exponent == pytest.approx(0.906, abs=0.05)
+    else:
+        assert "as far from the orbit as" in result.status.message
