@@ -26,7 +26,7 @@ from lyapunov.statistics import running_tapered_mean
 # The renormalised companion has no digits left this many roundings of the state from the orbit, or so near
 # the least of all numbers.
 EPSILON = float(np.finfo(float).eps)
-LEAST_ROUNDINGS = 256.0
+LEAST_ROUNDINGS = 4096.0
 LEAST_DISTANCE = 1e-290
 # Nor is its distance small beyond this share of the largest distance of the free companion, if it has grown
 # by so much.

@@ -20,6 +20,7 @@ EPSILON = np.finfo(float).eps
 
 @pytest.fixture(autouse=True)
 def _as_plain_python(monkeypatch):
+    load_kernels("lyapunov.study.kernels")
     for name, each in getmembers(kernels, lambda each: hasattr(each, "py_func")):
         monkeypatch.setattr(kernels, name, each.py_func)
 
