@@ -34,7 +34,7 @@ EXPONENTIAL = (sympy.exp, sympy.tanh, sympy.erf, sympy.sinh, sympy.cosh, expm1, 
 # Functions that switch once between two values.
 SWITCHES = (sympy.tanh, sympy.erf)
 # Functions that may be flat to all digits and change a little further on.
-SATURATING = (sympy.tanh, sympy.atan, sympy.exp, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
+SATURATING = (*EXPONENTIAL, sympy.atan)
 # Functions with a branch point, beyond which their series goes on: that of ``arcsin(sin(q))`` is ``q``.
 BRANCHING = (sympy.asin, sympy.acos, sympy.acosh)
 # A sum counts as a factor. A single exponential does not, since it makes no product narrower.

@@ -440,7 +440,8 @@ def crossing_on_path(
 ):
     """``first_change`` from the side that the run knows; ``sampled_change`` if the guard has no program.
 
-    ``end`` is the value of the guard at the end of the step, which the path may hold with other rounding.
+    ``end`` is the value of a guard at the end of the step, which the path may hold with other rounding; only
+    one of the order ``BY_STEP`` needs it.
     Returns the share of the step at which the guard crosses, its side after the crossing or at the end, and
     the share of the step that is proved. The guard is no longer held to be zero at the start of the step,
     unless it rests there.

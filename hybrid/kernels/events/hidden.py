@@ -77,6 +77,7 @@ def hidden_until(model, method, run, transition, path, order, clock, start, pace
 
     ``end`` is the value of the guard at the end of the step. With ``exact``, the path has no error of a
     method. Returned second is whether the guard rests at zero.
+
     A guard that jumps is never small, and its signs are no noise.
     """
     if may_jump(model, run, transition, start, run.y, work):
@@ -88,11 +89,12 @@ def hidden_until(model, method, run, transition, path, order, clock, start, pace
     if size < math.inf:
         # What is zero at the start has a size and rounding on the step.
         rounding += ROUNDING_OF_STATE * EPSILON * size
-    noise, place = noise_of_signs(rounding, error, end), length
+    noise, place, farthest = noise_of_signs(rounding, error, end), length, size
     for _ in range(MOST_HALVINGS):
-        if farthest_from_zero(model, transition, path, order, clock, start, pace, place, work) <= noise:
+        if farthest <= noise:
             break
         place *= 0.5
+        farthest = farthest_from_zero(model, transition, path, order, clock, start, pace, place, work)
     return place, size <= rounding
 
 

@@ -309,7 +309,9 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             later = time_at(series, order, clock, t, 1.0, h)
             for i in range(model.dimension):
                 work.trial[i] = series[order + 1, i]
-            end = guard_value(model, transition, later, work.trial, work.scalar)
+            end = 0.0
+            if on_guard == BY_STEP:
+                end = guard_value(model, transition, later, work.trial, work.scalar)
             theta, side, share = crossing_on_path(
                 model, method, run, transition, series, order, clock, t, 1.0, h, end, kind == EXACT, work
             )
