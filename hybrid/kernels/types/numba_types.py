@@ -20,6 +20,7 @@ from numba.extending import (
 from numba.np.arrayobj import populate_array
 
 from hybrid.kernels.types.kinds import TRUTH, Array, Function, Number, Pair
+from hybrid.kernels.types.lowering import array_of
 from hybrid.kernels.types.structure import Structure
 
 
@@ -149,11 +150,4 @@ def array_in(context, builder, kind, word):
     """An array that owns nothing: the structure on the side of Python keeps its memory."""
     integer = context.get_value_type(types.intp)
     shape = [word(1 + axis, integer) for axis in range(kind.ndim)]
-    itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
-    strides = [itemsize]
-    for length in reversed(shape[1:]):
-        strides.insert(0, builder.mul(strides[0], length))
-    array = context.make_array(kind)(context, builder)
-    data = word(0, context.get_data_type(kind.dtype).as_pointer())
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=itemsize, meminfo=None)
-    return array._getvalue()
+    return array_of(context, builder, kind, word(0, context.get_data_type(kind.dtype).as_pointer()), shape)

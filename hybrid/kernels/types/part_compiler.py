@@ -12,9 +12,9 @@ or a type, it finds out again in every function; here it is remembered.
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.ir import UNDEFINED
-from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
+
+from hybrid.kernels.types.lowering import KernelLowering
 
 # What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out a few
 # parts in a hundred faster.
@@ -134,32 +134,12 @@ class _OptimisedPart(_WithoutCode, WholeLibrary):
     """A library that is optimised with all that it calls before it is linked into others."""
 
 
-class _Lower(Lower):
-    """Lowers operators with the signatures that typing has found; numba itself looks for them again."""
-
-    def lower_binop(self, resty, expr, op):
-        """The value of an operator."""
-        if not (expr.static_lhs is UNDEFINED and expr.static_rhs is UNDEFINED):
-            return super().lower_binop(resty, expr, op)
-        context, builder = self.context, self.builder
-        signature = self.fndesc.calltypes[expr]
-        values = [
-            context.cast(builder, self.loadvar(each.name), self.typeof(each.name), kind)
-            for each, kind in zip((expr.lhs, expr.rhs), signature.args, strict=True)
-        ]
-        function = context.typing_context.resolve_value_type(op)
-        # Numba may have made the function anew since, without what it knew of this signature.
-        context.typing_context.resolve_function_type(function, signature.args, {})
-        value = context.get_function(function, signature)(builder, values)
-        return context.cast(builder, value, signature.return_type, resty)
-
-
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _PartLowering(NativeLowering):
     """Numba's lowering, into a library for parts."""
 
     _name = "part_lowering"
-    lowering_class = _Lower
+    lowering_class = KernelLowering
 
     def run_pass(self, state):
         """Choose the library before numba would make the usual one."""
