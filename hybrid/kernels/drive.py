@@ -4,28 +4,20 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
-from hybrid.kernels.arithmetic.tangent import keep_apart
 from hybrid.kernels.events.guards import (
-    allowed,
-    guard_speed,
     guard_value,
-    may_jump,
     rounding_band,
-    was_left_behind,
-    widen_scale,
 )
-from hybrid.kernels.events.onset import BY_STEP
-from hybrid.kernels.events.resolution import rests_on_guard, underflows
-from hybrid.kernels.events.sides import side_of
-from hybrid.kernels.steps.disguised_jumps import leave, look_back
+from hybrid.kernels.jumps.limits import may_accumulate
+from hybrid.kernels.steps.disguised_jumps import leave
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
     DONE,
     ENTERING,
     GO_ON,
+    INCOMPLETE,
     MAX_JUMPS,
     MAX_STEPS,
     NO_MODE,
@@ -47,43 +39,6 @@ MOST_JUMPS_AT_ONCE = 1000
 MOST_JUMPS_EACH = 100
 # A landing may be this many times as far from its guard as the rounding of the state.
 MOST_ROUNDING = 64.0
-
-
-@njit(**KERNEL)
-def arrived(model, run, work):
-    """The transition whose guard is reached or passed at the end of a run; it still belongs to this run.
-
-    Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
-    and takes a guard that it starts beyond as crossed: then one of the two runs fires the transition.
-    """
-    mode, t, found = run.mode, run.phase, NO_TRANSITION
-    model.field(mode, t, run.y, model.parameters, work.field)
-    for i in range(model.dimension):
-        work.settled[i] = run.scale[i]
-        run.scale[i] = abs(run.y[i])
-    widen_scale(model, run, work)
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        transition = model.outgoing[slot]
-        before = run.side[transition]
-        run.rehearsal[3, transition] = 0
-        if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
-            continue
-        if underflows(model, transition, t, run.y, t, run.y, work.scalar):
-            continue
-        now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
-        if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
-            # An event at a jump of the guard lies beyond the near side.
-            now = -before
-        elif now == -before and order == 0:
-            speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-            if was_left_behind(model, run, transition, t, run.y, speed, before, work):
-                now = before
-        crossed = now == -before and crosses_towards(model.direction[transition], now)
-        if crossed and allowed(model, transition, t, run.y, work.scalar):
-            found = transition
-    for i in range(model.dimension):
-        run.scale[i] = max(run.scale[i], work.settled[i])
-    return found
 
 
 @njit(**KERNEL)
@@ -111,6 +66,10 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
     parts.jump(task, fired)
     if model.target[fired] == NO_MODE:
         return TERMINAL
+    if not may_accumulate(model, run, fired):
+        return GO_ON
+    if parts.complete == 0:
+        return INCOMPLETE
     ended = parts.finish_chatter(task, fired, time_left(model, run, stop_cycle, stop_phase))
     if ended and model.accumulates_to[run.last_fired] == NO_MODE:
         return ACCUMULATION
@@ -126,7 +85,7 @@ def enter(parts, task):
     if not finite(run, model.dimension * (1 + task.tangents)):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)
-    if fires == RESTING or (fires == NO_TRANSITION and rests_on_guard(model, task.method, run, task.work)):
+    if fires == RESTING or (fires == NO_TRANSITION and parts.rests_on_guard(task)):
         limit_mode = model.accumulates_to[run.last_fired]
         if limit_mode == NO_MODE:
             run.at_rest = 1
@@ -195,7 +154,7 @@ def step(parts, task, remaining):
         leave(model, run, work)
     code, span = step_by_propagator(parts, task, remaining)
     if code == GO_ON and watched:
-        look_back(model, task.method, run, span, work)
+        parts.look_back(model, task.method, run, span, work)
     if code == GO_ON and run.pending != NO_TRANSITION:
         keep_scale(model, run, on_guard, run.phase + span, work)
     return code, span
@@ -220,7 +179,8 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 
     The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record
-    has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. Nothing is allocated.
+    has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. After ``INCOMPLETE`` it is in
+    the middle of a jump, and has to begin again where this call began, with all parts. Nothing is allocated.
     """
     model, run = task.model, task.run
     while True:
@@ -237,7 +197,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
                 continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
         if remaining <= 0.0:
-            fired = arrived(model, run, task.work)
+            fired = parts.arrived(task)
             if fired == NO_TRANSITION:
                 return DONE
             run.pending = parts.first_in_order(task, fired)
@@ -252,8 +212,8 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             return int(code)
         forward(run, model.period, span)
         run.since_entry += span
-        if task.orthonormal != 0 and 0.0 < span < remaining:
-            keep_apart(model, run, mode, task.tangents, task.work.jacobian)
+        if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
+            parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
         fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import Absent, load_kernels
+from hybrid.compiler.cache.loader import LIMITS, Absent, is_kept, load_kernels
 from hybrid.compiler.compiled import CompiledSystem
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
@@ -33,23 +33,30 @@ def check_solver(solver: object) -> Solver:
     )
 
 
-@attrs.frozen(eq=False)
+@attrs.define(eq=False)
 class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
-    ``task`` lacks only what a run has for itself. ``model`` is that at the default parameters.
-    ``propagators`` says how each mode is advanced, by the name of the mode; ``degree`` is that of the steps
-    in a record.
+    ``parts_so_far`` are ``parts`` without those that few runs call and that are not compiled yet. ``task``
+    lacks only what a run has for itself. ``model`` is that at the default parameters. ``propagators`` says
+    how each mode is advanced, by the name of the mode; ``degree`` is that of the steps in a record.
     """
 
     method: Any
-    parts: Any
+    parts_so_far: Any
     task: Any
     model: Any
     propagators: dict[str, str]
     degree: int
     run_layout: Any
     work_layout: Any
+
+    @property
+    def parts(self) -> Any:
+        """All pieces that the driver may call; those that are not compiled yet are compiled now."""
+        if not self.parts_so_far.complete:
+            self.parts_so_far = completed(self.parts_so_far)
+        return self.parts_so_far
 
 
 def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: int | None = None) -> Plan:
@@ -66,14 +73,20 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
         if by_steps is not None:
             kinds[by_steps] = codes.RUNGE_KUTTA
         method = kernel_method(solver, any(kind != codes.RUNGE_KUTTA for kind in kinds))
+        emitted = compiled.emitted
         parts, attempts = driver_parts(
-            compiled.takes_steps(kinds), solver.attempt, bool(compiled.emitted.forcing_component)
+            solver.attempt,
+            steps=compiled.takes_steps(kinds),
+            forced=bool(emitted.forcing_component),
+            beside_series=not all(emitted.guard_in_series),
+            tangents=tangents > 0,
+            abrupt=tangents > 0 and any(emitted.abrupt),
         )
         model = compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64))
         columns, rows = compiled.series_columns(tangents), compiled.emitted.programs.longest
         plan = Plan(
             method,
-            parts,
+            completed(parts) if is_kept(LIMITS) else parts,
             _task(attempts, model, method, tangents),
             model,
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
@@ -127,34 +140,60 @@ def kernel_method(solver: Solver, series: bool) -> Any:
 
 
 @cache
-def driver_parts(steps: bool, attempt: tuple[str, str], forced: bool) -> tuple[Any, Any]:
-    """The pieces that the driver is handed; what the run does not need is not loaded."""
+def driver_parts(
+    attempt: tuple[str, str],
+    *,
+    steps: bool,
+    forced: bool,
+    beside_series: bool,
+    tangents: bool,
+    abrupt: bool,
+) -> tuple[Any, Any]:
+    """The pieces that the driver is handed first; what the run does not need is not loaded.
+
+    Whether some mode takes steps of the solver's method ``attempt``, some rate depends on time alone, some
+    guard is no series itself, the run has tangent vectors, and some field may change abruptly below them.
+    """
+
+    def needed(asked: bool, module: str, name: str) -> Any:
+        return vars(load_kernels(module))[name] if asked else Absent()
+
     jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
     module, name = attempt
     if steps:
         step = load_kernels("hybrid.kernels.steps.runge_kutta").runge_kutta_step
     else:
         step = load_kernels("hybrid.kernels.steps.step").no_step
-    explained_step, explained_attempt, explained_series = Absent(), Absent(), Absent()
-    if forced:
-        forcing = load_kernels("hybrid.kernels.steps.forcing")
-        explained_step, explained_attempt = forcing.explained_step, forcing.explained_attempt
-        explained_series = forcing.explained_series
+    forcing = "hybrid.kernels.steps.forcing"
     parts = Parts(
         runge_kutta_step=step,
         enter=corners.enter,
+        rests_on_guard=corners.rests_on_guard,
+        arrived=corners.arrived,
+        keep_apart=needed(tangents, "hybrid.kernels.arithmetic.tangent", "keep_apart"),
+        look_back=needed(abrupt, "hybrid.kernels.steps.disguised_jumps", "look_back"),
         jump=jumps.jump,
-        finish_chatter=jumps.finish_chatter,
+        finish_chatter=Absent(),
+        complete=0,
         rest=jumps.rest,
         first_in_order=corners.first_in_order,
     )
     attempts = Attempts(
         attempt_implicit=vars(load_kernels(module))[name],
-        explained_step=explained_step,
-        explained_attempt=explained_attempt,
-        explained_series=explained_series,
+        explained_step=needed(forced, forcing, "explained_step"),
+        explained_attempt=needed(forced, forcing, "explained_attempt"),
+        explained_series=needed(forced, forcing, "explained_series"),
+        crossing_beside_series=needed(
+            beside_series, "hybrid.kernels.steps.beside_series", "crossing_beside_series"
+        ),
     )
     return parts, attempts
+
+
+@cache
+def completed(parts: Any) -> Any:
+    """The pieces with those that few runs call."""
+    return parts.replace(finish_chatter=load_kernels(LIMITS).finish_chatter, complete=1)
 
 
 def propagator_kinds(compiled: CompiledSystem, solver: Solver, tangents: int) -> list[int]:

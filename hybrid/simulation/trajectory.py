@@ -18,6 +18,7 @@ from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
+from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import Unexplored
 
@@ -56,7 +57,7 @@ def start(
     check_time(time, t0, model.period)
     run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
     work = fresh_work(plan.work_layout, plan.method)
-    run.mode, beyond = choose_mode(system, plan.parts, model, run, work, mode)
+    run.mode, beyond = choose_mode(system, plan.parts_so_far, model, run, work, mode)
     if beyond and model.propagator[run.mode] in (codes.DESINGULARISED, codes.ROOTED):
         # These series hold the root of a guard, which may be negative here.
         plan = plan_of(compiled, solver, tangents, by_steps=int(run.mode))
@@ -194,9 +195,22 @@ class Trajectory:
         return code
 
     def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
-        return int(
-            load_kernels().advance(self.plan.parts, self.task(record), cycle, phase, max_steps, max_jumps)
-        )
+        parts, run, work = self.plan.parts_so_far, self.run, self.work
+        call = self.task(record), cycle, phase, max_steps, max_jumps
+        if parts.complete:
+            return int(load_kernels().advance(parts, *call))
+        before = run.saved(), work.saved(), record.used.copy()
+        code = int(load_kernels().advance(parts, *call))
+        if code != codes.INCOMPLETE:
+            return code
+        run.restore(before[0])
+        work.restore(before[1])
+        record.used[:] = before[2]
+        try:
+            parts = self.plan.parts
+        except KeyboardInterrupt:
+            return StatusCode.INTERRUPTED
+        return int(load_kernels().advance(parts, *call))
 
     def task(self, record: Any, *, orthonormal: bool = False) -> Any:
         """What the driver works on: this run and a record.

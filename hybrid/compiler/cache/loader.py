@@ -27,17 +27,28 @@ from hybrid.kernels.types.kinds import text_of
 from hybrid.symbolic.branches import PARSER
 
 DRIVER = "hybrid.kernels.drive"
-# Every run needs these kernels too. A second process compiles them while this one compiles the driver.
-EVENTS = ("hybrid.kernels.jumps.jump", "hybrid.kernels.jumps.corner", "hybrid.kernels.events.initial_mode")
+LIMITS = "hybrid.kernels.jumps.limits"
+# While this process compiles the driver, a second one compiles what every run needs too, and then what most
+# runs never call.
+IN_SECOND = (
+    "hybrid.kernels.jumps.jump",
+    "hybrid.kernels.jumps.corner",
+    "hybrid.kernels.events.initial_mode",
+    LIMITS,
+)
 # All kernels that Python calls or passes on, slowest to compile first.
 ALL_KERNELS = (
     DRIVER,
     "hybrid.kernels.jumps.jump",
+    LIMITS,
     "hybrid.kernels.steps.radau",
     "hybrid.kernels.steps.runge_kutta",
     "hybrid.kernels.jumps.corner",
     "hybrid.kernels.events.bounds",
     "hybrid.kernels.steps.forcing",
+    "hybrid.kernels.steps.beside_series",
+    "hybrid.kernels.arithmetic.tangent",
+    "hybrid.kernels.steps.disguised_jumps",
     "hybrid.kernels.events.sections",
     "hybrid.kernels.events.many",
     "hybrid.kernels.steps.dense",
@@ -67,9 +78,9 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
         if content is None:
             with announced(MESSAGE):
                 if module == DRIVER:
-                    second_process.start([each for each in EVENTS if not is_kept(each)])
-                elif module in EVENTS:
-                    second_process.finish()
+                    second_process.start([each for each in IN_SECOND if not is_kept(each)])
+                elif module in IN_SECOND:
+                    second_process.wait_for(lambda: is_kept(module))
                     content = _on_disk(module)
                 if content is None:
                     content = compiled(module)

@@ -10,10 +10,12 @@ import atexit
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from hybrid.compiler.cache.folder import PACKAGE, cache_directory
 
+# Seconds between two looks at what the second process has done.
+LOOK = 0.02
 PROGRAM = """\
 import sys
 from hybrid.compiler.cache.loader import load_kernels
@@ -42,12 +44,14 @@ def start(modules: Sequence[str]) -> None:
     _helpers.append(helper)
 
 
-def finish() -> None:
-    """Wait for the second process, if there is one."""
-    while _helpers:
-        helper = _helpers.pop()
-        helper.wait()
-        atexit.unregister(helper.kill)
+def wait_for(is_done: Callable[[], bool]) -> None:
+    """Wait until something is done, or until the second process, if there is one, has ended."""
+    while _helpers and not is_done():
+        try:
+            _helpers[-1].wait(LOOK)
+        except subprocess.TimeoutExpired:
+            continue
+        atexit.unregister(_helpers.pop().kill)
 
 
 def environment() -> dict[str, str]:

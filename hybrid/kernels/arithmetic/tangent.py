@@ -11,7 +11,9 @@ from hybrid.kernels.types.codes import (
     RUNGE_KUTTA,
     STALE,
 )
-from hybrid.kernels.types.options import KERNEL
+from hybrid.kernels.types.kinds import INTEGER, MATRIX
+from hybrid.kernels.types.layout import Model, Run
+from hybrid.kernels.types.options import KERNEL, exported
 
 # A vector that is shorter than this share of the terms that make it up along itself is only rounding.
 COLLAPSED = 1e-13
@@ -116,7 +118,7 @@ def independence(y, n, k, gram):
     return product
 
 
-@njit(**KERNEL)
+@exported(None, Model, Run, INTEGER, INTEGER, MATRIX)
 def keep_apart(model, run, mode, tangents, gram):
     """After a step, orthonormalise the tangent vectors if they are too close for the mode's propagator."""
     kind, closest, steps = model.propagator[mode], CLOSE_IN_TAYLOR, 1

@@ -141,7 +141,7 @@ def draws_state(model, run, transition, mode, t, x, value, work):
 
 
 @njit(**KERNEL)
-def rests_on_guard(model, method, run, work):
+def stays_on_guard(model, method, run, work):
     """Whether a jump has left the state on its guard, within the tolerances, and the field holds it there.
 
     The flow would lead the state back to the guard at once. So would the flow of another mode from which the

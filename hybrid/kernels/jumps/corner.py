@@ -2,6 +2,7 @@
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.events.derivatives import acceleration_rounding, speed_rounding
 from hybrid.kernels.events.guards import (
     allowed,
@@ -10,17 +11,27 @@ from hybrid.kernels.events.guards import (
     guard_value,
     has_program,
     keep_grazing,
+    may_jump,
+    was_left_behind,
     widen_scale,
 )
-from hybrid.kernels.events.onset import BY_SPEED, JUMPING
-from hybrid.kernels.events.resolution import leads_to_guard
-from hybrid.kernels.events.sides import FLOWED, LANDED, STARTED, beyond_at_start, end_instant, take_sides
+from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, JUMPING
+from hybrid.kernels.events.resolution import leads_to_guard, stays_on_guard, underflows
+from hybrid.kernels.events.sides import (
+    FLOWED,
+    LANDED,
+    STARTED,
+    beyond_at_start,
+    end_instant,
+    side_of,
+    take_sides,
+)
 from hybrid.kernels.types.codes import (
     NO_MODE,
     NO_TRANSITION,
     STALE,
 )
-from hybrid.kernels.types.kinds import INTEGER
+from hybrid.kernels.types.kinds import INTEGER, TRUTH
 from hybrid.kernels.types.layout import Model, Run, Task, Work
 from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.task import task_of
@@ -54,6 +65,50 @@ def enter(model, run, work):
     else:
         end_instant(model, mode, run.due)
     return fires
+
+
+@exported(TRUTH, Task)
+def rests_on_guard(task):
+    """As :func:`hybrid.kernels.events.resolution.stays_on_guard`, for the driver."""
+    return stays_on_guard(task.model, task.method, task.run, task.work)
+
+
+@exported(INTEGER, Task)
+def arrived(task):
+    """The transition whose guard is reached or passed at the end of a run; it still belongs to this run.
+
+    Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
+    and takes a guard that it starts beyond as crossed: then one of the two runs fires the transition.
+    """
+    _, model, _, run, _, work = task_of(task)
+    mode, t, found = run.mode, run.phase, NO_TRANSITION
+    model.field(mode, t, run.y, model.parameters, work.field)
+    for i in range(model.dimension):
+        work.settled[i] = run.scale[i]
+        run.scale[i] = abs(run.y[i])
+    widen_scale(model, run, work)
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        transition = model.outgoing[slot]
+        before = run.side[transition]
+        run.rehearsal[3, transition] = 0
+        if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
+            continue
+        if underflows(model, transition, t, run.y, t, run.y, work.scalar):
+            continue
+        now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
+        if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
+            # An event at a jump of the guard lies beyond the near side.
+            now = -before
+        elif now == -before and order == 0:
+            speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+            if was_left_behind(model, run, transition, t, run.y, speed, before, work):
+                now = before
+        crossed = now == -before and crosses_towards(model.direction[transition], now)
+        if crossed and allowed(model, transition, t, run.y, work.scalar):
+            found = transition
+    for i in range(model.dimension):
+        run.scale[i] = max(run.scale[i], work.settled[i])
+    return found
 
 
 @njit(**KERNEL)

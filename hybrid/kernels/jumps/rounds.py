@@ -85,6 +85,16 @@ def time_left_of_rounds(model, run, turn, back):
 
 
 @njit(**KERNEL)
+def shortens(model, run):
+    """Whether the last jumps took less time than as many before them."""
+    if run.jumps <= FEWEST_JUMPS:
+        return False
+    half = FEWEST_JUMPS // 2
+    recent, earlier = time_before(model, run, 0, half), time_before(model, run, half, FEWEST_JUMPS)
+    return recent < SHORTER * earlier or recent == 0.0
+
+
+@njit(**KERNEL)
 def transitions_in_turn(model, run):
     """The number of transitions that fire in turn, in the same order in each round; 0 if there are none.
 
@@ -197,13 +207,7 @@ def limit_of_rounds(model, method, run, work):
     To be called after each jump. The limit is known once two estimates, a round apart, agree up to the
     tolerances, or once there is next to nothing left. The limit state goes to ``work.settled``.
     """
-    if run.jumps <= FEWEST_JUMPS:
-        return 0.0, 0
-    half = FEWEST_JUMPS // 2
-    recent, earlier = time_before(model, run, 0, half), time_before(model, run, half, FEWEST_JUMPS)
-    if not (recent < SHORTER * earlier or recent == 0.0):
-        return 0.0, 0
-    turn = transitions_in_turn(model, run)
+    turn = transitions_in_turn(model, run) if shortens(model, run) else 0
     if turn == 0:
         return 0.0, 0
     left, _ = time_left_of_rounds(model, run, turn, 0)

@@ -10,8 +10,9 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.types.codes import EXACT
-from hybrid.kernels.types.layout import EPSILON
-from hybrid.kernels.types.options import KERNEL
+from hybrid.kernels.types.kinds import REAL
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
+from hybrid.kernels.types.options import KERNEL, exported
 
 # A step past a jump moves the state by less than this share of its size, and by fewer relative tolerances.
 SHORT = 0.03
@@ -34,7 +35,7 @@ def leave(model, run, work):
         work.departure[i] = run.y[i]
 
 
-@njit(**KERNEL)
+@exported(None, Model, Method, Run, REAL, Work)
 def look_back(model, method, run, span, work):
     """After a step of length ``span``, from the clock's time, count it if the field has jumped on it."""
     if model.propagator[run.mode] == EXACT:

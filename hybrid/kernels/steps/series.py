@@ -410,14 +410,18 @@ def series_step(task, remaining):
         evaluate_with_sizes(series, order, h, 0, front)
     fired, cut = NO_TRANSITION, False
     if guards > 0:
-        theta, fired, proved, blurred = earliest_on_series(model, method, run, order, t, h, clock, work)
+        theta, fired, proved, blurred = earliest_on_series(
+            attempts, model, method, run, order, t, h, clock, work
+        )
         for _ in range(MOST_SHORTER):
             if blurred == NO_TRANSITION or SHORTER * h <= 4.0 * EPSILON * measured_time(model, run, mode):
                 break
             h *= SHORTER
             evaluate_with_sizes(series, order, h, 0, front)
             restore_sides(model, run)
-            theta, fired, proved, blurred = earliest_on_series(model, method, run, order, t, h, clock, work)
+            theta, fired, proved, blurred = earliest_on_series(
+                attempts, model, method, run, order, t, h, clock, work
+            )
         end = min(theta, proved, 1.0)
         if run.grazing_place <= end:
             s = run.grazing_place * h

@@ -13,11 +13,9 @@ from hybrid.kernels.arithmetic.bernstein import (
     stays,
 )
 from hybrid.kernels.arithmetic.lanes import four_times, load, store
-from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
-    guard_value,
     rounding_band,
     size_of_time,
 )
@@ -287,7 +285,7 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
 
 
 @njit(**KERNEL)
-def earliest_on_series(model, method, run, order, t, h, clock, work):
+def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
     Returns ``(theta, transition, proved, blurred)``, and brings sides up to date, as
@@ -309,12 +307,11 @@ def earliest_on_series(model, method, run, order, t, h, clock, work):
             later = time_at(series, order, clock, t, 1.0, h)
             for i in range(model.dimension):
                 work.trial[i] = series[order + 1, i]
-            end = 0.0
-            if on_guard == BY_STEP:
-                end = guard_value(model, transition, later, work.trial, work.scalar)
-            theta, side, share = crossing_on_path(
-                model, method, run, transition, series, order, clock, t, 1.0, h, end, kind == EXACT, work
+            theta, share = attempts.crossing_beside_series(
+                model, method, run, transition, order, t, h, clock, work
             )
+            side = run.rehearsal[3, transition]
+            run.rehearsal[3, transition] = 0
             proved = min(proved, share)
             if underflows(model, transition, t, run.y, later, work.trial, work.scalar):
                 continue

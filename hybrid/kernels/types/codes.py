@@ -13,6 +13,8 @@ TERMINAL = 8
 GO_ON = -1
 # No mode allows the start, or more than one does.
 REFUSED = -2
+# A part that is not compiled yet is needed.
+INCOMPLETE = -3
 
 # ``Run.stage``: what the driver has to do before it can step: nothing, evaluate the rates anew (the tangent
 # vectors were changed from outside), or take its sides at every guard of a mode.

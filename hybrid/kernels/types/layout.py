@@ -353,13 +353,17 @@ class Attempts(Structure):
     """What a step may need: parts that are not compiled where they are not called.
 
     ``attempt_implicit`` is the step of an implicit method; ``explained_step``, ``explained_attempt`` and
-    ``explained_series`` shorten a step so that no pulse of the field is hidden from it.
+    ``explained_series`` shorten a step so that no pulse of the field is hidden from it;
+    ``crossing_beside_series`` finds the crossing of a guard that is no series itself.
     """
 
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
     explained_step: function(REAL, Model, Method, Run, REAL, Work)
     explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
     explained_series: function(REAL, Model, Method, Run, INTEGER, INTEGER, INTEGER, REAL, Work)
+    crossing_beside_series: function(
+        Pair(REAL), Model, Method, Run, INTEGER, INTEGER, REAL, REAL, INTEGER, Work
+    )
 
 
 class Task(Structure):
@@ -382,14 +386,21 @@ class Task(Structure):
 class Parts(Structure):
     """Pieces of the driver that run now and then, handed to it instead of being compiled into it.
 
-    What is linked into a kernel is optimised again with it; what comes as an argument is not, and the step of
-    a Runge-Kutta method need not even be compiled where every mode has a series.
+    What is linked into a kernel is optimised again with it; what comes as an argument is not. What a run
+    never calls need not even be compiled: the step of a Runge-Kutta method where every mode has a series,
+    ``keep_apart`` without tangent vectors, ``look_back`` where no field changes abruptly. Whether
+    ``finish_chatter`` will be called is not known beforehand: with ``complete`` 0 it is absent.
     """
 
     runge_kutta_step: function(Pair(REAL), Task, REAL)
     enter: function(INTEGER, Model, Run, Work)
+    rests_on_guard: function(TRUTH, Task)
+    arrived: function(INTEGER, Task)
+    keep_apart: function(None, Model, Run, INTEGER, INTEGER, MATRIX)
+    look_back: function(None, Model, Method, Run, REAL, Work)
     jump: function(None, Task, INTEGER)
     finish_chatter: function(TRUTH, Task, INTEGER, REAL)
+    complete: INTEGER
     rest: function(None, Task, INTEGER)
     first_in_order: function(INTEGER, Task, INTEGER)
 

@@ -80,15 +80,52 @@ def test_the_kernels_view_of_a_solver():
     np.testing.assert_array_equal(method.b, solver.tableau.b)
 
 
-def test_what_a_run_does_not_need_is_not_loaded():
+# What a run may need, and the parts that are handed over for it.
+PARTS = {
+    "forced": ("explained_step", "explained_attempt", "explained_series"),
+    "beside_series": ("crossing_beside_series",),
+    "tangents": ("keep_apart",),
+    "abrupt": ("look_back",),
+}
+
+
+@pytest.mark.parametrize("need", [None, *PARTS])
+@pytest.mark.parametrize("steps", [False, True])
+def test_what_a_run_does_not_need_is_not_loaded(need, steps):
     absent = ("hybrid.kernels.steps.step", "no_attempt")
-    for steps in (False, True):
-        for forced in (False, True):
-            parts, attempts = plan.driver_parts(steps, absent, forced)
-            name = "runge_kutta_step" if steps else "no_step"
-            assert parts.runge_kutta_step.name == name
-            assert isinstance(attempts, Attempts)
-            assert bool(attempts.explained_step.address) == bool(attempts.explained_series.address) == forced
+    parts, attempts = plan.driver_parts(absent, steps=steps, **{name: name == need for name in PARTS})
+    assert isinstance(attempts, Attempts)
+    assert parts.runge_kutta_step.name == ("runge_kutta_step" if steps else "no_step")
+    for name, needed in PARTS.items():
+        for each in needed:
+            part = getattr(parts, each, None) or getattr(attempts, each)
+            assert (part.address != 0) == (name == need)
+
+
+def test_parts_that_a_run_needs():
+    """By guards with a series and without one, and by fields that may change abruptly."""
+
+    def parts_of(field, guard, tangents):
+        system = hybrid.HybridSystem(
+            state=("q", "v"),
+            modes=[hybrid.Mode("move", field)],
+            transitions=[hybrid.Transition("move", "move", hybrid.Guard(guard))],
+        )
+        made = plan.plan_of(hybrid.compile_system(system), hybrid.Taylor(), tangents)
+        parts = made.parts.keep_apart, made.parts.look_back, made.task.attempts.crossing_beside_series
+        return tuple(each.address != 0 for each in parts)
+
+    def smooth(t, x, p):
+        return x.v, -x.q
+
+    def steep(t, x, p):
+        return x.v, -np.tanh(1e8 * x.q)
+
+    assert parts_of(smooth, lambda t, x, p: x.q - 0.5, 0) == (False, False, False)
+    assert parts_of(smooth, lambda t, x, p: np.exp(x.q) - 2.0, 0) == (False, False, True)
+    assert parts_of(smooth, lambda t, x, p: x.q - 0.5, 2) == (True, False, False)
+    assert parts_of(steep, lambda t, x, p: x.q - 0.5, 0) == (False, False, False)
+    assert parts_of(steep, lambda t, x, p: x.q - 0.5, 2) == (True, True, False)
 
 
 def test_plans_of_the_last_solvers_are_kept(compiled):

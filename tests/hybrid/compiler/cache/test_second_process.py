@@ -24,7 +24,7 @@ def refuse(monkeypatch):
 
 def test_second_process_fills_the_same_cache(empty_cache):
     second_process.start(["hybrid.kernels.steps.step"])
-    second_process.finish()
+    second_process.wait_for(lambda: False)
     [folder] = empty_cache.glob("kernels-*")
     assert [path.name for path in folder.iterdir()] == ["hybrid.kernels.steps.step.o"]
     assert not second_process._helpers
@@ -32,14 +32,14 @@ def test_second_process_fills_the_same_cache(empty_cache):
 
 def test_what_becomes_of_it_does_not_matter(empty_cache):
     second_process.start(["hybrid.kernels.no_such_module"])
-    second_process.finish()
+    second_process.wait_for(lambda: False)
     assert list(empty_cache.rglob("*.o")) == []
 
 
 def test_nor_whether_it_can_be_started(empty_cache, monkeypatch):
     monkeypatch.setattr("sys.executable", str(empty_cache / "no_such_interpreter"))
     second_process.start(["hybrid.kernels.steps.step"])
-    second_process.finish()
+    second_process.wait_for(lambda: False)
 
 
 def test_one_processor_is_left_to_this_process(empty_cache, monkeypatch, refuse):
@@ -57,4 +57,4 @@ def test_neither_does_a_program_that_is_its_own_interpreter(empty_cache, monkeyp
 
 
 def test_finish_has_nothing_to_wait_for_without_a_start():
-    second_process.finish()
+    second_process.wait_for(lambda: False)
