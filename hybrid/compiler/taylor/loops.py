@@ -16,6 +16,12 @@ def indented(statements: Iterable[str]) -> list[str]:
     return [f"    {statement}" for statement in statements]
 
 
+def below_highest(statements: Iterable[str]) -> list[str]:
+    """Statements for an order that has a next one."""
+    found = indented(statements)
+    return ["if o < order:", *found] if found else []
+
+
 def padded(width: int, whole: int = NARROW) -> int:
     """A width rounded up to a multiple of ``whole``."""
     return -(-width // whole) * whole
@@ -69,12 +75,12 @@ class StateLoop:
         return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
 
     def higher(self) -> list[str]:
-        """Statements for order ``o``; ``shrink`` is 1/o."""
+        """Statements for order ``o``; ``shrink`` is 1/o. No order comes after ``order``."""
         block = self.block
         inner = [f"{block.prefix}s{i} = out[o, {block.prefix}c{i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
         after = [f"{name} = {value}" for name, value in block.before().items()]
-        sums = [*inner, *self._sums("o + 1")]
+        sums = [*inner, *below_highest(self._sums("o + 1"))]
         return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
 
     def _separate(self) -> list[str]:
@@ -141,7 +147,8 @@ class TangentLoop:
                 for place in range(len(rights))
             ]
         later = self._later("o + 1", "later*({})")
-        return ["later = 1.0/(o + 1)", *self._each([*sums, *inner, *block.higher, *later])]
+        statements = self._each([*sums, *inner, *block.higher, *later])
+        return below_highest(["later = 1.0/(o + 1)", *statements])
 
     def _later(self, order: str, value: str) -> list[str]:
         return [

@@ -4,8 +4,10 @@ from hybrid.kernels.instructions.loops import loop, variable
 from hybrid.kernels.instructions.registers import everywhere, multiply_add, read, vector_of, write
 from hybrid.kernels.types.codes import NARROW, WIDE
 
-# Number of partial sums: in one sum, each term waits for the previous term.
+# Number of partial sums: in one sum, each term waits for the previous term. All sums together take at most
+# this many of the sixteen registers of four numbers.
 AT_ONCE = 4
+MOST_REGISTERS = 12
 
 
 def _registers(width, widest):
@@ -18,7 +20,9 @@ def _registers(width, widest):
 def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
     """The instructions of ``convolve``, or of ``convolve_pairs``."""
     registers = _registers(width, widest)
-    sums_at_once = max(1, AT_ONCE // len(registers))
+    sums_at_once = AT_ONCE
+    while sums_at_once > 1 and sums_at_once * width > MOST_REGISTERS * NARROW:
+        sums_at_once //= 2
     number = order.type
     # Start with the lowest orders of the columns: the orders written last are the slowest to read.
     factor = rows.walker(builder.sub(order, inset), left)

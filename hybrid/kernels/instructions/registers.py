@@ -29,8 +29,8 @@ def built_in(builder, name, width, *arguments):
 
 
 def multiply_add(builder, a, b, c):
-    """``a * b + c``."""
-    return builder.fadd(c, builder.fmul(a, b, flags=FUSED), flags=FUSED)
+    """``a * b + c`` as one operation: LLVM does not fuse by itself what it adds to the sum of a loop."""
+    return built_in(builder, "fmuladd", c.type.count, a, b, c)
 
 
 class Matrix:
