@@ -9,7 +9,7 @@ one vector data that it has just written as several. So the columns of the state
 import numpy as np
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload, register_jitable
+from numba.extending import intrinsic, overload
 
 from hybrid.kernels.arithmetic.lanes import HERE, matrix_of
 from hybrid.kernels.instructions.registers import (
@@ -95,13 +95,42 @@ def spread_tangents(y, n, series, first, stride):
             series[0, column + NARROW * i] = y[n * (1 + vector) + i] if vector < count else 0.0
 
 
-@register_jitable
 def gather_tangents(series, order, n, first, stride, y):
     """The inverse of ``spread_tangents``, from row ``order``."""
     for vector in range(len(y) // n - 1):
         column = first + vector // NARROW * stride + vector % NARROW
         for i in range(n):
             y[n * (1 + vector) + i] = series[order, column + NARROW * i]
+
+
+@overload(gather_tangents, jit_options=HERE)
+def _overload_gather_tangents(series, order, n, first, stride, y):
+    return lambda series, order, n, first, stride, y: _gather(series, order, n, first, stride, y)
+
+
+@intrinsic
+def _gather(typing_context, series, order, n, first, stride, y):
+    """``gather_tangents`` without a look at the signs of its indices."""
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, n, first, stride, vector = arguments
+        rows = matrix_of(context, builder, series, matrix)
+        target = context.make_array(y)(context, builder, vector)
+        [length] = cgutils.unpack_tuple(builder, target.shape)
+        number = n.type
+        lanes = number(NARROW)
+        count = builder.sub(builder.sdiv(length, n), number(1))
+        with cgutils.for_range(builder, count, intp=number) as each:
+            block, lane = builder.sdiv(each.index, lanes), builder.srem(each.index, lanes)
+            column = builder.add(builder.add(first, builder.mul(block, stride)), lane)
+            source = rows.address(order, column)
+            begin = builder.gep(target.data, [builder.mul(n, builder.add(each.index, number(1)))])
+            with cgutils.for_range(builder, n, intp=number) as component:
+                value = builder.load(builder.gep(source, [builder.mul(component.index, lanes)]))
+                builder.store(value, builder.gep(begin, [component.index]))
+        return context.get_dummy_value()
+
+    return types.void(series, types.intp, types.intp, types.intp, types.intp, y), generate
 
 
 @overload(evaluate, jit_options=HERE)
