@@ -53,7 +53,7 @@ IMPORTS = (
     "    log, log10, log1p, log2, sin, sinh, sqrt, tan, tanh,\n"
     ")\n"
     "from hybrid.kernels.arithmetic.columns import (\n"
-    "    combine, combine_tangents, convolve, convolve_pairs, spread_tangents,\n"
+    "    add_ends, add_ends_of_pairs, combine, combine_tangents, convolve, convolve_pairs, spread_tangents,\n"
     ")\n"
     "from hybrid.kernels.arithmetic.doubled import divided_dot_product\n"
     "from hybrid.kernels.arithmetic.lanes import four_times, load, store, store_down, store_row\n"

@@ -69,19 +69,15 @@ class StateLoop:
         """Statements for order zero."""
         block = self.block
         begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
-        # Order one is read before it is written, and multiplied by factors that are still zero.
-        nothing = f"store_row(out, 1, 0, ({'0.0, ' * len(self.front)}))"
-        before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.before())]
-        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
+        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *self._sums("1")]
 
     def higher(self) -> list[str]:
         """Statements for order ``o``; ``shrink`` is 1/o. No order comes after ``order``."""
         block = self.block
         inner = [f"{block.prefix}s{i} = out[o, {block.prefix}c{i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
-        after = [f"{name} = {value}" for name, value in block.before().items()]
-        sums = [*inner, *below_highest(self._sums("o + 1"))]
-        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
+        sums = [*self._ends(), *below_highest(self._sums("o + 1")), *inner]
+        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates]
 
     def _separate(self) -> list[str]:
         """Write the columns of ``y`` that are not among the first ones, one by one."""
@@ -98,11 +94,22 @@ class StateLoop:
         return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
 
     def _sums(self, order: str) -> list[str]:
+        """The terms of an order that contain no order above the last but one."""
+        name = "convolve" if self.block.common_left else "convolve_pairs"
+        return [f"{name}(out, {order}, 2, {factors})" for factors in self._factors()]
+
+    def _ends(self) -> list[str]:
+        """The terms of order ``o`` with the order before; order one has none."""
+        name = "add_ends" if self.block.common_left else "add_ends_of_pairs"
+        found = [f"{name}(out, o, {factors})" for factors in self._factors()]
+        return ["if o > 1:", *indented(found)] if found else []
+
+    def _factors(self) -> list[str]:
+        """Columns of the factors of all convolutions, their number and the widest register, as text."""
         common = self.block.common_left
-        name = "convolve_pairs" if common is None else "convolve"
-        factors = [(common or each.left, each.right, padded(len(each.places))) for each in self.layers()]
         return [
-            f"{name}(out, {order}, 2, {left}, {right}, {width}, {WIDE})" for left, right, width in factors
+            f"{common or each.left}, {each.right}, {padded(len(each.places))}, {WIDE}"
+            for each in self.layers()
         ]
 
 

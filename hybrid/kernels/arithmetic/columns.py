@@ -44,6 +44,22 @@ def convolve_pairs(series, order, inset, left, first, width, widest):
     series[order, first : first + width] = sums
 
 
+def add_ends(series, order, left, first, width, widest):
+    """Add to the sums of ``convolve`` in row ``order``, at least 2, with ``inset`` 2 what is missing for 1."""
+    sums = series[1, left] * series[order - 1, first : first + width]
+    if order > 2:
+        sums = sums + series[order - 1, left] * series[1, first : first + width]
+    series[order, first : first + width] += sums
+
+
+def add_ends_of_pairs(series, order, left, first, width, widest):
+    """As ``add_ends``, for the sums of ``convolve_pairs``."""
+    sums = series[1, left : left + width] * series[order - 1, first : first + width]
+    if order > 2:
+        sums = sums + series[order - 1, left : left + width] * series[1, first : first + width]
+    series[order, first : first + width] += sums
+
+
 def evaluate(series, order, s, first, width):
     """Values at ``s`` of ``width`` series from column ``first`` on, into ``series[order + 1]``.
 

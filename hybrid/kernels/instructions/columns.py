@@ -58,6 +58,26 @@ def write_convolution(builder, rows, order, inset, left, first, width, widest, p
         write(builder, parts[0], rows.beside(target, place))
 
 
+def write_ends(builder, rows, order, left, first, width, widest, pairs=False):
+    """The instructions of ``add_ends``, or of ``add_ends_of_pairs``."""
+    number = order.type
+    below = builder.sub(order, number(1))
+    differ = builder.icmp_signed(">", order, number(2))
+    here, one, last = (rows.address(row, first) for row in (order, number(1), below))
+    left_one, left_last = (rows.address(row, left) for row in (number(1), below))
+    for place, lanes in _registers(width, widest):
+        nothing = vector_of(lanes)([0.0] * lanes)
+        if pairs:
+            low, high = (read(builder, rows.beside(each, place), lanes) for each in (left_one, left_last))
+        else:
+            low, high = (everywhere(builder, builder.load(each), lanes) for each in (left_one, left_last))
+        high = builder.select(differ, high, nothing)
+        total = read(builder, rows.beside(here, place), lanes)
+        total = multiply_add(builder, high, read(builder, rows.beside(one, place), lanes), total)
+        total = multiply_add(builder, low, read(builder, rows.beside(last, place), lanes), total)
+        write(builder, total, rows.beside(here, place))
+
+
 def _weighted_sum(builder, factors, terms):
     total = builder.fmul(factors[0], terms[0])
     for factor, term in zip(factors[1:], terms[1:], strict=True):
