@@ -145,16 +145,13 @@ class TangentLoop:
     def higher(self) -> list[str]:
         """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
         block = self.block
-        sums, inner = [], []
+        sums = []
         for i, (left, rights) in enumerate(block.blocks.items()):
-            base = f"{block.prefix}b{i}"
-            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)}, {WIDE})")
-            inner += [
-                f"{block.prefix}s{i}_{place} = load(out, o, {base} + {NARROW * place})"
-                for place in range(len(rights))
-            ]
+            names = "".join(f"{block.prefix}s{i}_{place}, " for place in range(len(rights)))
+            factors = f"{left}, {block.prefix}b{i}, {NARROW * len(rights)}, {WIDE}"
+            sums.append(f"{names}= convolved(out, o, 1, {factors})")
         later = self._later("o + 1", "later*({})")
-        statements = self._each([*sums, *inner, *block.higher, *later])
+        statements = self._each([*sums, *block.higher, *later])
         return below_highest(["later = 1.0/(o + 1)", *statements])
 
     def _later(self, order: str, value: str) -> list[str]:

@@ -49,11 +49,11 @@ class Recurrences:
 
     The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
-    ``o``. Convolutions are split. The terms at both ends contain coefficients of this order. All terms between
-    contain only lower orders, so they are summed early, all convolutions side by side: those with the order
-    before come last. ``pairs`` lists these convolutions: the column of the first factor and the second factor, with the
-    text of the second factor's coefficient. In every sum, the term known last is added last, so that only one
-    addition waits for it.
+    ``o``. Convolutions are split. The terms at both ends contain coefficients of this order. All terms
+    between contain only lower orders, so they are summed early, all convolutions side by side, and those with
+    the order before come last. ``pairs`` lists these convolutions: the column of the first factor and the
+    second factor, with the text of the second factor's coefficient. In every sum, the term known last is
+    added last, so that only one addition waits for it.
 
     With ``lanes``, a coefficient holds four numbers, one per tangent vector, in four columns. The four are
     written and read as one vector, which is fast even right after the order before was written. ``blocks``

@@ -30,10 +30,16 @@ def convolve(series, order, inset, left, first, width, widest):
     multiple of 4. No register is wider than ``widest``. ``width`` and ``widest`` are known at compile time.
     The terms left out at both ends have the coefficients of the highest orders.
     """
+    sums = convolved(series, order, inset, left, first, width, widest)
+    series[order, first : first + width] = np.concatenate(sums)
+
+
+def convolved(series, order, inset, left, first, width, widest):
+    """The sums of ``convolve`` as registers of four numbers; nothing is written."""
     sums = np.zeros(width)
     for j in range(inset, order - inset + 1):
         sums += series[j, left] * series[order - j, first : first + width]
-    series[order, first : first + width] = sums
+    return [sums[place : place + NARROW] for place in range(0, width, NARROW)]
 
 
 def convolve_pairs(series, order, inset, left, first, width, widest):
@@ -45,7 +51,7 @@ def convolve_pairs(series, order, inset, left, first, width, widest):
 
 
 def add_ends(series, order, left, first, width, widest):
-    """Add to the sums of ``convolve`` in row ``order``, at least 2, with ``inset`` 2 what is missing for 1."""
+    """Add the first and the last term to the sums of ``convolve`` with ``inset`` 1 that were begun with 2."""
     sums = series[1, left] * series[order - 1, first : first + width]
     if order > 2:
         sums = sums + series[order - 1, left] * series[1, first : first + width]

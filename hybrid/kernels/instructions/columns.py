@@ -1,5 +1,7 @@
 """LLVM's instructions for series side by side in vector registers (``hybrid.kernels.arithmetic.columns``)."""
 
+from llvmlite import ir
+
 from hybrid.kernels.instructions.loops import loop, variable
 from hybrid.kernels.instructions.registers import everywhere, multiply_add, read, vector_of, write
 from hybrid.kernels.types.codes import NARROW, WIDE
@@ -19,6 +21,23 @@ def _registers(width, widest):
 
 def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
     """The instructions of ``convolve``, or of ``convolve_pairs``."""
+    target = rows.address(order, first)
+    for place, total in _convolution(builder, rows, order, inset, left, first, width, widest, pairs):
+        write(builder, total, rows.beside(target, place))
+
+
+def write_convolved(builder, rows, order, inset, left, first, width, widest):
+    """The instructions of ``convolved``; returns the registers."""
+    found = []
+    for _, total in _convolution(builder, rows, order, inset, left, first, width, widest, False):
+        for lane in range(0, total.type.count, NARROW):
+            lanes = ir.Constant(ir.VectorType(ir.IntType(32), NARROW), list(range(lane, lane + NARROW)))
+            found.append(builder.shuffle_vector(total, total.type(ir.Undefined), lanes))
+    return found
+
+
+def _convolution(builder, rows, order, inset, left, first, width, widest, pairs):
+    """The instructions for the sums of a convolution; yields each register with its first column."""
     registers = _registers(width, widest)
     sums_at_once = AT_ONCE
     while sums_at_once > 1 and sums_at_once * width > MOST_REGISTERS * NARROW:
@@ -50,12 +69,11 @@ def write_convolution(builder, rows, order, inset, left, first, width, widest, p
     if sums_at_once > 1:
         with loop(builder, number(0), builder.urem(terms, number(sums_at_once)), number(1)):
             add_term(totals[0])
-    target = rows.address(order, first)
     for i, (place, _) in enumerate(registers):
         parts = [builder.load(each[i]) for each in totals]
         while len(parts) > 1:
             parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
-        write(builder, parts[0], rows.beside(target, place))
+        yield place, parts[0]
 
 
 def write_ends(builder, rows, order, left, first, width, widest, pairs=False):
