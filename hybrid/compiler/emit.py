@@ -174,7 +174,11 @@ def _emitted(system: HybridSystem) -> Emitted:
         surface=surface,
         orientation=orientation,
         abrupt=tuple(
-            _may_change_abruptly(field, around, symbols)
+            field.expressions is None
+            or any(
+                may_be_abrupt(simplified(rate, known_positive(around)), symbols.x)
+                for rate in field.expressions
+            )
             for field, around in zip(fields, boundaries, strict=True)
         ),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
@@ -431,14 +435,6 @@ def _where_it_jumps(
     known = known_positive(boundaries)
     places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
     return ", or ".join(_in_names(system, place) for place in places)
-
-
-def _may_change_abruptly(field: Written, boundaries: Sequence[Boundary], symbols: Symbols) -> bool:
-    """Whether the field of a mode may change abruptly inside the mode, as far as its expressions tell."""
-    if field.expressions is None:
-        return True
-    known = known_positive(boundaries)
-    return any(may_be_abrupt(simplified(rate, known), symbols.x) for rate in field.expressions)
 
 
 def _told(system: HybridSystem, expressions: Sequence[sympy.Expr]) -> str:
