@@ -69,15 +69,19 @@ class StateLoop:
         """Statements for order zero."""
         block = self.block
         begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
-        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *self._sums("1")]
+        last = [f"{name} = 0.0" for name in self._last()]
+        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *self._sums("1"), *last]
 
     def higher(self) -> list[str]:
         """Statements for order ``o``; ``shrink`` is 1/o. No order comes after ``order``."""
         block = self.block
         inner = [f"{block.prefix}s{i} = out[o, {block.prefix}c{i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
-        sums = [*self._ends(), *below_highest(self._sums("o + 1")), *inner]
-        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates]
+        sums = below_highest(self._sums("o + 1"))
+        ends = self._ends()
+        sums = [*inner, *ends, *sums] if self._is_short else [*ends, *sums, *inner]
+        last = [f"{name} = {value}" for name, value in self._last().items()]
+        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *last]
 
     def _separate(self) -> list[str]:
         """Write the columns of ``y`` that are not among the first ones, one by one."""
@@ -98,10 +102,34 @@ class StateLoop:
         name = "convolve" if self.block.common_left else "convolve_pairs"
         return [f"{name}(out, {order}, 2, {factors})" for factors in self._factors()]
 
+    @property
+    def _is_short(self) -> bool:
+        """Whether an order takes no longer than it takes to write a register and to read it."""
+        return len(self.block.pairs) <= NARROW
+
+    def _last(self) -> dict[str, str]:
+        """Names of all factors' coefficients in the order before, with their values at the end of an order.
+
+        Order two has one term with them. With few convolutions it is faster to keep them than to read them.
+        """
+        if not self._is_short:
+            return {}
+        found = {}
+        for i, ((left, _), value) in enumerate(self.block.pairs.items()):
+            found[f"{self.block.prefix}q{i}"] = f"out[o, {left}] if o > 1 else 0.0"
+            found[f"{self.block.prefix}p{i}"] = value
+        return found
+
     def _ends(self) -> list[str]:
         """The terms of order ``o`` with the order before; order one has none."""
-        name = "add_ends" if self.block.common_left else "add_ends_of_pairs"
+        prefix, common = self.block.prefix, self.block.common_left
+        name = "add_ends" if common else "add_ends_of_pairs"
         found = [f"{name}(out, o, {factors})" for factors in self._factors()]
+        if self._is_short:
+            found = []
+            for i, (left, _) in enumerate(self.block.pairs):
+                ends = f"{prefix}q{i}*out[1, {prefix}c{i}] + out[1, {left}]*{prefix}p{i}"
+                found.append(f"{prefix}s{i} = {prefix}s{i} + {ends}")
         return ["if o > 1:", *indented(found)] if found else []
 
     def _factors(self) -> list[str]:
