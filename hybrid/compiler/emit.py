@@ -174,8 +174,12 @@ def _emitted(system: HybridSystem) -> Emitted:
         surface=surface,
         orientation=orientation,
         abrupt=tuple(
-            field.expressions is None or any(may_be_abrupt(rate, symbols.x) for rate in field.expressions)
-            for field in fields
+            field.expressions is None
+            or any(
+                may_be_abrupt(simplified(rate, known_positive(around)), symbols.x)
+                for rate in field.expressions
+            )
+            for field, around in zip(fields, boundaries, strict=True)
         ),
         autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
         discontinuities=tuple(

@@ -76,11 +76,12 @@ class Builder(ir.IRBuilder):
         text = f"load {_text(kind)}, {_text(ptr.type)} {_reference(ptr)}"
         return self.written(kind, text if align is None else f"{text}, align {align}")
 
-    def store(self, value: Any, ptr: Any, align: int | None = None) -> Line:
-        """Store a value at an address."""
+    def store(self, value: Any, ptr: Any, align: int | None = None, *, whole: bool = False) -> Line:
+        """Store a value at an address; ``whole`` as one register, also where LLVM would store its halves."""
         if ptr.type.pointee != value.type:
             raise TypeError(f"{value.type} cannot be stored at {ptr.type}")
-        text = f"store {_text(value.type)} {_reference(value)}, {_text(ptr.type)} {_reference(ptr)}"
+        words = "store volatile" if whole else "store"
+        text = f"{words} {_text(value.type)} {_reference(value)}, {_text(ptr.type)} {_reference(ptr)}"
         return self._added(Line(ir.VoidType(), "", text if align is None else f"{text}, align {align}"))
 
     def gep(self, ptr: Any, indices: Sequence[Any]) -> Any:

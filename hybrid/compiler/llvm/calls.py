@@ -14,6 +14,8 @@ from hybrid.kernels.instructions.columns import (
     write_combination,
     write_combination_of_tangents,
     write_convolution,
+    write_convolved,
+    write_ends,
     write_spread,
 )
 from hybrid.kernels.instructions.loops import declared
@@ -115,6 +117,9 @@ CALLS = {
     "four_times": Call(lambda builder, number: everywhere(builder, number, NARROW)),
     "convolve": Call(write_convolution, known=(5, 6)),
     "convolve_pairs": Call(partial(write_convolution, pairs=True), known=(5, 6)),
+    "convolved": Call(write_convolved, known=(5, 6)),
+    "add_ends": Call(write_ends, known=(4, 5)),
+    "add_ends_of_pairs": Call(partial(write_ends, pairs=True), known=(4, 5)),
     "combine": Call(write_combination, known=(3,)),
     "combine_tangents": Call(write_combination_of_tangents, known=(3, 5)),
     "divided_dot_product": Call(write_divided_dot_product),

@@ -16,6 +16,12 @@ def indented(statements: Iterable[str]) -> list[str]:
     return [f"    {statement}" for statement in statements]
 
 
+def below_highest(statements: Iterable[str]) -> list[str]:
+    """Statements for an order that has a next one."""
+    found = indented(statements)
+    return ["if o < order:", *found] if found else []
+
+
 def padded(width: int, whole: int = NARROW) -> int:
     """A width rounded up to a multiple of ``whole``."""
     return -(-width // whole) * whole
@@ -63,19 +69,19 @@ class StateLoop:
         """Statements for order zero."""
         block = self.block
         begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
-        # Order one is read before it is written, and multiplied by factors that are still zero.
-        nothing = f"store_row(out, 1, 0, ({'0.0, ' * len(self.front)}))"
-        before = [nothing, *self._sums("1"), *(f"{name} = 0.0" for name in block.before())]
-        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *before]
+        last = [f"{name} = 0.0" for name in self._last()]
+        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *self._sums("1"), *last]
 
     def higher(self) -> list[str]:
-        """Statements for order ``o``; ``shrink`` is 1/o."""
+        """Statements for order ``o``; ``shrink`` is 1/o. No order comes after ``order``."""
         block = self.block
         inner = [f"{block.prefix}s{i} = out[o, {block.prefix}c{i}]" for i in range(len(block.pairs))]
         step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
-        after = [f"{name} = {value}" for name, value in block.before().items()]
-        sums = [*inner, *self._sums("o + 1")]
-        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *after]
+        sums = below_highest(self._sums("o + 1"))
+        ends = self._ends()
+        sums = [*inner, *ends, *sums] if self._is_short else [*ends, *sums, *inner]
+        last = [f"{name} = {value}" for name, value in self._last().items()]
+        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *last]
 
     def _separate(self) -> list[str]:
         """Write the columns of ``y`` that are not among the first ones, one by one."""
@@ -92,11 +98,46 @@ class StateLoop:
         return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
 
     def _sums(self, order: str) -> list[str]:
+        """The terms of an order that contain no order above the last but one."""
+        name = "convolve" if self.block.common_left else "convolve_pairs"
+        return [f"{name}(out, {order}, 2, {factors})" for factors in self._factors()]
+
+    @property
+    def _is_short(self) -> bool:
+        """Whether an order takes no longer than it takes to write a register and to read it."""
+        return len(self.block.pairs) <= NARROW
+
+    def _last(self) -> dict[str, str]:
+        """Names of all factors' coefficients in the order before, with their values at the end of an order.
+
+        Order two has one term with them. With few convolutions it is faster to keep them than to read them.
+        """
+        if not self._is_short:
+            return {}
+        found = {}
+        for i, ((left, _), value) in enumerate(self.block.pairs.items()):
+            found[f"{self.block.prefix}q{i}"] = f"out[o, {left}] if o > 1 else 0.0"
+            found[f"{self.block.prefix}p{i}"] = value
+        return found
+
+    def _ends(self) -> list[str]:
+        """The terms of order ``o`` with the order before; order one has none."""
+        prefix, common = self.block.prefix, self.block.common_left
+        name = "add_ends" if common else "add_ends_of_pairs"
+        found = [f"{name}(out, o, {factors})" for factors in self._factors()]
+        if self._is_short:
+            found = []
+            for i, (left, _) in enumerate(self.block.pairs):
+                ends = f"{prefix}q{i}*out[1, {prefix}c{i}] + out[1, {left}]*{prefix}p{i}"
+                found.append(f"{prefix}s{i} = {prefix}s{i} + {ends}")
+        return ["if o > 1:", *indented(found)] if found else []
+
+    def _factors(self) -> list[str]:
+        """Columns of the factors of all convolutions, their number and the widest register, as text."""
         common = self.block.common_left
-        name = "convolve_pairs" if common is None else "convolve"
-        factors = [(common or each.left, each.right, padded(len(each.places))) for each in self.layers()]
         return [
-            f"{name}(out, {order}, 2, {left}, {right}, {width}, {WIDE})" for left, right, width in factors
+            f"{common or each.left}, {each.right}, {padded(len(each.places))}, {WIDE}"
+            for each in self.layers()
         ]
 
 
@@ -132,16 +173,14 @@ class TangentLoop:
     def higher(self) -> list[str]:
         """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
         block = self.block
-        sums, inner = [], []
+        sums = []
         for i, (left, rights) in enumerate(block.blocks.items()):
-            base = f"{block.prefix}b{i}"
-            sums.append(f"convolve(out, o, 1, {left}, {base}, {NARROW * len(rights)}, {WIDE})")
-            inner += [
-                f"{block.prefix}s{i}_{place} = load(out, o, {base} + {NARROW * place})"
-                for place in range(len(rights))
-            ]
+            names = "".join(f"{block.prefix}s{i}_{place}, " for place in range(len(rights)))
+            factors = f"{left}, {block.prefix}b{i}, {NARROW * len(rights)}, {WIDE}"
+            sums.append(f"{names}= convolved(out, o, 1, {factors})")
         later = self._later("o + 1", "later*({})")
-        return ["later = 1.0/(o + 1)", *self._each([*sums, *inner, *block.higher, *later])]
+        statements = self._each([*sums, *block.higher, *later])
+        return below_highest(["later = 1.0/(o + 1)", *statements])
 
     def _later(self, order: str, value: str) -> list[str]:
         return [

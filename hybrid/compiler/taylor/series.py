@@ -49,11 +49,11 @@ class Recurrences:
 
     The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
-    ``o``. Convolutions are split. The terms at both ends contain coefficients of this order and the one
-    before. All terms between contain only lower orders, so they are summed early, all convolutions side by
-    side. ``pairs`` lists these convolutions: the column of the first factor and the second factor, with the
-    text of the second factor's coefficient. In every sum, the term known last is added last, so that only one
-    addition waits for it.
+    ``o``. Convolutions are split. The terms at both ends contain coefficients of this order. All terms
+    between contain only lower orders, so they are summed early, all convolutions side by side, and those with
+    the order before come last. ``pairs`` lists these convolutions: the column of the first factor and the
+    second factor, with the text of the second factor's coefficient. In every sum, the term known last is
+    added last, so that only one addition waits for it.
 
     With ``lanes``, a coefficient holds four numbers, one per tangent vector, in four columns. The four are
     written and read as one vector, which is fast even right after the order before was written. ``blocks``
@@ -100,9 +100,8 @@ class Recurrences:
         self.first: list[str] = []
         self.higher: list[str] = []
         self.pairs: dict[tuple[str, sympy.Expr], str] = {}
-        # The place of each pair, and that of the first pair with each first factor.
+        # The place of each pair.
         self.places: dict[tuple[str, sympy.Expr], int] = {}
-        self.lefts: dict[str, int] = {}
         self.blocks: dict[str, list[sympy.Expr]] = {}
         self.variables: dict[sympy.Expr, str] = {}
         self.slopes: dict[sympy.Expr, str] = {}
@@ -209,23 +208,7 @@ class Recurrences:
             return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {NARROW * place}"
         self.pairs.setdefault((left, right), "")
         place = self.places.setdefault((left, right), len(self.places))
-        self.lefts.setdefault(left, place)
-        column = f"{self.prefix}c{place}"
-        # The second factor often depends on the first and is known later, so its term is added last.
-        inner = f"{self.prefix}s{place} + {self._left_before(left)}*out[1, {column}]"
-        return f"({inner} + out[1, {left}]*{self.prefix}p{place})", column
-
-    def _left_before(self, left: str) -> str:
-        """Name of the coefficient of a first factor in the order before."""
-        return f"{self.prefix}q{self.lefts[left]}"
-
-    def before(self) -> dict[str, str]:
-        """Names of all factors' coefficients in the order before, with their values at the end of an order.
-
-        Order one has no terms with them. In order two, both terms are the same, so one is set to zero.
-        """
-        lefts = {self._left_before(left): f"out[o, {left}] if o > 1 else 0.0" for left, _ in self.pairs}
-        return lefts | {f"{self.prefix}p{i}": value for i, value in enumerate(self.pairs.values())}
+        return f"{self.prefix}s{place}", f"{self.prefix}c{place}"
 
     @property
     def common_left(self) -> str | None:

@@ -9,7 +9,7 @@ one vector data that it has just written as several. So the columns of the state
 import numpy as np
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, overload, register_jitable
+from numba.extending import intrinsic, overload
 
 from hybrid.kernels.arithmetic.lanes import HERE, matrix_of
 from hybrid.kernels.instructions.registers import (
@@ -30,10 +30,16 @@ def convolve(series, order, inset, left, first, width, widest):
     multiple of 4. No register is wider than ``widest``. ``width`` and ``widest`` are known at compile time.
     The terms left out at both ends have the coefficients of the highest orders.
     """
+    sums = convolved(series, order, inset, left, first, width, widest)
+    series[order, first : first + width] = np.concatenate(sums)
+
+
+def convolved(series, order, inset, left, first, width, widest):
+    """The sums of ``convolve`` as registers of four numbers; nothing is written."""
     sums = np.zeros(width)
     for j in range(inset, order - inset + 1):
         sums += series[j, left] * series[order - j, first : first + width]
-    series[order, first : first + width] = sums
+    return [sums[place : place + NARROW] for place in range(0, width, NARROW)]
 
 
 def convolve_pairs(series, order, inset, left, first, width, widest):
@@ -42,6 +48,22 @@ def convolve_pairs(series, order, inset, left, first, width, widest):
     for j in range(inset, order - inset + 1):
         sums += series[j, left : left + width] * series[order - j, first : first + width]
     series[order, first : first + width] = sums
+
+
+def add_ends(series, order, left, first, width, widest):
+    """Add the first and the last term to the sums of ``convolve`` with ``inset`` 1 that were begun with 2."""
+    sums = series[1, left] * series[order - 1, first : first + width]
+    if order > 2:
+        sums = sums + series[order - 1, left] * series[1, first : first + width]
+    series[order, first : first + width] += sums
+
+
+def add_ends_of_pairs(series, order, left, first, width, widest):
+    """As ``add_ends``, for the sums of ``convolve_pairs``."""
+    sums = series[1, left : left + width] * series[order - 1, first : first + width]
+    if order > 2:
+        sums = sums + series[order - 1, left : left + width] * series[1, first : first + width]
+    series[order, first : first + width] += sums
 
 
 def evaluate(series, order, s, first, width):
@@ -95,13 +117,42 @@ def spread_tangents(y, n, series, first, stride):
             series[0, column + NARROW * i] = y[n * (1 + vector) + i] if vector < count else 0.0
 
 
-@register_jitable
 def gather_tangents(series, order, n, first, stride, y):
     """The inverse of ``spread_tangents``, from row ``order``."""
     for vector in range(len(y) // n - 1):
         column = first + vector // NARROW * stride + vector % NARROW
         for i in range(n):
             y[n * (1 + vector) + i] = series[order, column + NARROW * i]
+
+
+@overload(gather_tangents, jit_options=HERE)
+def _overload_gather_tangents(series, order, n, first, stride, y):
+    return lambda series, order, n, first, stride, y: _gather(series, order, n, first, stride, y)
+
+
+@intrinsic
+def _gather(typing_context, series, order, n, first, stride, y):
+    """``gather_tangents`` without a look at the signs of its indices."""
+
+    def generate(context, builder, signature, arguments):
+        matrix, order, n, first, stride, vector = arguments
+        rows = matrix_of(context, builder, series, matrix)
+        target = context.make_array(y)(context, builder, vector)
+        [length] = cgutils.unpack_tuple(builder, target.shape)
+        number = n.type
+        lanes = number(NARROW)
+        count = builder.sub(builder.sdiv(length, n), number(1))
+        with cgutils.for_range(builder, count, intp=number) as each:
+            block, lane = builder.sdiv(each.index, lanes), builder.srem(each.index, lanes)
+            column = builder.add(builder.add(first, builder.mul(block, stride)), lane)
+            source = rows.address(order, column)
+            begin = builder.gep(target.data, [builder.mul(n, builder.add(each.index, number(1)))])
+            with cgutils.for_range(builder, n, intp=number) as component:
+                value = builder.load(builder.gep(source, [builder.mul(component.index, lanes)]))
+                builder.store(value, builder.gep(begin, [component.index]))
+        return context.get_dummy_value()
+
+    return types.void(series, types.intp, types.intp, types.intp, types.intp, y), generate
 
 
 @overload(evaluate, jit_options=HERE)

@@ -138,6 +138,16 @@ def largest(lanes):
     return max(lanes)
 
 
+def largest_of_each(a, b, c, d):
+    """The largest number of each of four registers, as one register."""
+    return np.array([max(a), max(b), max(c), max(d)])
+
+
+def places():
+    """The places of the numbers in a register, as numbers from 0 on."""
+    return np.arange(float(NARROW))
+
+
 def _operation(instruction):
     """An intrinsic for an operation on two registers, or on a register and a number."""
 
@@ -201,6 +211,30 @@ def _reduce_to_largest(typing_context, lanes):
     return types.float64(LANES), generate
 
 
+@intrinsic
+def _reduce_each_to_largest(typing_context, a, b, c, d):
+    def generate(context, builder, signature, arguments):
+        def chosen(one, other, *places):
+            mask = ir.Constant(ir.VectorType(ir.IntType(32), NARROW), list(places))
+            return builder.shuffle_vector(one, other, mask)
+
+        def larger_of_pairs(one, other):
+            return _larger_of(builder, chosen(one, other, 0, 4, 2, 6), chosen(one, other, 1, 5, 3, 7))
+
+        low, high = larger_of_pairs(*arguments[:2]), larger_of_pairs(*arguments[2:])
+        return _larger_of(builder, chosen(low, high, 0, 1, 4, 5), chosen(low, high, 2, 3, 6, 7))
+
+    return LANES(LANES, LANES, LANES, LANES), generate
+
+
+@intrinsic
+def _count_places(typing_context):
+    def generate(context, builder, signature, arguments):
+        return vector_of(NARROW)([float(place) for place in range(NARROW)])
+
+    return LANES(), generate
+
+
 _add, _subtract, _multiply, _divide = (_operation(name) for name in ("fadd", "fsub", "fmul", "fdiv"))
 _square_root, _magnitude = _function_of_each("sqrt"), _function_of_each("fabs")
 
@@ -252,3 +286,13 @@ def _overload_larger(a, b):
 @overload(largest, jit_options=HERE)
 def _overload_largest(lanes):
     return lambda lanes: _reduce_to_largest(lanes)
+
+
+@overload(largest_of_each, jit_options=HERE)
+def _overload_largest_of_each(a, b, c, d):
+    return lambda a, b, c, d: _reduce_each_to_largest(a, b, c, d)
+
+
+@overload(places, jit_options=HERE)
+def _overload_places():
+    return lambda: _count_places()

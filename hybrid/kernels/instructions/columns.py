@@ -1,11 +1,15 @@
 """LLVM's instructions for series side by side in vector registers (``hybrid.kernels.arithmetic.columns``)."""
 
+from llvmlite import ir
+
 from hybrid.kernels.instructions.loops import loop, variable
 from hybrid.kernels.instructions.registers import everywhere, multiply_add, read, vector_of, write
 from hybrid.kernels.types.codes import NARROW, WIDE
 
-# Number of partial sums: in one sum, each term waits for the previous term.
+# Number of partial sums: in one sum, each term waits for the previous term. All sums together take at most
+# this many of the sixteen registers of four numbers.
 AT_ONCE = 4
+MOST_REGISTERS = 12
 
 
 def _registers(width, widest):
@@ -17,8 +21,27 @@ def _registers(width, widest):
 
 def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
     """The instructions of ``convolve``, or of ``convolve_pairs``."""
+    target = rows.address(order, first)
+    for place, total in _convolution(builder, rows, order, inset, left, first, width, widest, pairs):
+        write(builder, total, rows.beside(target, place))
+
+
+def write_convolved(builder, rows, order, inset, left, first, width, widest):
+    """The instructions of ``convolved``; returns the registers."""
+    found = []
+    for _, total in _convolution(builder, rows, order, inset, left, first, width, widest, False):
+        for lane in range(0, total.type.count, NARROW):
+            lanes = ir.Constant(ir.VectorType(ir.IntType(32), NARROW), list(range(lane, lane + NARROW)))
+            found.append(builder.shuffle_vector(total, total.type(ir.Undefined), lanes))
+    return found
+
+
+def _convolution(builder, rows, order, inset, left, first, width, widest, pairs):
+    """The instructions for the sums of a convolution; yields each register with its first column."""
     registers = _registers(width, widest)
-    sums_at_once = max(1, AT_ONCE // len(registers))
+    sums_at_once = AT_ONCE
+    while sums_at_once > 1 and sums_at_once * width > MOST_REGISTERS * NARROW:
+        sums_at_once //= 2
     number = order.type
     # Start with the lowest orders of the columns: the orders written last are the slowest to read.
     factor = rows.walker(builder.sub(order, inset), left)
@@ -46,12 +69,31 @@ def write_convolution(builder, rows, order, inset, left, first, width, widest, p
     if sums_at_once > 1:
         with loop(builder, number(0), builder.urem(terms, number(sums_at_once)), number(1)):
             add_term(totals[0])
-    target = rows.address(order, first)
     for i, (place, _) in enumerate(registers):
         parts = [builder.load(each[i]) for each in totals]
         while len(parts) > 1:
             parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
-        write(builder, parts[0], rows.beside(target, place))
+        yield place, parts[0]
+
+
+def write_ends(builder, rows, order, left, first, width, widest, pairs=False):
+    """The instructions of ``add_ends``, or of ``add_ends_of_pairs``."""
+    number = order.type
+    below = builder.sub(order, number(1))
+    differ = builder.icmp_signed(">", order, number(2))
+    here, one, last = (rows.address(row, first) for row in (order, number(1), below))
+    left_one, left_last = (rows.address(row, left) for row in (number(1), below))
+    for place, lanes in _registers(width, widest):
+        nothing = vector_of(lanes)([0.0] * lanes)
+        if pairs:
+            low, high = (read(builder, rows.beside(each, place), lanes) for each in (left_one, left_last))
+        else:
+            low, high = (everywhere(builder, builder.load(each), lanes) for each in (left_one, left_last))
+        high = builder.select(differ, high, nothing)
+        total = read(builder, rows.beside(here, place), lanes)
+        total = multiply_add(builder, high, read(builder, rows.beside(one, place), lanes), total)
+        total = multiply_add(builder, low, read(builder, rows.beside(last, place), lanes), total)
+        write(builder, total, rows.beside(here, place))
 
 
 def _weighted_sum(builder, factors, terms):

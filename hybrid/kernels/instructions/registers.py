@@ -29,8 +29,8 @@ def built_in(builder, name, width, *arguments):
 
 
 def multiply_add(builder, a, b, c):
-    """``a * b + c``."""
-    return builder.fadd(c, builder.fmul(a, b, flags=FUSED), flags=FUSED)
+    """``a * b + c`` as one operation: LLVM does not fuse by itself what it adds to the sum of a loop."""
+    return built_in(builder, "fmuladd", c.type.count, a, b, c)
 
 
 class Matrix:
@@ -79,13 +79,17 @@ def write_down(builder, matrix, row, column, stride, lanes):
 
 
 def write_row(builder, matrix, row, column, numbers):
-    """The instructions of ``store_row``."""
+    """The instructions of ``store_row``.
+
+    A processor stalls when it reads as one register what has just been written as two.
+    """
     address = matrix.address(row, column)
-    for i, width in enumerate(widths(len(numbers))):
-        vector = vector_of(width)([0.0] * width)
-        for lane, value in enumerate(numbers[WIDE * i : WIDE * (i + 1)]):
+    for place in range(0, sum(widths(len(numbers))), NARROW):
+        vector = vector_of(NARROW)([0.0] * NARROW)
+        for lane, value in enumerate(numbers[place : place + NARROW]):
             vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
-        write(builder, vector, matrix.beside(address, WIDE * i))
+        target = builder.bitcast(matrix.beside(address, place), vector.type.as_pointer())
+        builder.store(vector, target, align=8, whole=True)
 
 
 def whole_registers(width, register):

@@ -13,16 +13,7 @@ from numba import njit
 from hybrid.kernels.arithmetic.bernstein import first_crossing
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
-from hybrid.kernels.arithmetic.lanes import (
-    four_times,
-    larger,
-    largest,
-    load,
-    magnitude,
-    square_root,
-    store,
-)
-from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
+from hybrid.kernels.arithmetic.powers import power_of_two
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.onset import BY_SPEED
@@ -32,6 +23,13 @@ from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.events.touches import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.steps.series_guards import earliest_on_series, powers_on_step, to_bernstein
+from hybrid.kernels.steps.series_length import (
+    EXACT_TOLERANCE,
+    MOST_BITS,
+    is_regular,
+    longest_step,
+    within_floats,
+)
 from hybrid.kernels.steps.series_roots import expanded_at, time_of
 from hybrid.kernels.steps.step import moves_nothing, rates_by_jacobian
 from hybrid.kernels.types.codes import (
@@ -54,29 +52,6 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 from hybrid.kernels.types.task import task_of
 
-# Series that can be trusted to the last digit are cut off below rounding.
-EXACT_TOLERANCE = 1e-17
-# Share of the largest component that serves as absolute tolerance for the others.
-SHARE = 1e-3
-SAFETY = 0.9
-# Share of the tolerance for tangent vectors: a stiff contact stretches a vector a thousandfold and shrinks it
-# again, and the error made while the vector is long remains when it is short.
-TANGENT_SHARE = 0.1
-# Below this tolerance the error of tangent vectors is rounding.
-FINEST = 1e-14
-# Absolute tolerance of exact series, which need none.
-TINY = 1e-300
-# Number of terms at the end of a series that must be small.
-TAIL = 8
-TAIL_OF_EXACT = 3
-# Number of terms before these that must suggest about the same step. The logarithm of the quotient of both
-# steps: more if the terms before suggest a shorter one, as in a gap, or a longer one, as at the end of a gap.
-BEFORE_TAIL = 5
-LEAST_RISE = -0.5
-NEWER = 4
-MOST_RISE = 0.2
-# The same for exact modes, whose terms fall ever faster.
-MOST_RISE_OF_EXACT = 1.0
 # The field and the slope of a series may differ by the tolerance over this share of a step.
 SHARE_OF_STEP = 0.25
 MOST_HALVINGS = 1000
@@ -85,11 +60,6 @@ SHORTER = 0.75
 MOST_SHORTER = 100
 # Rounding of a state by which the noise of its field is measured.
 ROUNDING = 8.0 * EPSILON
-# The terms of a series must be normal floats, from 2**-1022 to 2**1024. In units of time far from its pace
-# they grow or fall by as many bits per order as the step has. All orders together may take this many.
-MOST_BITS = 900.0
-# How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
-FALL_OF_EXACT = 4.0
 # Largest correction of a landing, as a share of the step.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
@@ -102,109 +72,6 @@ CRAWL = 1e-4
 MOST_CRAWLING = 100
 # Below this share of the time the excess is too small for a step.
 NEXT_TO_NOTHING = 1e-10
-
-
-@njit(**INLINE)
-def weigh_state(series, n, rtol, atol, exact, weights):
-    """One over the tolerance of each component of the state into ``weights``; all other weights are zero."""
-    largest = 0.0
-    for i in range(n if exact else 0):
-        largest = max(largest, abs(series[0, i]))
-    if exact and largest == 0.0:
-        # At rest at the origin, the first terms determine the size.
-        for i in range(n):
-            largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
-    floor = SHARE * rtol * largest + TINY if exact else atol + TINY
-    for i in range(0, n, NARROW):
-        store(weights, 0, i, 1.0 / (floor + rtol * magnitude(load(series, 0, i))))
-    for i in range(n, whole_registers(n, NARROW)):
-        weights[0, i] = 0.0
-
-
-@njit(**INLINE)
-def weigh_tangents(series, n, first, rtol, exact, weights):
-    """One over the tolerance of every component of four tangent vectors, each measured against itself."""
-    square = four_times(0.0)
-    for i in range(n):
-        component = load(series, 0, first + NARROW * i)
-        square = component * component + square
-    if not exact:
-        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST))
-    floor = (SHARE * rtol if exact else rtol) * square_root(square / n) + TINY
-    for i in range(n):
-        component = load(series, 0, first + NARROW * i)
-        store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
-
-
-@njit(**KERNEL)
-def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights):
-    """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
-
-    The tolerances are those of the Runge-Kutta methods, each tangent vector a block by itself. The last
-    term is to be the tolerance. One term is not enough, on the clock of a contact only every fifth may be
-    there: the ones before must be on their way, below the powers of ``rtol`` that lead to it. The series of
-    exact modes fall faster than any power, what is behind their last term is next to nothing, and three of
-    their terms are enough. ``weights (1, columns)`` is scratch.
-
-    Returned second is whether the terms of the state before those suggest about the same step. A series may
-    have gaps, as that of ``t - x**9`` near zero: then small terms say nothing of those that follow. Nor do
-    terms that grow over the step.
-    """
-    weigh_state(series, n, rtol, atol, exact, weights)
-    for g in range(groups):
-        weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
-    fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
-    decisive = four_times(-math.inf)
-    newer, older = four_times(0.0), four_times(0.0)
-    for o in range(order, order - (TAIL_OF_EXACT if exact else TAIL), -1):
-        # A nan is skipped here; it shows when the series is summed.
-        worst = four_times(0.0)
-        for i in range(0, n, NARROW):
-            worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
-        for g in range(groups):
-            for i in range(first + g * stride, first + g * stride + NARROW * n, NARROW):
-                worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
-        decisive = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), decisive)
-        if order - o < NEWER:
-            newer = larger(worst, newer)
-        else:
-            older = larger(worst, older)
-    tail = order - (TAIL_OF_EXACT if exact else TAIL)
-    earlier = four_times(-math.inf)
-    for o in range(tail, max(tail - BEFORE_TAIL, 0), -1):
-        worst = four_times(0.0)
-        for i in range(0, n, NARROW):
-            worst = larger(load(weights, 0, i) * magnitude(load(series, o, i)), worst)
-        earlier = larger((binary_logarithms(worst) - fall * (order - o)) * (1.0 / o), earlier)
-    last, before = largest(decisive), largest(earlier)
-    most = MOST_RISE_OF_EXACT if exact else MOST_RISE
-    regular = LEAST_RISE <= before - last <= most if tail > 0 else last > -1000.0
-    if not exact and regular:
-        # If the newer terms are larger on the step than the older ones, those to come are larger yet.
-        growth = largest(binary_logarithms(newer)) - largest(binary_logarithms(older))
-        regular = growth <= 0.5 * TAIL * last
-    return (1.0 if exact else SAFETY) * power_of_two(-last), regular
-
-
-@njit(**KERNEL)
-def within_floats(series, n, first, stride, groups, order, rtol, atol, exact, weights):
-    """The order up to which the terms of a series are normal floats, with its longest step.
-
-    Units of time far from the pace of the solution make the later terms overflow or vanish. Terms that vanish
-    in a low order, too, are those of a polynomial, and the order stays as it is.
-    """
-    least, highest = (TAIL_OF_EXACT if exact else TAIL) + 1, order
-    h, regular = longest_step(series, n, first, stride, groups, least, rtol, atol, exact, weights)
-    if not least * abs(math.log2(h)) <= MOST_BITS:
-        h, regular = longest_step(series, n, first, stride, groups, highest, rtol, atol, exact, weights)
-        return highest, h, regular
-    while order > least:
-        h, regular = longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights)
-        most = int(MOST_BITS / abs(math.log2(h)))
-        if order <= most:
-            break
-        order = max(least, most)
-    return order, h, regular
 
 
 @njit(**KERNEL)
@@ -375,14 +242,16 @@ def series_step(task, remaining):
     model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
     run.steps += 1
     rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
-    h, regular = math.inf, True
+    h, last, growth = math.inf, 0.0, 0.0
     if degree == 0:
         start, stride = model.tangent_start, model.tangent_columns[mode]
         groups = whole_registers(tangents, NARROW) // NARROW
-        h, regular = longest_step(series, n, start, stride, groups, order, rtol, atol, exact, work.weights)
+        h, last, growth = longest_step(
+            series, n, start, stride, groups, order, rtol, atol, exact, work.weights
+        )
         reach = power_of_two(MOST_BITS / order)
         if not 1.0 < h * reach < reach * reach:
-            order, h, regular = within_floats(
+            order, h, last, growth = within_floats(
                 series, n, start, stride, groups, order, rtol, atol, exact, work.weights
             )
     if not h > 0.0 or (model.fragile[mode] == 1 and clock < 0 and moves_nothing(model, run, series, h)):
@@ -397,7 +266,11 @@ def series_step(task, remaining):
         h = attempts.explained_series(model, method, run, tangents, order, clock, h, work)
         if not h > 0.0:
             return NON_FINITE, 0.0
-    elif not regular and clock < 0:
+    elif (
+        degree == 0
+        and clock < 0
+        and not is_regular(series, n, order, rtol, exact, work.weights, last, growth)
+    ):
         h = followed(model, method, run, order, t, h, work)
     evaluate_with_sizes(series, order, h, 0, front)
     total = 0.0

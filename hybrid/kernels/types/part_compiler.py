@@ -22,6 +22,7 @@ THOROUGHLY = (
     "hybrid.kernels.arithmetic.tangent",
     "hybrid.kernels.steps.series",
     "hybrid.kernels.steps.series_guards",
+    "hybrid.kernels.steps.series_length",
     "hybrid.kernels.steps.series_roots",
 )
 # Numba's passes that change nothing in a kernel. The legalisation marks where variables end, which only

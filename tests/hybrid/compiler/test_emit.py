@@ -252,6 +252,33 @@ def test_what_is_proved():
     assert unknown.autonomous == unknown.affine_guard == (False,)
 
 
+def test_guards_tell_whether_a_field_may_change_abruptly():
+    """A maximum, a sign or a quotient by a size that the sign of a guard decides inside the mode is none."""
+    pushes = {
+        "force of a contact": lambda u: np.maximum(u, 0.0) ** 1.5,
+        "sign": lambda u: u * np.sign(u),
+        "quotient by its size": lambda u: u / np.abs(u),
+        "saturation": lambda u: np.tanh(1e9 * u),
+        "sine": np.sin,
+    }
+    found = {}
+    for name, push in pushes.items():
+        field = lambda t, x, p, push=push: (x.v, -push(x.q))  # noqa: E731
+        system = HybridSystem(
+            state=("q", "v"),
+            modes=[Mode("beyond", field), Mode("everywhere", field)],
+            transitions=[Transition("beyond", "everywhere", Guard(lambda t, x, p: x.q, -1))],
+        )
+        found[name] = emit(system).abrupt
+    assert found == {
+        "force of a contact": (False, True),
+        "sign": (False, True),
+        "quotient by its size": (False, True),
+        "saturation": (True, True),
+        "sine": (False, False),
+    }
+
+
 def test_a_constant_slope_between_jumps_is_not_affine():
     for force in (lambda t, x: -np.sign(x.v), lambda t, x: np.mod(x.q, 1.0)):
         [found] = emit(mode_system(lambda t, x, p, force=force: (x.v, force(t, x)))).propagators

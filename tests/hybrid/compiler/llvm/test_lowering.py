@@ -254,6 +254,9 @@ def test_lines_are_read_by_llvm():
     builder.store(
         builder.sub(bits, WHOLE(1)), builder.gep(builder.bitcast(address, WHOLE.as_pointer()), [index])
     )
+    builder.store(value, here, align=8, whole=True)
     builder.ret_void()
     binding.parse_assembly(str(module)).verify()
     assert "fmul contract double" in str(module)
+    # LLVM takes no volatile store apart.
+    assert str(module).count("store volatile double") == 1

@@ -51,6 +51,48 @@ def test_convolve():
             np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
 
 
+def test_the_sums_of_a_convolution_as_registers():
+    widths = (4, 8, 12, 20, 36, 60)
+    lines = []
+    for i, width in enumerate(widths):
+        names = "".join(f"r{place}, " for place in range(0, width, 4))
+        lines += [f"if index == {i}:", f"    {names}= convolved(out, order, 1, 3, 63, {width}, 8)"]
+        lines += [f"    store(out, order, {63 + place}, r{place})" for place in range(0, width, 4)]
+    as_python, as_machine_code = both(lines, fused=True)
+    for i, width in enumerate(widths):
+        for order in (1, 2, 3, 4, 7, 28):
+            series, plain = pair(124)
+            expected = sum(plain[j, 3] * plain[order - j, 63 : 63 + width] for j in range(1, order))
+            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
+            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+            np.testing.assert_allclose(plain[order, 63 : 63 + width], expected, rtol=1e-13, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("convolve", "ends"), [("convolve", "add_ends"), ("convolve_pairs", "add_ends_of_pairs")]
+)
+def test_a_convolution_in_two_parts(convolve, ends):
+    """The terms with the order before are added to the others later."""
+    widths = (4, 8, 12, 20, 36)
+    lines = []
+    for i, width in enumerate(widths):
+        lines += [
+            f"if index == {i}:",
+            f"    {convolve}(out, order, 2, 3, 43, {width}, 8)",
+            f"    {ends}(out, order, 3, 43, {width}, 8)",
+        ]
+    whole, _ = both([f"{convolve}(out, order, 1, 3, 43, 36, 8)"], fused=True)
+    for run in both(lines, fused=True):
+        for i, width in enumerate(widths):
+            for order in (2, 3, 4, 7, 28):
+                series, plain = pair(80)
+                whole(0, 0.0, NOTHING, NOTHING, order, plain)
+                run(i, 0.0, NOTHING, NOTHING, order, series)
+                both_parts = series[order, 43 : 43 + width]
+                np.testing.assert_allclose(both_parts, plain[order, 43 : 43 + width], rtol=1e-12, atol=1e-13)
+
+
 @pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
 @pytest.mark.parametrize("order", [1, 2, 3, 13, 28, 30])
 @pytest.mark.parametrize(

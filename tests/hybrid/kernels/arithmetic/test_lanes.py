@@ -9,8 +9,10 @@ from hybrid.kernels.arithmetic.lanes import (
     four_times,
     larger,
     largest,
+    largest_of_each,
     load,
     magnitude,
+    places,
     square_root,
     store,
 )
@@ -53,6 +55,20 @@ def test_the_largest_wherever_it_is(place):
     numbers = np.array([[-3.0, 1.0, 0.5, -7.0]])
     numbers[0, place] = 2.0
     assert compiled(numbers) == largest(load(numbers, 0, 0)) == 2.0
+
+
+def test_the_largest_of_each_of_four_registers():
+    def largest_of_rows(matrix):
+        rows = load(matrix, 0, 0), load(matrix, 1, 0), load(matrix, 2, 0), load(matrix, 3, 0)
+        store(matrix, 4, 0, largest_of_each(*rows) + 10.0 * places())
+
+    for seed in range(20):
+        matrix = np.random.default_rng(seed).normal(size=(5, 4))
+        plain = matrix.copy()
+        njit(largest_of_rows)(matrix)
+        largest_of_rows(plain)
+        np.testing.assert_array_equal(matrix, plain)
+        np.testing.assert_array_equal(plain[4], plain[:4].max(axis=1) + 10.0 * np.arange(4))
 
 
 @pytest.mark.parametrize(
