@@ -37,7 +37,8 @@ def check_solver(solver: object) -> Solver:
 class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
-    ``task`` lacks only what a run has for itself. ``model`` is that at the default parameters.
+    ``task`` lacks only what a run has for itself. ``model`` is that at the default parameters,
+    see ``CompiledSystem.moved_by``.
     ``propagators`` says how each mode is advanced, by the name of the mode; ``degree`` is that of the steps
     in a record.
     """
