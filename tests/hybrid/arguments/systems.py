@@ -20,9 +20,9 @@ from tests.hybrid.arguments.values import (
     call,
 )
 
-
 BAD_STATES = [
-    None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), math.nan, 2**70, [["q", "v"], ["w"]], np.array(["q"])[:, None],
+    None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), math.nan, 2**70,
+    [["q", "v"], ["w"]], np.array(["q"])[:, None],
 ]  # fmt: skip
 
 
