@@ -63,6 +63,11 @@ def poincare():
     found = hybrid.poincare_section(system, start, rising, points=10**9)
     kept(found, len(found) > 100)
 
+def missed():
+    never = hybrid.Guard(lambda t, x, p: x.v - 1e9, +1)
+    found = hybrid.poincare_section(system, start, never, points=2)
+    kept(found, len(found))
+
 def orbit():
     found = hybrid.periodic_orbit(system, start, periods=10**8, solver=slow)
     kept(found, found.x0.shape)
@@ -111,6 +116,7 @@ CALLS = {
     "two_orbits": "INTERRUPTED 0",
     "strobe": "INTERRUPTED True",
     "poincare": "INTERRUPTED True",
+    "missed": "INTERRUPTED 0",
     "orbit": "INTERRUPTED (2,)",
     "error": "INTERRUPTED INTERRUPTED",
     "work": " ['INTERRUPTED']",
