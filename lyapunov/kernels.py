@@ -55,7 +55,7 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
         code = advance(parts, task, end.cycle, end.phase, max_steps, UNLIMITED)
         if code != DONE:
             return code
-        run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False)
+        run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False, 0)
         run.strain = 0.0
         if run.stage == READY:
             run.stage = STALE

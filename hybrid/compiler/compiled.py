@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from threading import RLock
@@ -186,8 +187,19 @@ class CompiledSystem:
         return self.at(parameters, self._model)
 
     def moved_by(self, moving: Mapping[str, Any], propagator: np.ndarray) -> Any:
-        """A model at its default parameters, with the functions from ``moving`` and these propagators."""
-        return self.at(None, self._model.replace(**moving, propagator=propagator))
+        """A model at its default parameters, with the functions from ``moving`` and these propagators.
+
+        Its period is nan if the default parameters have none; runs at other parameters may have one.
+        """
+        model = self._model.replace(**moving, propagator=propagator)
+        try:
+            return self.at(None, model)
+        except ArgumentError:
+            return model.replace(period=math.nan)
+
+    def given(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
+        """A model from ``moved_by`` at parameter values; itself for None."""
+        return model if parameters is None and model.period >= 0.0 else self.at(parameters, model)
 
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model at parameter values."""

@@ -10,6 +10,7 @@ import math
 
 from hybrid.kernels.types import codes
 from hybrid.simulation.trajectory import Trajectory
+from hybrid.status import StatusCode
 
 # Units in the last place by which the end of a period may miss the jumps there.
 ROUNDING_OF_TIME = 16
@@ -40,6 +41,8 @@ def advance_to_close(trajectory: Trajectory, cycle: int, phase: float) -> int:
         return trajectory.advance_to(cycle, phase, record)
     code = codes.MAX_JUMPS
     while code == codes.MAX_JUMPS:
+        if trajectory.stop.is_set():
+            return StatusCode.INTERRUPTED
         code = trajectory.advance_to(cycle, phase, record, max_jumps=trajectory.jumps + 1)
         if code == codes.MAX_JUMPS and same_time(trajectory.t, cycle * period + phase, period):
             return codes.DONE

@@ -212,6 +212,8 @@ def periodic_orbit(
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
+    if not np.isfinite(t0 + 2 * length):
+        raise arguments.refusal("period", "be a time that the clock can reach twice", length)
     compile_system(system)
     with CTRL_C:
         return _kept(shooting.autonomous(Point(guess, t0, length), tolerance, max_iterations))

@@ -20,7 +20,7 @@ from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import empty_record
 from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
 from hybrid.solvers import Solver
-from hybrid.status import Status
+from hybrid.status import Status, StatusCode
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
@@ -313,6 +313,10 @@ def crossings(
             bar.update(int(marked.sum()))
         goes_on = code in (codes.RECORD_FULL, codes.MAX_JUMPS)
         if not goes_on and not (code == codes.MAX_STEPS and marked.any()):
+            break
+        # Each part of the run may be too short to ask.
+        if trajectory.stop.is_set() and found < points:
+            code = StatusCode.INTERRUPTED
             break
     else:
         code = codes.DONE

@@ -38,8 +38,9 @@ class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
     ``parts_so_far`` are ``parts`` without those that few runs call and that are not compiled yet. ``task``
-    lacks only what a run has for itself. ``model`` is that at the default parameters. ``propagators`` says
-    how each mode is advanced, by the name of the mode; ``degree`` is that of the steps in a record.
+    lacks only what a run has for itself. ``model`` is that at the default parameters, see
+    ``CompiledSystem.moved_by``. ``propagators`` says how each mode is advanced, by the name of the mode;
+    ``degree`` is that of the steps in a record.
     """
 
     method: Any

@@ -53,7 +53,7 @@ def start(
     solver = check_solver(solver)
     tangents = 0 if tangent is None else tangent.shape[1]
     plan = plan_of(compiled, solver, tangents)
-    model = plan.model if parameters is None else compiled.at(parameters, plan.model)
+    model = compiled.given(parameters, plan.model)
     check_time(time, t0, model.period)
     run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
     work = fresh_work(plan.work_layout, plan.method)
@@ -61,7 +61,7 @@ def start(
     if beyond and model.propagator[run.mode] in (codes.DESINGULARISED, codes.ROOTED):
         # These series hold the root of a guard, which may be negative here.
         plan = plan_of(compiled, solver, tangents, by_steps=int(run.mode))
-        model = compiled.at(parameters, plan.model) if parameters else plan.model
+        model = compiled.given(parameters, plan.model)
         work = fresh_work(plan.work_layout, plan.method)
     return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond, stop)
 

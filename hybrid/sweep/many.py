@@ -251,8 +251,7 @@ class _Runs:
         # Before threads need the same kernels.
         plan = self.plan = plan_of(compiled, options["solver"], 0)
         load_kernels("hybrid.kernels.events.many")
-        given = options["parameters"]
-        self.model = compiled.at(given, plan.model) if given else plan.model
+        self.model = compiled.given(options["parameters"], plan.model)
         for time in t_span:
             check_time("t_span", time, self.model.period)
         mode = options["mode"]

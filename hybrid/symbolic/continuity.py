@@ -48,6 +48,7 @@ from hybrid.symbolic.nodes import (
     replaced,
     symbols_of,
 )
+from hybrid.symbolic.ranges import has_one_sign, range_of
 
 # Functions that change by their derivatives, other than sums, products and positive powers.
 GRADUAL = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh, sympy.log)
@@ -77,12 +78,21 @@ def _surfaces(entry: sympy.Expr, states: Sequence[sympy.Symbol]) -> list[str]:
     quotients = nodes_of(WholeQuotient, entry)
     entry = replaced(entry, {each: Floor(each.args[0] / each.args[1]) for each in quotients})
     entry = _with_exact_turns(entry)
-    jumps = (
-        node for node in nodes_of(JUMPS, entry) if mentions(node, states) and not isinstance(node, Level)
-    )
+    jumps = (node for node in nodes_of(JUMPS, entry) if mentions(node, states) and _may_jump(node))
     atoms = sorted(jumps, key=sympy.default_sort_key)
     names = {atom: sympy.Dummy(real=True) for atom in atoms}
     return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
+
+
+def _may_jump(atom: sympy.Expr) -> bool:
+    """Whether an atom may have surfaces where it jumps: an angle turns only left of the origin."""
+    if isinstance(atom, Level):
+        return False
+    if isinstance(atom, Atan2) and range_of(atom.args[1]).positive:
+        return False
+    surface, _ = _sides(atom, ZERO)
+    # The surface of a whole number is one of many, and this is its own.
+    return surface is None or isinstance(atom, (*ROUNDING, *REMAINDERS)) or not has_one_sign(surface)
 
 
 def _is_continuous(entry: sympy.Expr, atom: sympy.Expr, names: Mapping[sympy.Expr, sympy.Dummy]) -> bool:

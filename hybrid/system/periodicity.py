@@ -35,7 +35,11 @@ def period_at(period: Period, variables: Variables, values: np.ndarray) -> float
     """
     if period is None:
         return None
-    found = period(variables.parameter_view(values)) if callable(period) else period
+    try:
+        with np.errstate(all="ignore"):
+            found = period(variables.parameter_view(values)) if callable(period) else period
+    except ArithmeticError as error:
+        raise ArgumentError(f"HybridSystem: period fails: {error}. Check the parameters.") from error
     number = arguments.number("HybridSystem: period", found)
     if number <= 0:
         raise ArgumentError(f"HybridSystem: period must be positive; got {number}. Check the parameters.")

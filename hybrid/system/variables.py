@@ -18,6 +18,7 @@ from hybrid.system.frozen import FrozenMapping
 
 STATE = "State components"
 PARAMETERS = "Parameters"
+MOST_COMPONENTS = 1_000_000
 # Number of named-value classes kept for later models with the same names.
 MOST_CLASSES = 256
 
@@ -184,9 +185,11 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     if isinstance(value, int | np.integer):
         if value < 1:
             raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
+        if value > MOST_COMPONENTS:
+            raise ModelError(f"HybridSystem: state has at most {MOST_COMPONENTS} components; got {value}.")
         return int(value)
     # A set has no order.
-    if not isinstance(value, Sequence | np.ndarray) or np.ndim(value) != 1:
+    if not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1):
         raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)
     names = tuple(value)
     if not names:

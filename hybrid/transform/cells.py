@@ -22,6 +22,7 @@ from hybrid.symbolic.switches import Surfaces, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
 from hybrid.transform import additive
+from hybrid.transform.rounding import combined
 from hybrid.transform.surface import SwitchingSurface
 
 # Two solutions for the shares on an intersection count as one if their relative difference is less than the
@@ -271,7 +272,7 @@ class Pieces:
         """Whether the jumps across two surfaces simply add up."""
         a, b, c, d = (self._vertex_field({**sides, one: i, other: j}) for i, j in product((-2, 2), repeat=2))
         pieces = zip(a, b, c, d, strict=True)
-        return all((w - x - y + z).expand() == 0 for w, x, y, z in pieces)
+        return all(combined((1, w), (-1, x), (-1, y), (1, z)) == 0 for w, x, y, z in pieces)
 
     def shares(self, sides: Sides) -> Shares | None:
         """The shares of the sides of two surfaces whose jumps do not add up; None on other cells."""
@@ -331,9 +332,8 @@ class Pieces:
 def _coefficients(mm: sympy.Expr, mp: sympy.Expr, pm: sympy.Expr, pp: sympy.Expr) -> tuple[sympy.Expr, ...]:
     """Coefficients of 1, a, b and ab of the bilinear function with these values where a, b are -1 or 1."""
     four = sympy.Integer(4)
-    by_a, by_b, by_both = (
-        each.expand() / four for each in (pm + pp - mm - mp, mp + pp - mm - pm, mm + pp - mp - pm)
-    )
+    signs = (-1, -1, 1, 1), (-1, 1, -1, 1), (1, -1, -1, 1)
+    by_a, by_b, by_both = (combined(*zip(each, (mm, mp, pm, pp), strict=True)) / four for each in signs)
     return pp - by_a - by_b - by_both, by_a, by_b, by_both
 
 

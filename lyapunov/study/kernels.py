@@ -284,7 +284,7 @@ def growth_rates(field, p, t, period, y, rtol, atol, rates, work, counters):
             return done
         for c in range(k):
             rates[done, c] = 0.0
-        orthonormalise(y, n, k, rates[done], work, False)
+        orthonormalise(y, n, k, rates[done], work, False, 0)
         for c in range(k):
             rates[done, c] /= period
     return rates.shape[0]

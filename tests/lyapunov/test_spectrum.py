@@ -454,3 +454,27 @@ def test_steps_and_jumps_of_the_transient_are_not_counted(transient):
     assert spectrum.jumps_per_interval == 2.0
     # The start of a run may cost a step.
     assert 3.0 <= spectrum.steps_per_interval <= 3.1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_invertible_reset_annihilates_nothing_on_an_orbit_that_grows(seed):
+    """The entries of its saltation matrix grow with the orbit, until rounding hides a direction."""
+    rng = np.random.default_rng(seed)
+    A, B = 0.5 * rng.normal(size=(2, 2)) + 0.4 * np.eye(2), np.eye(2) + 0.3 * rng.normal(size=(2, 2))
+    system = hybrid.HybridSystem(
+        state=("a", "b", "clock"),
+        modes=[hybrid.Mode("m", lambda t, x, p: (*(A[i, 0] * x.a + A[i, 1] * x.b for i in (0, 1)), 1.0))],
+        transitions=[
+            hybrid.Transition(
+                "m",
+                "m",
+                hybrid.Guard(lambda t, x, p: x.clock - 1, +1),
+                hybrid.Reset(lambda t, x, p: (*(B[i, 0] * x.a + B[i, 1] * x.b for i in (0, 1)), 0.0)),
+            )
+        ],
+    )
+    spectrum = lyapunov.lyapunov_spectrum(system, (1.0, 0.5, 0.1), interval=1.0, intervals=150, transient=0)
+    assert np.isfinite(spectrum.sum_rule)
+    assert np.all(np.isfinite(spectrum.exponents)) or not spectrum.status.ok
+    if spectrum.status.ok:
+        assert abs(spectrum.sum_defect) < 1e-6

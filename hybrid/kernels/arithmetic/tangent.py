@@ -17,6 +17,8 @@ from hybrid.kernels.types.options import KERNEL, exported
 
 # A vector that is shorter than this share of the terms that make it up along itself is only rounding.
 COLLAPSED = 1e-13
+# A pivot is zero if it is smaller than this share of the terms that make it up, and may be below the second.
+SINGULAR, NEARLY_SINGULAR = 1e-14, 1e-12
 # Tangent vectors are orthonormalised once the strain of all jumps since the last orthonormalisation reaches
 # this limit. A condition number of a thousand costs three digits of the vectors that grow less.
 STRAINED = math.log(1e3)
@@ -35,7 +37,7 @@ SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 
 
 @njit(**KERNEL)
-def orthonormalise(y, n, k, growth, sizes, images):
+def orthonormalise(y, n, k, growth, sizes, images, annihilated):
     """Orthonormalise the ``k`` tangent vectors in ``y (n (1 + k),)``.
 
     The logarithms of the lengths taken out are added to ``growth (k,)``. Modified Gram-Schmidt runs twice,
@@ -44,11 +46,11 @@ def orthonormalise(y, n, k, growth, sizes, images):
     Whether what is left of a vector is more than rounding is judged along its own direction, by the sizes of
     the terms that were added to make it up: so the units of the states do not matter. With ``images`` the
     vectors are images by a matrix, and ``sizes (k, n)`` has those of the terms of each component; without,
-    it is scratch. An image that is only rounding has collapsed, because the matrix is singular: its growth is
-    minus infinity and it stays the zero vector. Returns the number of other vectors of which only rounding is
-    left.
+    it is scratch. Images that are only rounding have collapsed if the matrix is singular, and as many of them
+    as directions that it has ``annihilated``: their growth is minus infinity and they stay zero vectors.
+    Returns the number of other vectors of which only rounding is left, or nothing.
     """
-    indistinct = 0
+    indistinct, collapsed = 0, 0
     for c in range(k):
         start, size = n * (1 + c), sizes[c]
         for i in range(n):
@@ -72,12 +74,19 @@ def orthonormalise(y, n, k, growth, sizes, images):
             made_of += abs(share) * (size[i] / largest)
         length = largest * math.sqrt(square)
         distinct = square > COLLAPSED * made_of
-        if length > 0.0 and (distinct or not images):
+        if length > 0.0 and (distinct or not images or collapsed == annihilated):
             growth[c] += math.log(length)
             indistinct += 0 if distinct else 1
             for i in range(start, start + n):
                 y[i] /= length
         else:
+            was_zero = True
+            for i in range(n):
+                was_zero = was_zero and size[i] == 0.0
+            if images and not was_zero and collapsed < annihilated:
+                collapsed += 1
+            elif not was_zero:
+                indistinct += 1
             growth[c] = -math.inf
             for i in range(start, start + n):
                 y[i] = 0.0
@@ -135,7 +144,7 @@ def keep_apart(model, run, mode, tangents, gram):
     n = model.dimension
     if independence(run.y, n, tangents, gram) > closest:
         return
-    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, gram, False)
+    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, gram, False, 0)
     run.strain = 0.0
     if kind == RUNGE_KUTTA and run.stage == READY:
         run.stage = STALE
@@ -217,30 +226,34 @@ def solve(system, n, out):
 
 @njit(**KERNEL)
 def log_abs_determinant(matrix, magnitude, n):
-    """``log |det|`` of a matrix ``(n, n)``; minus infinity if it is singular to rounding.
+    """``log |det|`` of a matrix ``(n, n)``, and how many directions it annihilates, as far as can be told.
 
-    ``magnitude``, of at least that shape, holds the size of the terms that made up each entry. A pivot
-    within the rounding of these terms counts as zero; a pivot that is merely small, as near a grazing, does
-    not. Both are overwritten.
+    The logarithm is minus infinity if the matrix is singular to rounding. ``magnitude``, of at least that
+    shape, holds the size of the terms that made up each entry. A pivot within the rounding of these terms
+    counts as zero; a pivot that is merely small, as near a grazing, does not. Both are overwritten.
     """
-    total = 0.0
+    total, row, annihilated = 0.0, 0, 0
     for column in range(n):
-        pivot = column
-        for i in range(column + 1, n):
+        pivot = row
+        for i in range(row + 1, n):
             if abs(matrix[i, column]) > abs(matrix[pivot, column]):
                 pivot = i
         size = abs(matrix[pivot, column])
-        if not size > 1e-14 * magnitude[pivot, column]:
-            return -math.inf
+        if not size > NEARLY_SINGULAR * magnitude[pivot, column]:
+            annihilated += 1
+        if not size > SINGULAR * magnitude[pivot, column]:
+            total = -math.inf
+            continue
         for j in range(n):
-            matrix[column, j], matrix[pivot, j] = matrix[pivot, j], matrix[column, j]
-            magnitude[column, j], magnitude[pivot, j] = magnitude[pivot, j], magnitude[column, j]
+            matrix[row, j], matrix[pivot, j] = matrix[pivot, j], matrix[row, j]
+            magnitude[row, j], magnitude[pivot, j] = magnitude[pivot, j], magnitude[row, j]
         total += math.log(size)
-        for i in range(column + 1, n):
-            factor = matrix[i, column] / matrix[column, column]
+        for i in range(row + 1, n):
+            factor = matrix[i, column] / matrix[row, column]
             # The matrix of a jump that changes a few components of a large system is nearly the identity.
             for j in range(column, n if factor != 0.0 else 0):
-                term = factor * matrix[column, j]
+                term = factor * matrix[row, j]
                 matrix[i, j] -= term
-                magnitude[i, j] = max(magnitude[i, j], abs(factor) * magnitude[column, j])
-    return total
+                magnitude[i, j] = max(magnitude[i, j], abs(factor) * magnitude[row, j])
+        row += 1
+    return total, annihilated

@@ -126,12 +126,12 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
         for j in range(n):
             work.jacobian[i, j] = work.saltation[i, j]
             work.reset_jacobian[i, j] = work.sizes[i, j]
-    log_determinant = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
+    log_determinant, annihilated = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
     run.log_determinant += log_determinant
     run.strain += strain(work.saltation, n, log_determinant)
     anew = orthonormal and (apart or not run.strain < STRAINED)
     if anew:
-        orthonormalise(run.y, n, tangents, run.growth, work.jacobian, False)
+        run.indistinct += orthonormalise(run.y, n, tangents, run.growth, work.jacobian, False, 0)
         for c in range(tangents):
             for i in range(n):
                 work.jacobian[c, i] = 0.0
@@ -141,7 +141,7 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
     multiply(work.saltation, run.y, n, tangents, work.state, work.rounding)
     if not anew:
         return 0.0
-    orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True)
+    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True, annihilated)
     run.strain = 0.0
     return run.growth[0] - before
 

@@ -20,6 +20,11 @@ from tests.hybrid.arguments.values import (
     call,
 )
 
+BAD_STATES = [
+    None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), math.nan, 2**70,
+    [["q", "v"], ["w"]], np.array(["q"])[:, None],
+]  # fmt: skip
+
 
 def systems():
     return [
@@ -29,7 +34,7 @@ def systems():
             call(hybrid.from_equations, lambda t, x, p: (x.v, -np.abs(x.q)), state=("q", "v")),
             {
                 "field": [None, *FUNCTION],
-                "state": [None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), {"q", "v"}, math.nan, Odd()],
+                "state": [*BAD_STATES, {"q", "v"}, Odd()],
                 "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import hybrid
 import models
-from hybrid import simulate
+from hybrid import ArgumentError, simulate
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
 TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-14)
@@ -233,6 +233,9 @@ class TestJumps:
             arc.jumps[6]
         with pytest.raises(IndexError):
             arc.jumps[-7]
+        for index in (None, 1.0, True, (0, 1), [0], np.array([True]), b"a", object()):
+            with pytest.raises(ArgumentError, match="jumps: the index must be a whole number"):
+                arc.jumps[index]
 
     def test_fields(self, arc):
         jump = arc.jumps[0]

@@ -28,6 +28,8 @@ import hybrid, lyapunov, models
 signal.signal(signal.SIGINT, signal.default_int_handler)
 system, start = models.impact_oscillator(), (0.0, 0.0)
 rising = hybrid.Guard(lambda t, x, p: x.v, +1)
+never = hybrid.Guard(lambda t, x, p: x.v - 1e9, +1)
+hybrid.poincare_section(system, start, never, points=1, solver=hybrid.Taylor(max_steps=100))
 marked = hybrid.poincare_section(system, start, rising, points=1)
 slow = hybrid.DOP853(rtol=1e-13, atol=1e-15)
 
@@ -62,6 +64,10 @@ def strobe():
 def poincare():
     found = hybrid.poincare_section(system, start, rising, points=10**9)
     kept(found, len(found) > 100)
+
+def missed():
+    found = hybrid.poincare_section(system, start, never, points=2)
+    kept(found, len(found))
 
 def orbit():
     found = hybrid.periodic_orbit(system, start, periods=10**8, solver=slow)
@@ -111,6 +117,7 @@ CALLS = {
     "two_orbits": "INTERRUPTED 0",
     "strobe": "INTERRUPTED True",
     "poincare": "INTERRUPTED True",
+    "missed": "INTERRUPTED 0",
     "orbit": "INTERRUPTED (2,)",
     "error": "INTERRUPTED INTERRUPTED",
     "work": " ['INTERRUPTED']",

@@ -41,6 +41,10 @@ CONTINUOUS = {
     "the sine of an angle": lambda t, x, p: np.sin(np.arctan2(x.v, x.q)),
     "jumps in time": lambda t, x, p: np.sign(np.sin(t)) * x.q + np.mod(t, 1.0),
     "jumps in parameters": lambda t, x, p: np.where(p.k > 1, x.q, x.v),
+    "an angle right of the origin": lambda t, x, p: np.arctan2(x.v, 1 + x.q**2) + np.arctan2(x.q, 0.9),
+    "an angle above the origin": lambda t, x, p: np.arctan2(np.exp(x.v), x.q),
+    "a sign that never changes": lambda t, x, p: x.q * np.sign(2 + np.sin(x.v)),
+    "a condition that always holds": lambda t, x, p: np.where(x.v**2 > -1, x.q, x.v),
     "heaviside of a ramp": lambda t, x, p: np.heaviside(x.q, 0.5) * x.q**2,
 }
 JUMPING = {
@@ -52,6 +56,9 @@ JUMPING = {
     "a sawtooth": (lambda t, x, p: np.mod(x.q, 2.0), "x[0] is a multiple of 2"),
     "fmod": (lambda t, x, p: np.fmod(x.q, 2.0), "x[0] is a multiple of 2"),
     "an angle": (lambda t, x, p: np.arctan2(x.v, x.q), "the angle of (x[0], x[1])"),
+    "an angle left of the origin": (lambda t, x, p: np.arctan2(x.v, -1 - x.q**2), "the angle of"),
+    "an angle beside who knows what": (lambda t, x, p: np.arctan2(x.v, p.k), "the angle of"),
+    "an angle with a touch": (lambda t, x, p: np.arctan2(x.v, x.q**2), "the angle of"),
     "one of two slopes": (lambda t, x, p: np.where(x.q > 1, 2 * x.q, x.q), "x[0] = 1"),
     "the wrong factor": (lambda t, x, p: np.sign(x.q) * x.v, "x[0] = 0"),
     "a sheet of two": (lambda t, x, p: np.sign(x.q * x.v) * x.q, "x[0]*x[1] = 0"),

@@ -6,13 +6,14 @@ SymPy's evaluation of powers of sums, and of functions of them, ended with a Rec
 import random
 from fractions import Fraction
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate
+from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate, split
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.evaluation import Program
 from hybrid.symbolic.printer import IMPORTS, assignments
@@ -130,3 +131,19 @@ def test_the_slope_of_a_high_power():
     assert printed(lambda a: (a / 50) ** -200, 50.0) == (1.0, -4.0)
     assert printed(lambda a: (a / -50) ** 201, 50.0) == (-1.0, pytest.approx(-4.02))
     assert printed(lambda a: (a * 2) ** 5000, 1.0)[0] == inf
+
+
+@pytest.mark.parametrize(
+    "exponent", [lambda q: np.abs(q), lambda q: -q, lambda q: 2 * q, lambda q: -np.abs(q), np.sin]
+)
+@pytest.mark.parametrize("transform", [lambda system: system, split])
+def test_powers_of_zero(exponent, transform):
+    """SymPy has complex infinity for 1/0, which no float can hold."""
+    field = lambda t, x, p: (1.0 + np.minimum(0.0 ** exponent(x.q), 3.0),)  # noqa: E731
+    for start in (-2.5, 0.5):
+        system = transform(HybridSystem(state=("q",), modes=[Mode("m", field)]))
+        with np.errstate(all="ignore"):
+            rate = field(0.0, SimpleNamespace(q=np.float64(start)), None)[0]
+        arc = simulate(system, (start,), (0.0, 0.25))
+        assert arc.status.ok
+        assert arc.x[-1, 0] == pytest.approx(start + 0.25 * rate, rel=1e-14)

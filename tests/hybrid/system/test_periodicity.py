@@ -1,10 +1,23 @@
 """A declared period is a period of every function, or the model is refused."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import models
-from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition, compile_system, simulate
+from hybrid import (
+    ArgumentError,
+    Guard,
+    HybridSystem,
+    Mode,
+    ModelError,
+    Reset,
+    Transition,
+    compile_system,
+    simulate,
+    simulate_many,
+)
 from hybrid.compiler.compiled import emitted_of
 
 
@@ -112,3 +125,24 @@ def test_the_period_of_the_models_is_proved_once_for_all_parameters(model):
     assert compiled.emitted.proved_period
     compiled.model({next(iter(system.parameters)): 0.7})
     assert not compiled.periodic_at
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("period", [lambda p: 2 * np.pi / p.w, lambda p: 6 // int(p.w) + 1.0, lambda p: -p.w])
+def test_default_parameters_without_a_period(period):
+    """Defaults may be names with zeros; every run gives its own values."""
+    system = HybridSystem(
+        state=("q",),
+        parameters={"w": 0.0, "a": 1.0},
+        modes=[Mode("m", lambda t, x, p: (-p.a * x.q,))],
+        period=period,
+    )
+    one = {"w": -1.0} if period(SimpleNamespace(w=1.0)) < 0 else {"w": 1.0}
+    arc = simulate(system, (1.0,), (0.0, 1.0), parameters=one)
+    assert arc.x[-1, 0] == pytest.approx(np.exp(-1.0), rel=1e-12)
+    assert simulate_many(system, {"q": [1.0]}, (0.0, 1.0), parameters=one).x_end == pytest.approx(
+        arc.x[-1, 0]
+    )
+    for parameters in (None, {}, {"a": 2.0}):
+        with pytest.raises(ArgumentError, match="HybridSystem: period"):
+            simulate(system, (1.0,), (0.0, 1.0), parameters=parameters)

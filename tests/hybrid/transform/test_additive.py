@@ -6,8 +6,9 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybrid import from_equations, simulate
+from hybrid import HybridSystem, Mode, from_equations, simulate
 from hybrid.transform.additive import sliding_field
+from hybrid.transform.splitter import Splitter
 
 
 @given(size=st.integers(1, 4), seed=st.integers(0, 10**6))
@@ -32,6 +33,22 @@ def test_the_shares_solve_the_linear_system(size, seed):
         return
     shares = np.linalg.solve(matrix, -(normals @ middle) - 1.0)
     assert [float(each) for each in found] == pytest.approx(middle + shares @ jumps)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_switches_of_a_plane_add_up_whatever_the_numbers(seed):
+    """Where both heights are held the state is held; no quadratic equation for the shares is needed."""
+    rng = np.random.default_rng(seed)
+    A, C = rng.normal(size=(2, 2, 2))
+    H = np.eye(2) + 0.3 * rng.normal(size=(2, 2))
+
+    def field(t, x, p):
+        signs = [np.sign(H[k, 0] * x.a + H[k, 1] * x.b + 0.1 * x.a**2) for k in range(2)]
+        linear = (A[i, 0] * x.a + A[i, 1] * x.b + 0.7 * np.cos(t) for i in range(2))
+        return tuple(each + C[i, 0] * signs[0] + C[i, 1] * signs[1] for i, each in enumerate(linear))
+
+    [pieces] = Splitter(HybridSystem(state=("a", "b"), modes=[Mode("plain", field)])).pieces
+    assert pieces.shares({0: 0, 1: 0}) is None
 
 
 def test_jumps_that_do_not_add_up_have_no_such_field():

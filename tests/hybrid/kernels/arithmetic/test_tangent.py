@@ -16,8 +16,8 @@ _independence_kernel, _multiply = tangent.independence, tangent.multiply
 
 
 @njit
-def _run(y, n, k, growth, sizes, images):
-    return _orthonormalise(y, n, k, growth, sizes, images)
+def _run(y, n, k, growth, sizes, images, annihilated):
+    return _orthonormalise(y, n, k, growth, sizes, images, annihilated)
 
 
 @njit
@@ -40,17 +40,24 @@ def _determinant(matrix, magnitude):
     return _log_abs_determinant(matrix, magnitude, matrix.shape[0])
 
 
-def orthonormalise(vectors, images=False, growth=None):
-    """``(Q, growth, indistinct)`` of the columns of ``vectors``; as images, of terms of their own size."""
+def orthonormalise(vectors, images=False, growth=None, annihilated=1):
+    """``(Q, growth, indistinct)`` of the columns of ``vectors``; as images, of terms of their own size.
+
+    The matrix that made the images has annihilated so many directions.
+    """
     n, k = vectors.shape
     y = np.concatenate([np.full(n, 7.0), vectors.T.ravel()])
     growth = np.zeros(k) if growth is None else growth
-    indistinct = _run(y, n, k, growth, np.abs(vectors.T).copy(), images)
+    indistinct = _run(y, n, k, growth, np.abs(vectors.T).copy(), images, annihilated)
     assert np.all(y[:n] == 7.0), "the state was touched"
     return y[n:].reshape(k, n).T, growth, indistinct
 
 
 def log_determinant(matrix, magnitude=None):
+    return log_determinant_and_nullity(matrix, magnitude)[0]
+
+
+def log_determinant_and_nullity(matrix, magnitude=None):
     matrix = np.array(matrix, dtype=float)
     return _determinant(matrix, np.abs(matrix) if magnitude is None else magnitude)
 
@@ -124,6 +131,23 @@ def test_what_a_projection_leaves_of_a_direction_is_rounding():
     assert indistinct == 0
 
 
+def test_no_more_images_collapse_than_the_matrix_annihilates():
+    """An invertible matrix annihilates nothing: images that only rounding tells apart are not known."""
+    image = np.array([[0.3, 0.7], [0.6, 1.4 + 3e-16]])
+    for annihilated in range(3):
+        _, growth, indistinct = orthonormalise(image, True, annihilated=annihilated)
+        assert np.isfinite(growth[1]) == (annihilated == 0)
+        assert indistinct == (annihilated == 0)
+
+
+@pytest.mark.parametrize("images", [False, True])
+def test_a_vector_of_which_nothing_is_left_is_counted(images):
+    q, growth, indistinct = orthonormalise(np.array([[2.0, 4.0], [0.0, 0.0]]), images, annihilated=0)
+    assert indistinct == 1
+    assert growth[1] == -math.inf
+    assert not q[:, 1].any()
+
+
 def test_vectors_that_only_rounding_tells_apart_are_counted():
     """Without a threshold no vector collapses, but the rest of the second vector is only rounding."""
     _, growth, indistinct = orthonormalise(np.array([[0.3, 0.7], [0.6, 1.4 + 3e-16]]))
@@ -172,6 +196,15 @@ def test_log_determinant(n, seed):
 )
 def test_singular_is_minus_infinity(matrix):
     assert log_determinant(matrix) == -math.inf
+
+
+@given(st.integers(1, 6), st.integers(0, 6), st.integers(0, 2**32 - 1))
+def test_the_directions_that_a_matrix_annihilates_are_counted(n, rank, seed):
+    rng, rank = np.random.default_rng(seed), min(rank, n)
+    left, right = rng.normal(size=(n, rank)), rng.normal(size=(rank, n))
+    found = log_determinant_and_nullity(left @ right, np.abs(left) @ np.abs(right))
+    assert found[1] == n - rank
+    assert (found[0] == -math.inf) == (rank < n)
 
 
 def test_projection_is_singular():
