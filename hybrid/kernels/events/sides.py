@@ -31,7 +31,7 @@ SMOOTH = 4.0
 KEPT = 1e-3
 # Moments beside a jump of a guard: each is so many times as long as the last, from the rounding of time on.
 LONGER = 16.0
-MOST_MOMENTS = 3
+MOST_MOMENTS = 7
 
 
 @njit(**KERNEL)
@@ -66,11 +66,14 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     speed and the acceleration decides. It is 3 if the same holds for the acceleration: then the side is
     unchanged if the guard was zero before, and otherwise the guard counts as not yet crossed. It is
     ``JUMPING`` if the guard jumps across zero within the rounding of the state: then its derivatives are no
-    guide. A guard without a value keeps its side. ``work.field`` is current.
+    guide. A guard without a value keeps its side, and may jump; an infinite one has the side of its sign.
+    ``work.field`` is current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
     if math.isnan(value):
-        return before, 0
+        return before, JUMPING if may_jump(model, run, transition, t, x, work) else 0
+    if abs(value) == math.inf:
+        return (1 if value > 0.0 else -1), 0
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     trend, order = value, 0
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
@@ -204,12 +207,12 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
         )
         jumps = order == JUMPING or (order == BY_STEP and may_jump(model, run, transition, t, x, work))
-        if own and direction != 0 and not flat:
-            if order == BY_STEP:
+        if own and not flat:
+            if order == BY_STEP and direction != 0:
                 # Its own reset has stopped the state on the guard, as a plastic impact does.
                 now = -direction
             if jumps:
-                # The flow may go on across the jump of the guard that has just fired.
+                # The flow may go on across the jump of the guard that has just fired, or back from it.
                 first, now = signs_beside_jump(model, run, transition, t, x, now, work)
         if came == STARTED:
             crossed = is_zero(order) and direction != 0 and now == direction
