@@ -11,6 +11,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
+from hybrid.kernels.events.beside import MOST_MOMENTS, signs_beside
 from hybrid.kernels.events.guards import (
     error_band,
     has_program,
@@ -280,7 +281,8 @@ def first_change(
     sure = 0.0
     # Where and how close the guard has come to zero: a touch, once the guard is farther from zero again.
     touch, depth = NOWHERE, math.inf
-    base, tilt, leaves = 0.0, 0.0, False
+    base, tilt = 0.0, 0.0
+    leaves = on_guard == JUMPING and hidden > 0.0
     if is_zero(on_guard):
         row = work.registers[_row_at(model, transition, path, order, clock, start, pace, 0.0, 0.0, 0.0, work)]
         value = 0.5 * (row[LOW_MIDDLE] + row[HIGH_MIDDLE])
@@ -288,7 +290,9 @@ def first_change(
         leaves = on_guard == BY_SPEED and side_is_certain(on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
     stack = work.intervals
     stack[0, 0], stack[0, 1] = max(hidden, SETTLED * length) if on_guard > 0 else 0.0, length
-    if on_guard == JUMPING:
+    if leaves and on_guard == JUMPING:
+        sure = hidden
+    elif on_guard == JUMPING:
         # By rounding the state may still be before the jump.
         beyond = rounding_of_start(path, model.dimension, run.scale, clock, size_of_time(model, start), pace)
         stack[0, 0] = max(stack[0, 0], min(beyond, 0.5 * length))
@@ -453,6 +457,13 @@ def crossing_on_path(
         )
         if rests:
             return NO_ROOT, side, 1.0
+    if on_guard == JUMPING and has_just_fired(run, transition, on_guard):
+        model.field(run.mode, start, run.y, model.parameters, work.field)
+        _, beside, moment = signs_beside(model, run, transition, start, run.y, MOST_MOMENTS, work)
+        rate = path[1, clock] if clock >= 0 else pace
+        if beside == side and rate > 0.0:
+            # Up to there the state may be on either side by rounding.
+            hidden = min(moment / rate, 0.5 * length)
     run.on_guard[transition] = 0
     if hidden == length:
         after = 1 if end > 0.0 else (-1 if end < 0.0 else side)

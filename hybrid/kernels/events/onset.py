@@ -24,7 +24,8 @@ from numba import njit
 from hybrid.kernels.types.options import INLINE
 
 # Orders of a guard that is zero: its speed, its acceleration or the next step shows the side to which it
-# leaves. A guard of the last order jumps across zero and is not small.
+# leaves. The signs of a guard of the last order are no noise: it jumps across zero, or the flow leaves it
+# after its own jump, and the signs a moment before and after tell to which side.
 BY_SPEED, BY_ACCELERATION, BY_STEP, JUMPING = range(1, 5)
 
 

@@ -28,7 +28,7 @@ def sampled_change(
         value = sample(model, transition, path, order, clock, start, pace, high, work)
         if value * side < 0.0:
             left, right = low, high
-            if i == 1 and not is_zero(on_guard):
+            if i == 1 and not is_zero(on_guard) and hidden == 0.0:
                 first = sample(model, transition, path, order, clock, start, pace, 0.0, work)
                 right = 0.0 if first * side <= 0.0 else high
             elif i == 1 and on_guard == BY_STEP:

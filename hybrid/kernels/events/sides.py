@@ -4,6 +4,15 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.events.beside import (
+    FEW_MOMENTS,
+    LONGER,
+    LONGEST,
+    MOST_MOMENTS,
+    leaves_by_signs,
+    signs_beside,
+    turns_within,
+)
 from hybrid.kernels.events.derivatives import (
     acceleration_sign,
     moment_of_rounding,
@@ -29,9 +38,6 @@ STARTED, FLOWED, LANDED = range(3)
 SMOOTH = 4.0
 # A reset that keeps less than this share of a guard's speed holds a state that the flow pushes through it.
 KEPT = 1e-3
-# Moments beside a jump of a guard: each is so many times as long as the last, from the rounding of time on.
-LONGER = 16.0
-MOST_MOMENTS = 3
 
 
 @njit(**KERNEL)
@@ -66,11 +72,14 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     speed and the acceleration decides. It is 3 if the same holds for the acceleration: then the side is
     unchanged if the guard was zero before, and otherwise the guard counts as not yet crossed. It is
     ``JUMPING`` if the guard jumps across zero within the rounding of the state: then its derivatives are no
-    guide. A guard without a value keeps its side. ``work.field`` is current.
+    guide. A guard without a value keeps its side, and may jump; an infinite one has the side of its sign.
+    ``work.field`` is current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
     if math.isnan(value):
-        return before, 0
+        return before, JUMPING if may_jump(model, run, transition, t, x, work) else 0
+    if abs(value) == math.inf:
+        return (1 if value > 0.0 else -1), 0
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     trend, order = value, 0
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
@@ -97,31 +106,6 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     if trend < 0.0:
         return -1, order
     return before if before != 0 and (was_on or direction == 0) else -direction, order
-
-
-@njit(**KERNEL)
-def sign_at(model, transition, t, x, moment, work):
-    """Sign of a guard a moment after ``t``, or before; ``work.field`` is current."""
-    for i in range(model.dimension):
-        work.state[i] = x[i] + moment * work.field[i]
-    value = guard_value(model, transition, t + moment, work.state, work.scalar)
-    return 1 if value > 0.0 else (-1 if value < 0.0 else 0)
-
-
-@njit(**KERNEL)
-def signs_beside_jump(model, run, transition, t, x, now, work):
-    """Signs of a guard before and after a jump within rounding of ``x``, from moments beside it.
-
-    The sign at ``x`` itself may be either. Both are ``now`` if the guard does not jump across zero here.
-    """
-    moment = moment_of_rounding(model, run, t, work)
-    for _ in range(MOST_MOMENTS):
-        moment *= LONGER
-        before = sign_at(model, transition, t, x, -moment, work)
-        after = sign_at(model, transition, t, x, moment, work)
-        if before * after < 0:
-            return before, after
-    return now, now
 
 
 @njit(**KERNEL)
@@ -174,6 +158,32 @@ def is_held(model, run, transition, mode, t, x, towards, work):
 
 
 @njit(**KERNEL)
+def is_held_beside(model, run, transition, mode, t, x, towards, work):
+    """``is_held`` for a guard whose speed is zero at the guard itself: signs beside it tell instead.
+
+    The state has come so close to rest that no moment beside it shows a change of sign.
+    """
+    n, later = model.dimension, work.settled
+    moment = LONGEST * moment_of_rounding(model, run, t, work)
+    for i in range(n):
+        later[i] = x[i] + moment * work.field[i]
+    model.field(mode, t + moment, later, model.parameters, work.field)
+    for i in range(n):
+        later[i] += moment * work.field[i]
+    end = t + 2.0 * moment
+    held = guard_value(model, transition, end, later, work.scalar) * towards > 0.0
+    if held:
+        model.reset(transition, end, later, model.parameters, work.field_after)
+        for i in range(n):
+            later[i] = work.field_after[i]
+        model.field(mode, end, later, model.parameters, work.field)
+        _, beside, _ = signs_beside(model, run, transition, end, later, MOST_MOMENTS, work)
+        held = beside == -towards
+    model.field(mode, t, x, model.parameters, work.field)
+    return held
+
+
+@njit(**KERNEL)
 def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work):
     """Take sides at every guard of a mode; return the transition that must fire now, if any.
 
@@ -204,21 +214,33 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
         )
         jumps = order == JUMPING or (order == BY_STEP and may_jump(model, run, transition, t, x, work))
-        if own and direction != 0 and not flat:
-            if order == BY_STEP:
-                # Its own reset has stopped the state on the guard, as a plastic impact does.
-                now = -direction
-            if jumps:
-                # The flow may go on across the jump of the guard that has just fired.
-                first, now = signs_beside_jump(model, run, transition, t, x, now, work)
+        if own and not flat and order == BY_STEP and direction != 0:
+            # Its own reset has stopped the state on the guard, as a plastic impact does.
+            now = -direction
+        signs = own and order != BY_ACCELERATION and leaves_by_signs(model, transition)
+        if signs and order == BY_SPEED:
+            rounding = speed_rounding(model, run, transition, mode, t, x, work)
+            signs = abs(run.last_transversality) <= rounding
+        if own and (jumps or signs):
+            # The flow may go on across the guard that has just fired, or back from it.
+            moments = MOST_MOMENTS if order > 0 else FEW_MOMENTS
+            _, beside, moment = signs_beside(model, run, transition, t, x, moments, work)
+            held = False
+            if beside != 0:
+                now, order, flat = beside, JUMPING, False
+                held = signs and turns_within(model, transition, mode, t, x, LONGER * moment, beside, work)
+            elif signs and order > 0 and direction != 0:
+                held = is_held_beside(model, run, transition, mode, t, x, direction, work)
+            rests = rests or (held and allowed(model, transition, t, x, work.scalar))
         if came == STARTED:
             crossed = is_zero(order) and direction != 0 and now == direction
         elif came == FLOWED:
             if jumps:
                 order = JUMPING
-                first, now = signs_beside_jump(model, run, transition, t, x, now, work)
+                first, beside, _ = signs_beside(model, run, transition, t, x, MOST_MOMENTS, work)
+                now = beside if beside != 0 else now
                 # The guard may have jumped and fired already, within the rounding of this place.
-                before = first if before == 0 else before
+                before = (first if first != 0 else now) if before == 0 else before
             on = order in (BY_SPEED, JUMPING)
             crossed = on and before == -now and (direction == 0 or now == direction)
         else:

@@ -7,7 +7,7 @@ the time that is left, and both are extrapolated to where none is left.
 
 from numba import njit
 
-from hybrid.kernels.events.guards import guard_value
+from hybrid.kernels.events.guards import guard_value, may_jump
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -174,7 +174,8 @@ def is_limit(model, run, turn, t, work):
         size = abs(work.gradient[n] * t)
         for i in range(n):
             size += abs(work.gradient[i]) * work.trial[i]
-        if not abs(value) <= ROUGH * size:
+        # A guard that jumps across zero is small on neither side of its jump.
+        if not (abs(value) <= ROUGH * size or may_jump(model, run, transition, t, place, work)):
             return False
         model.reset(transition, t, place, model.parameters, work.state)
         for i in range(n):

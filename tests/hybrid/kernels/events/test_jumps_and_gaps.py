@@ -126,3 +126,65 @@ def test_crossings_between_two_gaps_are_found(solver):
     for name, shift in (("up", -beside), ("down", beside)):
         found = [jump.t for jump in arc.jumps if jump.transition == name]
         np.testing.assert_allclose(found, np.arange(1, 7) + shift, rtol=0, atol=1e-13)
+
+
+def bounces(wall, start, end):
+    """Times at which an oscillator of frequency one hits a wall that reverses its speed."""
+    size, phase = np.hypot(*start), np.arctan2(start[1], start[0])
+    if not size > abs(wall):
+        return []
+    half = np.arccos(wall / size)
+    t = np.min((phase + np.array([-half, half])) % (2 * np.pi))
+    v = size * np.sin(t - phase)
+    times = []
+    while t < end:
+        times.append(float(t))
+        t += 2 * np.arctan2(v, wall) % (2 * np.pi)
+    return times
+
+
+SWITCHES = {
+    "sign": lambda t, x, p: np.sign(x.q - p.wall),
+    "where": lambda t, x, p: np.where(x.q > p.wall, 1.0, -1.0),
+    "heaviside": lambda t, x, p: np.heaviside(x.q - p.wall, 0.5) - 0.5,
+    "quotient": lambda t, x, p: np.abs(x.q - p.wall) / (x.q - p.wall),
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("switch", SWITCHES.values(), ids=SWITCHES)
+def test_a_reset_that_turns_back_at_a_jump_fires_once(switch, solver):
+    """After the reset rounding leaves the state on either side of the jump; the flow goes back from there."""
+    system = HybridSystem(
+        state=("q", "v"),
+        parameters={"wall": 0.0},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[
+            Transition("swing", "swing", Guard(switch), Reset(lambda t, x, p: (x.q, -x.v))),
+        ],
+    )
+    rng = np.random.default_rng(7)
+    for _ in range(8):
+        wall = float(rng.choice([0.0, 0.3, rng.uniform(-1.2, 1.2)]))
+        start = tuple(map(float, rng.uniform(-1.5, 1.5, 2)))
+        arc = simulate(system, start, (0.0, END), parameters={"wall": wall}, solver=solver)
+        wanted = bounces(wall, start, END)
+        assert arc.status.ok
+        assert len(arc.jumps) == len(wanted), (wall, start)
+        np.testing.assert_allclose(arc.jumps.t, wanted, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("sign", [+1, -1])
+def test_an_infinite_guard_at_the_end_of_a_run_has_not_crossed(sign, solver):
+    """The guard overflows; its rounding, infinite too, tells nothing of its side."""
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode("rise", lambda t, x, p: (1.0,))],
+        transitions=[Transition("rise", "rise", Guard(lambda t, x, p: sign * (np.exp(1e3 * x.q) - 2.0)))],
+    )
+    for end in (0.5, 1.0, 2.0):
+        arc = simulate(system, (-0.5,), (0.0, 0.5 + end), solver=solver)
+        assert arc.status.ok
+        np.testing.assert_allclose(arc.jumps.t, [0.5 + np.log(2.0) / 1e3], rtol=0, atol=1e-12)
+        assert simulate(system, (0.3,), (0.0, 0.2), mode="rise", solver=solver).status.ok

@@ -9,7 +9,6 @@ import pytest
 from hybrid.kernels.events import sides
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
 from hybrid.kernels.types.codes import NO_TRANSITION
-from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(sides)
@@ -96,41 +95,6 @@ class TestLanding:
             expected = not own and before * now == -1
             assert crossed(0, before=before, now=now, own=own) == expected
             assert crossed(0, before=before, now=now, own=own, order=BY_SPEED) == expected
-
-
-def moving(guard, **others):
-    """One state, which moves at a speed of 2."""
-
-    def write(transition, t, x, parameters, scalar):
-        scalar[0] = guard(t, x[0])
-
-    return SimpleNamespace(dimension=1, parameters=None, guard=write, period=0.0, **others), SimpleNamespace(
-        field=np.array([2.0]), state=np.zeros(1), scalar=np.zeros(1)
-    )
-
-
-def test_the_sign_of_a_guard_a_moment_away():
-    for moment, sign in ((0.5, 1), (-0.5, -1), (0.0, 0)):
-        model, work = moving(lambda t, x: x - 1.0 + 4.0 * (t - 3.0))
-        assert kernels.sign_at(model, 0, 3.0, np.array([1.0]), moment, work) == sign
-        assert work.state[0] == 1.0 + 2.0 * moment
-        model, work = moving(lambda t, x: 8.0 * (t - 3.0) - (x - 1.0))
-        assert kernels.sign_at(model, 0, 3.0, np.array([1.0]), moment, work) == sign
-
-
-@pytest.mark.parametrize(
-    ("edge", "expected"),
-    [(0.0, (-1, 1)), (20.0, (-1, 1)), (-300.0, (-1, 1)), (4000.0, (-1, 1)), (5000.0, (7, 7))],
-)
-def test_signs_on_both_sides_of_a_jump(edge, expected):
-    """The jump is looked for up to 16^3 times the rounding of the state, which is 1 here."""
-    model, work = moving(lambda t, x: -1.0 if x - 1.0 < edge * EPSILON else 1.0)
-    run = SimpleNamespace(scale=np.array([1.0]))
-    found = kernels.signs_beside_jump(model, run, 0, 0.0, np.array([1.0]), 7, work)
-    assert found == expected
-    model, work = moving(lambda t, x: 1.0 if x - 1.0 < edge * EPSILON else -1.0)
-    found = kernels.signs_beside_jump(model, run, 0, 0.0, np.array([1.0]), 7, work)
-    assert found == tuple(-each if abs(each) == 1 else each for each in expected)
 
 
 def test_at_the_end_of_an_instant_nothing_is_due_in_its_mode():
