@@ -24,7 +24,7 @@ def memory():
 
 
 def opaque(guard):
-    """A model whose second transition has a guard that could not be traced, as a function of time and place."""
+    """A model whose second transition has an opaque guard, as a function of time and place."""
 
     def write(transition, t, x, parameters, out):
         assert transition == 1
