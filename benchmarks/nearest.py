@@ -31,6 +31,7 @@ NEAREST = {
         "compiler/llvm/test_lowering.py",
         "compiler/test_emit.py",
         "compiler/cache/test_folder.py",
+        "compiler/test_cases.py",
     ),
     "hybrid/compiler/propagators/affine.py": (
         "compiler/taylor/test_linear.py",

@@ -329,3 +329,15 @@ def test_a_part_that_is_cut_short(tmp_path):
     (tmp_path / "p").write_bytes(b"")
     with pytest.raises(parts.DamagedError):
         parts.read_part(tmp_path / "p")
+
+
+def test_the_seal_of_a_store_is_what_its_folder_says(tmp_path):
+    kept = store.Store.__new__(store.Store)
+    kept.path = tmp_path
+    assert kept.seal() == ""
+    (tmp_path / store.INSIDE).mkdir()
+    (tmp_path / store.INSIDE / store.MADE_BY).write_text("a seal")
+    assert kept.seal() == "a seal"
+    assert store.sees_store(tmp_path, "a seal")
+    assert not store.sees_store(tmp_path, "another")
+    assert not store.sees_store(tmp_path, "")

@@ -86,6 +86,10 @@ class TestLookingBack:
         assert self.asked(0.22) == ([], 0)
         assert self.asked(-0.22) == ([], 0)
 
+    def test_the_size_is_the_larger_one_of_each_component(self):
+        assert self.asked(-0.213) == ([5.0], 0)
+        assert self.asked(0.205) == ([5.0], 0)
+
     def test_short_is_less_with_less_tolerance(self):
         assert self.asked(6.9e-3, rtol=1e-10) == ([5.0], 0)
         assert self.asked(7.1e-3, rtol=1e-10) == ([], 0)
@@ -149,13 +153,15 @@ class TestRate:
             assert t == 6.0
             assert x[0] == 4.0 + 2.0 * x[1]
             places.append(float(x[1]))
-            return 1e9, rate(x[1])
+            return 1e9, 1.0 + 4.0 * rate(x[1])
 
         tested = plain(
-            disguised_jumps, explained_change=lambda *given: slope * abs(given[5][1] - given[4][1])
+            disguised_jumps, explained_change=lambda *given: 4.0 * slope * abs(given[5][1] - given[4][1])
         )
         work, run = memory(4.0, 0.0), run_at(6.0, 1.0)
-        found = tested.rate_jumps(plane(rates), run, 6.0, 1, rate(0.0), rate(1.0), work)
+        found = tested.rate_jumps(
+            plane(rates), run, 6.0, 1, 1.0 + 4.0 * rate(0.0), 1.0 + 4.0 * rate(1.0), work
+        )
         assert (work.departure.tolist(), run.y.tolist()) == ([4.0, 0.0], [6.0, 1.0])
         return found, places
 

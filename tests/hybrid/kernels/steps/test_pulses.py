@@ -24,7 +24,7 @@ CALM = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 def memory(nodes=5):
     # The last row of samples is one more than the nodes.
     return SimpleNamespace(
-        registers=np.full((3, 6), 1e9), samples=np.full((nodes + 1, 6), 1e9), intervals=np.zeros((60, 2))
+        registers=np.full((4, 6), 1e9), samples=np.full((nodes + 1, 6), 1e9), intervals=np.zeros((60, 2))
     )
 
 
@@ -69,9 +69,9 @@ class TestIsSteady:
             fixed(*self.wild), fixed(*self.wild), fixed(-4.25, -3.99, -9.0, 9.0, 0.0, 0.0)
         )[0]
 
-    @pytest.mark.parametrize("end", [math.inf, math.nan])
-    def test_not_without_bounds_of_the_forcing(self, end):
-        assert self.steady(fixed(*CALM), fixed(*CALM), fixed(0.0, end, 0.0, 1.0, 0.0, 0.0)) == (False, 0.0)
+    @pytest.mark.parametrize("ends", [(0.0, math.inf), (-math.inf, 0.0), (0.0, math.nan)])
+    def test_not_without_bounds_of_the_forcing(self, ends):
+        assert self.steady(fixed(*CALM), fixed(*CALM), fixed(*ends, 0.0, 1.0, 0.0, 0.0)) == (False, 0.0)
 
     def test_where_all_that_is_checked_is_monotone(self):
         for part in (self.rising, self.falling):
@@ -142,7 +142,7 @@ class TestJudged:
 
     def work(self, part=part, forcing=forcing, noise=0.0, common=1.0):
         work = memory()
-        work.registers[:] = self.wild, part, forcing
+        work.registers[:] = self.wild, part, forcing, self.wild
         work.samples[1] = 0.0, 0.0, 2.0 - noise, 2.0, 10.0 - noise, 10.0
         work.samples[2] = 0.0, 0.0, 4.0, 4.0 + noise, 12.0, 12.0 + noise
         # The largest low end less the smallest high end: what samples differ by.
@@ -292,6 +292,32 @@ class TestFirstHidden:
         found, asked = self.hidden(fixed(0.0, 9.0, 0.0, 1.0, 3.0, 3.0), h=2.0)
         assert found == (2.0, 2.0, 0.0)
         assert asked == [(1.0, 1.0)]
+
+    def test_one_evaluation_each_explains_pieces_on_which_it_is_monotone(self):
+        """However far the bounds lie beyond the samples."""
+        turning = lambda middle, half: (  # noqa: E731
+            middle - 9.0 * half,
+            middle + 9.0 * half,
+            -1.0 if half == 0.5 else 0.0,
+            1.0,
+            middle,
+            middle,
+        )
+        found, asked = self.hidden(turning)
+        assert found == (1.0, 1.0, 0.0)
+        assert asked == [
+            (0.5, 0.5),
+            *((node, 0.0) for node in NODES),
+            *((at, 0.125) for at in NODES[:4] + 0.125),
+        ]
+
+    def test_a_part_of_a_pulse_on_which_it_is_monotone_is_a_pulse(self):
+        def row(middle, half):
+            if middle == 0.3125:
+                return (0.0, 2.0, 0.0, 1.0, 1.5, 1.5)
+            return (0.0, 2.0, -1.0, 1.0, 0.0, 0.0) if (middle, half) in ((0.5, 0.5), (0.375, 0.125)) else CALM
+
+        assert self.hidden(row)[0][:2] == (0.25, 0.3125)
 
     def test_the_noise_of_a_steady_forcing_adds_to_its_integral(self):
         noisy = fixed(3.0, 5.0, -9.0, 9.0, 3.0, 4.0)
