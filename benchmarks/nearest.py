@@ -136,6 +136,7 @@ NEAREST = {
     ),
     "hybrid/kernels/events/touches.py": ("kernels/events/test_grazing.py",),
     "hybrid/kernels/jumps/chatter.py": (
+        "kernels/jumps/test_chatter_rules.py",
         "kernels/jumps/test_chatter_units.py",
         "kernels/jumps/test_chatter_bent.py",
         "kernels/jumps/test_chatter_tangents.py",
@@ -199,6 +200,10 @@ NEAREST = {
         "solvers/test_gaps.py",
         "solvers/test_pace.py",
     ),
+    "hybrid/kernels/steps/pulses.py": (
+        "compiler/bounds/test_forcing.py",
+        "compiler/bounds/test_pulses_in_state.py",
+    ),
     "hybrid/kernels/steps/series_guards.py": (
         "kernels/events/test_onset.py",
         "simulation/test_simulate.py",
@@ -206,7 +211,11 @@ NEAREST = {
         "kernels/events/test_grazing.py",
         "kernels/events/test_proved_crossings.py",
     ),
-    "hybrid/kernels/steps/series_roots.py": ("kernels/steps/test_series_guards.py",),
+    "hybrid/kernels/steps/series_roots.py": (
+        "kernels/steps/test_series_guards.py",
+        "kernels/events/test_crossings.py",
+        "simulation/test_infinite_slopes.py",
+    ),
     "hybrid/kernels/steps/step.py": ("accuracy/test_order.py", "simulation/test_simulate.py"),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
