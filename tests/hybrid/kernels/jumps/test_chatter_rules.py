@@ -381,3 +381,85 @@ def test_an_impulse_that_turns():
     turn = ((after - place) / (speed(after) - speed(place)) - p) / 0.125
     expected = 7.0 + np.outer(turn - np.dot([2.0, 3.0, 4.0], turn) * p, gradient)
     np.testing.assert_allclose(work.saltation, expected, rtol=1e-13)
+
+
+class Changing(Model):
+    """The restitution is ``1/2 + s/8``, and the impulse ``(0, 1, 1/4 + q/2)``."""
+
+    def reset(self, transition, t, x, parameters, out):
+        change = -(1.5 + 0.125 * x[2]) * x[1]
+        out[:] = x[0], x[1] + change, x[2] + (0.25 + 0.5 * x[0]) * change
+
+
+def test_impacts_that_change():
+    """Derivatives of acceleration, restitution and impulse along the columns, which are those of formulas.
+
+    The impulse takes out a speed of 2, and what the pull adds to it in the time 1/4.
+    """
+    run, work = new_run((0.5, 1.0, 0.5), scale=np.full(3, 0.125)), memory()
+    columns = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 3.0], [2.0, 0.0, -1.0]])
+    work.saltation[:] = columns
+    kernels.add_change_of_impacts(Changing(), run, 1, 2.0, 0.25, work)
+    q, s = 0.5, 0.5 - 2.0 * 0.25
+    bends = 0.5 * (columns[0] * s + q * columns[2])
+    np.testing.assert_allclose(work.rounding[0], bends, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(work.rounding[1], 0.125 * columns[2], rtol=0, atol=1e-9)
+    taken = 0.5 * columns[0] * (2.0 + 0.25 * (-PULL + 0.5 * q * s))
+    expected = columns - np.array([0.0 * taken, 0.0 * taken, taken])
+    np.testing.assert_allclose(work.saltation, expected, rtol=0, atol=1e-9)
+
+
+class Resting(Ball):
+    """A ball, and a mode at rest with a drift of its own."""
+
+    drift = 1.0
+
+    def field(self, mode, t, x, parameters, out):
+        super().field(mode, t, x, parameters, out)
+        if mode == 0:
+            out[:] = 0.0, 0.0, self.drift
+
+    def field_jacobian(self, mode, t, x, parameters, out):
+        out[:] = 0.0
+        out[0, 1] = 1.0 if mode == 1 else 0.0
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("drift", [1.0, 0.25])
+def test_the_duration_of_a_chatter(drift, side):
+    """``2 v / (a (1 - r))``, which a height changes through the energy of the flight.
+
+    A state that chatters longer drifts longer with the mean field, ``1/2 - a p``, and shorter with the other.
+    """
+    speed, ratio, p = 0.125, 0.5, 0.25
+    model = Resting(direction=-side, ratio=ratio, tilt=p)
+    model.drift = drift
+    run, work = new_run((0.0, side * speed, 0.5), restitution=ratio), memory()
+    run.trail[BEFORE, 3] = speed
+    span = 2.0 * speed / (PULL * (1.0 - ratio))
+    kernels.chatter_matrix(model, run, 1, work)
+    matrix = work.saltation.copy()
+    np.testing.assert_allclose(matrix, [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, -p, 1.0]], atol=1e-15)
+    work.settled[:] = 0.0, 0.0, 0.5 - side * speed * p + span * (0.5 + side * PULL * p)
+    assert kernels.add_change_of_duration(model, METHOD, run, 0, span, work)
+    instant = [side * (1.0 + ratio) / (speed * (1.0 - ratio)), side * 2.0 / (PULL * (1.0 - ratio)), 0.0]
+    np.testing.assert_allclose(run.instant, instant, rtol=1e-9, atol=1e-9)
+    excess = 0.5 + side * PULL * p - drift
+    expected = matrix + np.outer([0.0, 0.0, excess], instant)
+    np.testing.assert_allclose(work.saltation, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_limit_mode_that_drifts_alike_adds_nothing():
+    model = Resting(direction=-1, tilt=0.25)
+    run, work = new_run((0.0, 0.125, 0.5)), memory()
+    run.trail[BEFORE, 3] = 0.125
+    for drift, apart in ((1.5, False), (1.5 + 1e-13, False), (1.5 - 1e-9, True), (1.5 + 1e-9, True)):
+        model.drift = drift
+        kernels.chatter_matrix(model, run, 1, work)
+        matrix = work.saltation.copy()
+        work.settled[:] = 0.0, 0.0, 0.5
+        assert kernels.add_change_of_duration(model, METHOD, run, 0, 0.125, work) == apart
+        added = (work.saltation - matrix)[2]
+        np.testing.assert_allclose(
+            added, (1.5 - drift if apart else 0.0) * run.instant, rtol=1e-5, atol=1e-14
+        )
