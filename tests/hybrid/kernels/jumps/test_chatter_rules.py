@@ -106,7 +106,7 @@ METHOD = SimpleNamespace(atol=1e-10, rtol=1e-8)
 
 
 def test_the_far_side():
-    for direction, speed, side in ((-1, 5.0, -1), (1, -5.0, 1), (0, 5.0, 1), (0, -5.0, -1)):
+    for direction, speed, side in ((-1, 5.0, -1), (1, -5.0, 1), (0, 0.5, 1), (0, -0.5, -1)):
         run = new_run(last_transversality=speed)
         assert kernels.far_side(Model(direction=direction), run, 1) == side
 
@@ -192,8 +192,10 @@ class TestAccumulation:
             run.phase += flight
             run.y[:] = 0.0, -side * speed, 0.5 * run.phase
             run.trail[IMPULSE, :3] = 0.0, 1.0, 0.0
-            span = tested(model, METHOD, run, 1, flight, memory())
+            work = memory()
+            span = tested(model, METHOD, run, 1, flight, work)
             if span > 0.0:
+                np.testing.assert_allclose(work.settled, [0.0, 0.0, 0.5 * (run.phase + span)], atol=1e-7)
                 return k, span, speed
             flight = 2.0 * speed / PULL
             speed *= ratio * (1.0 + change(k))
@@ -227,6 +229,69 @@ class TestAccumulation:
         k, span, speed = self.bounces(0.5, change=lambda k: 1e-3 * 0.5**k)
         assert k >= 17
         assert span == pytest.approx(2.0 * speed / (PULL * 0.5), rel=1e-14)
+
+    def after(self, since_last, speed, *, band=1.0, ratio=0.5, value=0.0, **trail):
+        """What is found after a series with the speed 2, of which 2 time units were left, and the run."""
+        tested = plain(
+            chatter,
+            rounding_band=lambda *given: band,
+            guard_acceleration=lambda *given: -PULL,
+            guard_value=lambda *given: value,
+        ).accumulation
+        run = new_run((0.0, speed, 0.0), chattering=5, chatter_jumps=8, jumps=9, restitution=ratio)
+        run.trail[BEFORE] = 1.0, 0.0, 0.0, 2.0
+        run.trail[LIMIT] = 0.0, 0.0, 0.0, 2.0
+        run.trail[IMPULSE] = 0.0, 1.0, 0.0, trail.get("misfit", math.inf)
+        found = tested(Ball(), METHOD, run, 1, since_last, memory())
+        return found, run
+
+    @pytest.mark.parametrize(
+        ("since_last", "speed", "found"),
+        [(1.0, 1.0, True), (1.4, 1.0, True), (0.6, 1.0, True), (1.6, 1.0, False), (0.4, 1.0, False),
+         (1.0, 1.4, True), (1.0, 0.6, True), (1.0, 1.6, False), (1.0, 0.4, False), (1.6, 0.4, False)],
+    )  # fmt: skip
+    def test_lower_than_rounding_a_steady_flight_is_the_last(self, since_last, speed, found):
+        """Half of the flight, and of the speed, that the series has."""
+        span, run = self.after(since_last, speed)
+        assert span == (2.0 * speed / (PULL * 0.5) if found else 0.0)
+        assert run.chattering == 6
+        # Higher flights are followed.
+        assert self.after(since_last, speed, band=1e-9)[0] == 0.0
+
+    def test_the_change_of_the_limit_is_kept(self):
+        """A third of the change of its time for the ratio 1/2, in units of the tolerances."""
+        for ratio, gain in ((0.5, 1 / 3), (0.25, 1 / 15)):
+            span, run = self.after(0.75, 1.0, band=1e-9, ratio=ratio)
+            left = 2.0 / (PULL * (1.0 - ratio))
+            shift = left - (2.0 - 0.75)
+            misfit = gain * abs(shift) / (METHOD.rtol * left + 8.0 * EPSILON * 3.0)
+            assert span == 0.0
+            assert run.trail[IMPULSE, 3] == pytest.approx(misfit, rel=1e-14)
+            # It is driven: there is no limit to compare with.
+            assert run.trail[LIMIT, 0] == math.inf
+        # Slightly driven: the limit is compared with the last one, which was zero.
+        _, run = self.after(1.0 + 1e-4, 1.0, band=1e-9)
+        assert run.trail[LIMIT, 2] == pytest.approx(0.5, rel=1e-15)
+        assert run.trail[IMPULSE, 3] == pytest.approx(0.5 / 3.0 / (1e-10 + 1e-8), rel=1e-12)
+
+    @pytest.mark.parametrize(
+        ("band", "before", "found"),
+        [(1e-7, 1.0, True), (1e-7, 1e9, False), (1e-9, 1.0, False), (0.8e-8, 1.0, False), (2e-8, 1.0, True)],
+    )
+    def test_a_change_that_rounding_makes_is_the_last(self, band, before, found):
+        """The limit changes by 1e-6 / 3, and by at most 8 / 3 of the rounding over the height 1/8."""
+        tested = plain(
+            chatter,
+            rounding_band=lambda *given: band,
+            guard_acceleration=lambda *given: -PULL,
+            guard_value=lambda *given: 0.0,
+            change_of_limit=lambda model, method, run, gain, misfit, work: misfit,
+        ).accumulation
+        run = new_run((0.0, 1.0, 0.0), chattering=16, chatter_jumps=8, jumps=9, phase=0.0)
+        run.trail[:, 3] = 2.0, 2.0, before
+        span = tested(Ball(), METHOD, run, 1, 1.0 + 1e-6, memory())
+        assert run.trail[IMPULSE, 3] == pytest.approx(1e-6 / 3.0 / METHOD.rtol, rel=1e-6)
+        assert (span > 0.0) == found
 
     def test_what_ends_a_chatter(self):
         """A landing off the guard, no pull, and another transition in between."""
@@ -337,7 +402,10 @@ def test_the_drift_with_the_mean_field():
     a = jacobian - np.outer(p, [s / 2.0, 0.0, q / 2.0])
     start = np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 0.0], [3.0, 1.0, 1.0]])
     work.saltation[:] = start
+    times, field = set(), model.field
+    model.field = lambda mode, t, *given: times.add(t) or field(mode, t, *given)
     kernels.drift_with_mean(model, run, 1, h, work)
+    assert times == {3.0 + h / 2.0}
     expected = start + h * a @ start + h**2 / 2.0 * a @ a @ start
     np.testing.assert_allclose(work.saltation, expected, rtol=0, atol=1e-9)
 
@@ -463,3 +531,34 @@ def test_a_limit_mode_that_drifts_alike_adds_nothing():
         np.testing.assert_allclose(
             added, (1.5 - drift if apart else 0.0) * run.instant, rtol=1e-5, atol=1e-14
         )
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("drift", "apart"), [(0.25, True), (0.5, False)])
+def test_parts_of_a_change_of_duration(drift, apart, side):
+    """The speed has its sign, and the whole chatter counts only where the two drifts differ."""
+    calls = []
+    tested = plain(
+        chatter,
+        add_turn_of_impulse=lambda model, run, *given: calls.append(("turn", *given[:4])),
+        add_change_of_impacts=lambda model, run, *given: calls.append(("impacts", *given[:3])),
+        drift_with_mean=lambda model, run, *given: calls.append(("drift", *given[:2])),
+    ).add_change_of_duration
+    model = Resting(direction=-side)
+    model.drift = drift
+    run, work, times = new_run(), memory(), set()
+    run.trail[BEFORE, 3] = 4.0
+    run.trail[IMPULSE, :3] = 0.0, 1.0, 0.0
+    work.settled[:], work.error[:], work.rounding[:], work.saltation[:] = 0.0, 0.0, 0.0, 0.0
+    work.jacobian[:] = 0.0
+    work.rounding[0, 1], work.rounding[1, 2] = 3.0, 5.0
+    field = model.field
+    model.field = lambda mode, t, *given: times.add(t) or field(mode, t, *given)
+    assert tested(model, METHOD, run, 0, 0.125, work) == apart
+    assert times == {3.125}
+    whole = [("drift", 1, 0.125)] if apart else []
+    assert calls == [("turn", 1, 3.125, side * 4.0, 0.125), ("impacts", 1, side * 4.0, 0.125), *whole]
+    # The span changes with the pull and the restitution.
+    expected = [side * 1.5 / 2.0, 0.125 * side * 3.0 / PULL, 0.125 * 5.0 / 0.5]
+    assert run.instant.tolist() == expected
+    assert work.saltation.tolist() == [[0.0] * 3, [0.0] * 3, [(0.5 - drift) * each for each in expected]]
