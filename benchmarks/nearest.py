@@ -137,6 +137,7 @@ NEAREST = {
     "hybrid/kernels/events/touches.py": ("kernels/events/test_grazing.py",),
     "hybrid/kernels/jumps/chatter.py": (
         "kernels/jumps/test_chatter_rules.py",
+        "kernels/jumps/test_chatter_matrix.py",
         "kernels/jumps/test_chatter_units.py",
         "kernels/jumps/test_chatter_bent.py",
         "kernels/jumps/test_chatter_tangents.py",
