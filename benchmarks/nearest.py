@@ -74,6 +74,7 @@ NEAREST = {
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
+        "kernels/steps/test_disguised_jumps.py",
     ),
     "hybrid/kernels/events/bounds.py": (
         "kernels/events/test_proved_crossings.py",
@@ -179,7 +180,10 @@ NEAREST = {
         "compiler/taylor/test_series.py",
         "accuracy/test_work_precision.py",
     ),
-    "hybrid/kernels/steps/forcing.py": ("compiler/bounds/test_forcing.py",),
+    "hybrid/kernels/steps/forcing.py": (
+        "compiler/bounds/test_forcing.py",
+        "compiler/bounds/test_pulses_in_state.py",
+    ),
     "hybrid/kernels/steps/radau.py": ("solvers/test_radau.py",),
     "hybrid/kernels/steps/runge_kutta.py": (
         "accuracy/test_order.py",

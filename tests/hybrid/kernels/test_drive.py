@@ -295,7 +295,9 @@ class TestAdvance:
 
         def enter(parts, task):
             calls.append("enter")
-            task.run.stage = STALE
+            # The first mode is one of rest, which another is entered from at once.
+            task.run.stage = ENTERING if task.run.mode == 0 else STALE
+            task.run.mode = 1
             return GO_ON
 
         def arrived(model, run, work):
@@ -326,6 +328,7 @@ class TestAdvance:
 
     def test_a_mode_is_entered_first(self):
         assert self.advanced(stage=ENTERING)[1][:2] == ["enter", 5.0]
+        assert self.advanced(stage=ENTERING, mode=0)[1][:3] == ["enter", "enter", 5.0]
 
     def test_jumps_are_fired_where_they_are_pending(self):
         code, calls, _ = self.advanced(pending=(0,))
