@@ -31,6 +31,7 @@ NEAREST = {
         "compiler/llvm/test_lowering.py",
         "compiler/test_emit.py",
         "compiler/cache/test_folder.py",
+        "compiler/test_cases.py",
     ),
     "hybrid/compiler/propagators/affine.py": (
         "compiler/taylor/test_linear.py",
@@ -73,6 +74,7 @@ NEAREST = {
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
+        "kernels/steps/test_disguised_jumps.py",
     ),
     "hybrid/kernels/events/bounds.py": (
         "kernels/events/test_proved_crossings.py",
@@ -135,6 +137,8 @@ NEAREST = {
     ),
     "hybrid/kernels/events/touches.py": ("kernels/events/test_grazing.py",),
     "hybrid/kernels/jumps/chatter.py": (
+        "kernels/jumps/test_chatter_rules.py",
+        "kernels/jumps/test_chatter_matrix.py",
         "kernels/jumps/test_chatter_units.py",
         "kernels/jumps/test_chatter_bent.py",
         "kernels/jumps/test_chatter_tangents.py",
@@ -176,7 +180,10 @@ NEAREST = {
         "compiler/taylor/test_series.py",
         "accuracy/test_work_precision.py",
     ),
-    "hybrid/kernels/steps/forcing.py": ("compiler/bounds/test_forcing.py",),
+    "hybrid/kernels/steps/forcing.py": (
+        "compiler/bounds/test_forcing.py",
+        "compiler/bounds/test_pulses_in_state.py",
+    ),
     "hybrid/kernels/steps/radau.py": ("solvers/test_radau.py",),
     "hybrid/kernels/steps/runge_kutta.py": (
         "accuracy/test_order.py",
@@ -198,6 +205,10 @@ NEAREST = {
         "solvers/test_gaps.py",
         "solvers/test_pace.py",
     ),
+    "hybrid/kernels/steps/pulses.py": (
+        "compiler/bounds/test_forcing.py",
+        "compiler/bounds/test_pulses_in_state.py",
+    ),
     "hybrid/kernels/steps/series_guards.py": (
         "kernels/events/test_onset.py",
         "simulation/test_simulate.py",
@@ -205,7 +216,11 @@ NEAREST = {
         "kernels/events/test_grazing.py",
         "kernels/events/test_proved_crossings.py",
     ),
-    "hybrid/kernels/steps/series_roots.py": ("kernels/steps/test_series_guards.py",),
+    "hybrid/kernels/steps/series_roots.py": (
+        "kernels/steps/test_series_guards.py",
+        "kernels/events/test_crossings.py",
+        "simulation/test_infinite_slopes.py",
+    ),
     "hybrid/kernels/steps/step.py": ("accuracy/test_order.py", "simulation/test_simulate.py"),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),

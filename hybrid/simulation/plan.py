@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any
 
@@ -156,8 +157,11 @@ def driver_parts(
     guard is no series itself, the run has tangent vectors, and some field may change abruptly below them.
     """
 
-    def needed(asked: bool, module: str, name: str) -> Any:
-        return vars(load_kernels(module))[name] if asked else Absent()
+    def needed(asked: bool, load: Callable[[], Any]) -> Any:
+        return load() if asked else Absent()
+
+    def forcing() -> Any:
+        return load_kernels("hybrid.kernels.steps.forcing")
 
     jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
     module, name = attempt
@@ -165,14 +169,13 @@ def driver_parts(
         step = load_kernels("hybrid.kernels.steps.runge_kutta").runge_kutta_step
     else:
         step = load_kernels("hybrid.kernels.steps.step").no_step
-    forcing = "hybrid.kernels.steps.forcing"
     parts = Parts(
         runge_kutta_step=step,
         enter=corners.enter,
         rests_on_guard=corners.rests_on_guard,
         arrived=corners.arrived,
-        keep_apart=needed(tangents, "hybrid.kernels.arithmetic.tangent", "keep_apart"),
-        look_back=needed(abrupt, "hybrid.kernels.steps.disguised_jumps", "look_back"),
+        keep_apart=needed(tangents, lambda: load_kernels("hybrid.kernels.arithmetic.tangent").keep_apart),
+        look_back=needed(abrupt, lambda: load_kernels("hybrid.kernels.steps.disguised_jumps").look_back),
         jump=jumps.jump,
         finish_chatter=Absent(),
         complete=0,
@@ -181,11 +184,12 @@ def driver_parts(
     )
     attempts = Attempts(
         attempt_implicit=vars(load_kernels(module))[name],
-        explained_step=needed(forced, forcing, "explained_step"),
-        explained_attempt=needed(forced, forcing, "explained_attempt"),
-        explained_series=needed(forced, forcing, "explained_series"),
+        explained_step=needed(forced, lambda: forcing().explained_step),
+        explained_attempt=needed(forced, lambda: forcing().explained_attempt),
+        explained_series=needed(forced, lambda: forcing().explained_series),
         crossing_beside_series=needed(
-            beside_series, "hybrid.kernels.steps.beside_series", "crossing_beside_series"
+            beside_series,
+            lambda: load_kernels("hybrid.kernels.steps.beside_series").crossing_beside_series,
         ),
     )
     return parts, attempts

@@ -7,7 +7,7 @@ import pytest
 
 import hybrid.__main__ as command
 from hybrid import solvers
-from hybrid.compiler.cache.loader import ALL_KERNELS, DRIVER, EVENTS
+from hybrid.compiler.cache.loader import ALL_KERNELS, DRIVER, IN_SECOND
 
 SOURCES = Path(command.__file__).parents[1]
 SMALL = ("hybrid.kernels.steps.step", "hybrid.kernels.evaluate")
@@ -21,7 +21,7 @@ def empty_cache(tmp_path, monkeypatch):
 
 def test_every_module_of_kernels_that_is_loaded_is_compiled_ahead():
     methods = (getattr(solvers, name) for name in solvers.__all__)
-    loaded = {DRIVER, *EVENTS, *(method.attempt[0] for method in methods)}
+    loaded = {DRIVER, *IN_SECOND, *(method.attempt[0] for method in methods)}
     for folder in ("hybrid", "lyapunov"):
         for path in (SOURCES / folder).rglob("*.py"):
             loaded |= set(re.findall(r'load_kernels\("([\w.]+)"\)', path.read_text(encoding="utf-8")))

@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import hybrid
 import lyapunov
 import models
 from hybrid import StatusCode
+from lyapunov.chart import Exponents
 from lyapunov.spectrum import Estimate
 from models.one_impact import one_impact_orbits
 
@@ -34,6 +36,17 @@ def duffing():
         modes=[hybrid.Mode("on", lambda t, x, p: (x.v, x.x - x.x**3 - 0.3 * x.v + p.tilt + p.A * np.cos(t)))],
         period=2 * np.pi,
     )
+
+
+@pytest.mark.parametrize(("period", "forced"), [(2.0, "yes"), (None, "no")])
+def test_what_decides_the_results_of_a_chart(period, forced):
+    made = SimpleNamespace(
+        rows=SimpleNamespace(facts=lambda: {"solver": "s"}),
+        system=SimpleNamespace(period=period),
+        **{"k": 2, "intervals": 30, "interval": 0.5, "transient": 4, "points": 7},
+    )
+    settings = {"k": 2, "intervals": 30, "interval": 0.5, "transient": 4}
+    assert Exponents.facts.fget(made) == {"solver": "s", **settings, "section": 7, "forced": forced}
 
 
 def test_rows_are_the_spectra_one_by_one():

@@ -179,6 +179,13 @@ def test_student_factors():
     np.testing.assert_allclose(statistics.TWO_SIGMA_OF_STUDENT, expected, rtol=1e-7)
 
 
+def test_an_accumulator_begins_with_batches_of_one_value():
+    sums, state = new_batches(3)
+    assert sums.shape == (statistics.MAX_BATCHES, 3)
+    assert not sums.any()
+    assert state.tolist() == [0, 1, 0]
+
+
 def accumulate(series, batches, add=push):
     sums, state = new_batches(series.shape[1])
     sums = sums[:batches]

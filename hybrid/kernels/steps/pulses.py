@@ -178,7 +178,6 @@ def first_hidden(model, program, path, order, clock, start, nodes, h, tolerance,
     steady, noise = is_steady(model, program, path, order, clock, start, h, negligible, work)
     if steady:
         return h, h, _unseen(work.registers[programs.first[program + 1] - 1 - first], noise, h, tolerance)
-    last = programs.first[program + 1] - 1 - first
     _take_samples(model, program, path, order, clock, start, nodes, h, work)
     stack, pieces, limit, coarse = work.intervals, 0, MOST_PIECES, 0.0
     for j in range(len(nodes) - 1):

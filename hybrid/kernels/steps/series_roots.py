@@ -57,9 +57,12 @@ def time_of(series, clock, order, h, span):
         else:
             low = s
         newton = s - misfit / slope
+        # Where the step is rounding, the place itself is an end of the bracket.
+        if abs(newton - s) <= 2.0 * EPSILON * s:
+            return min(newton, h)
         if not low < newton < high:
             newton = 0.5 * (low + high)
-        if abs(newton - s) <= 2.0 * EPSILON * s or high - low <= 2.0 * EPSILON * high:
+        if high - low <= 2.0 * EPSILON * high:
             return newton
         s = newton
     return s

@@ -219,6 +219,30 @@ def test_after_a_run_that_took_too_long_finer_tolerances_are_left_out():
     assert calls.count(1e-4) == 2
 
 
+@pytest.mark.parametrize(
+    ("error", "status", "calls"),
+    [
+        (KeyboardInterrupt, "INTERRUPTED", 1),
+        (KeyboardInterrupt, "INTERRUPTED", 2),
+        (RuntimeError("no"), "RuntimeError: no", 2),
+    ],
+)
+def test_a_method_that_ends_early_has_the_time_of_its_last_run(error, status, calls):
+    """The first run also compiles: if it fails, so does the second one."""
+    clock, made = Clock(), []
+    clock.now = 100.0
+
+    def method(tolerance):
+        made.append(tolerance)
+        clock.now += 3.0 * len(made)
+        if len(made) == calls:
+            raise error
+        return EXACT
+
+    found = work_precision(*FALL, methods={"m": method}, reference=EXACT, tolerances=[1e-3], clock=clock)
+    assert (found.status[0], found.seconds[0]) == (status, 3.0 * calls)
+
+
 def test_a_method_that_raises_has_a_row_that_says_so():
     def method(tolerance):
         if tolerance < 1e-4:

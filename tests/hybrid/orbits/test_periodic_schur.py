@@ -1,6 +1,7 @@
 """Eigenvalues of matrix products compared with the product in many digits, beyond the range of floats."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import mpmath as mp
 import numpy as np
@@ -199,3 +200,13 @@ def test_the_shifts_make_sweeps_converge_fast(monkeypatch):
     expected = np.linalg.eigvals(factors[2] @ factors[1] @ factors[0])
     np.testing.assert_allclose(found.log_moduli, np.sort(np.log(np.abs(expected)))[::-1], atol=1e-9)
     assert len(sweeps) < 3 * 30
+
+
+def test_what_has_not_separated_after_many_sweeps_is_taken_as_equal():
+    """The smallest entry below the diagonal of the block becomes zero, and nothing else."""
+    head = np.arange(1.0, 37.0).reshape(6, 6)
+    head[[1, 2, 3, 4, 5], [0, 1, 2, 3, 4]] = 0.001, 5.0, -0.5, 7.0, 0.002
+    reduced = SimpleNamespace(head=head.copy())
+    periodic_schur._Reduced._sweep(reduced, 1, 5, periodic_schur.MOST_SWEEPS + 1)
+    head[3, 2] = 0.0
+    np.testing.assert_array_equal(reduced.head, head)

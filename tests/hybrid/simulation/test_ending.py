@@ -195,3 +195,23 @@ def test_an_order_that_mattered_is_said_with_what_grazed():
         assert ("5 of 9 jumps grazed" in found.message) == (tangents > 0)
     alone = ending._status(finished(order_mattered=4), codes.DONE)
     assert "grazed" not in alone.message
+
+
+@pytest.mark.parametrize("code", [codes.STEP_TOO_SMALL, codes.MAX_STEPS])
+@pytest.mark.parametrize(("period", "timed", "bare"), [(0.0, 1, True), (0.0, 0, False), (2.0, 1, False)])
+@pytest.mark.parametrize("last", [-1, 0])
+def test_bare_time_may_have_lost_its_digits(last, period, timed, bare, code, monkeypatch):
+    """A mode that depends on time, in a system without a period, is advised to declare one."""
+    asked = []
+    monkeypatch.setattr(ending, "_place", lambda trajectory: "at the place")
+    monkeypatch.setattr(ending, "run_status", lambda *given, **options: asked.append((given, options)))
+    trajectory = SimpleNamespace(
+        run=SimpleNamespace(
+            singular_jumps=0, order_mattered=0, ill_conditioned=0, mode=1, last_fired=last, at_rest=0
+        ),
+        tangents=0,
+        system=SimpleNamespace(transition_names=("first",)),
+        model=SimpleNamespace(period=period, timed=np.array([1 - timed, timed])),
+    )
+    ending._status(trajectory, code)
+    assert asked == [((code, "at the place", "first" if last == 0 else None), {"bare_time": bare})]

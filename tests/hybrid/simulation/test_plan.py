@@ -1,10 +1,12 @@
 """What all runs of a system by one solver share: which kernels run, in which modes, and how many are kept."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER, RUNGE_KUTTA
+from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Attempts
 from hybrid.simulation import plan
 from hybrid.simulation.memory import MOST_LAYOUTS
@@ -136,3 +138,21 @@ def test_plans_of_the_last_solvers_are_kept(compiled):
     assert plan.plan_of(compiled, solvers[-1], 0) is made[-1]
     assert plan.plan_of(compiled, solvers[2], 0) is made[2]
     assert plan.plan_of(compiled, solvers[1], 0) is not made[1]
+
+
+@pytest.mark.parametrize(
+    ("solver", "tangents", "kinds"),
+    [
+        (hybrid.Taylor(), 0, [ROOTED, EXACT]),
+        (hybrid.DOP853(), 0, [RUNGE_KUTTA, RUNGE_KUTTA]),
+        (hybrid.DOP853(), 1, [ROOTED, RUNGE_KUTTA]),
+        (hybrid.DOP853(), 3, [ROOTED, RUNGE_KUTTA]),
+        (hybrid.RadauIIA(), 1, [ROOTED, RUNGE_KUTTA]),
+    ],
+)
+def test_modes_whose_tangent_vectors_need_series_get_them(solver, tangents, kinds):
+    compiled = SimpleNamespace(
+        emitted=SimpleNamespace(propagators=[SimpleNamespace(kind=kind) for kind in (ROOTED, EXACT)]),
+        needs_series=lambda mode: mode == 0,
+    )
+    assert plan.propagator_kinds(compiled, solver, tangents) == kinds

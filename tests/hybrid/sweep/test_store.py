@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -329,3 +330,33 @@ def test_a_part_that_is_cut_short(tmp_path):
     (tmp_path / "p").write_bytes(b"")
     with pytest.raises(parts.DamagedError):
         parts.read_part(tmp_path / "p")
+
+
+def test_the_seal_of_a_store_is_what_its_folder_says(tmp_path):
+    kept = store.Store.__new__(store.Store)
+    kept.path = tmp_path
+    assert kept.seal() == ""
+    (tmp_path / store.INSIDE).mkdir()
+    (tmp_path / store.INSIDE / store.MADE_BY).write_text("a seal")
+    assert kept.seal() == "a seal"
+    assert store.sees_store(tmp_path, "a seal")
+    assert not store.sees_store(tmp_path, "another")
+    assert not store.sees_store(tmp_path, "")
+
+
+def test_a_file_of_a_worker_goes_into_the_sheet(tmp_path, monkeypatch):
+    """One that cannot be seen yet is read later."""
+    kept, put, asked = store.Store.__new__(store.Store), [], []
+    kept.path, kept.seen = tmp_path, set()
+    sheet = SimpleNamespace(put=put.append)
+    kept.receive("no such", np.array([4, 2]), sheet)
+    assert (kept.seen, put) == (set(), [])
+
+    def read_part(path):
+        asked.append(path)
+        return [], SimpleNamespace(at=lambda rows, places: (rows.tolist(), places.tolist()))
+
+    monkeypatch.setattr(store, "read_part", read_part)
+    kept.receive("part", np.array([4, 2]), sheet)
+    assert asked == [tmp_path / store.INSIDE / store.PARTS / "part"]
+    assert (kept.seen, put) == ({"part"}, [([4, 2], [0, 1])])

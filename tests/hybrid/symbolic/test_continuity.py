@@ -10,7 +10,7 @@ import sympy
 import hybrid
 import models
 from hybrid.compiler.compiled import emitted_of
-from hybrid.symbolic.continuity import _sides, jumps_of, may_jump
+from hybrid.symbolic.continuity import _sides, jumps_of, may_jump, vanishes_on
 from hybrid.symbolic.tracing import model_symbols, trace
 
 STATES, PARAMETERS = ("q", "v"), ("k", "c")
@@ -277,3 +277,24 @@ def test_values_below_and_above_a_jump_are_those_of_numpy(function, step, jump, 
     assert float(surface.subs({q: jump, symbol: step})) == 0.0
     assert tuple(float(sympy.sympify(side).subs(symbol, step)) for side in sides) == values
     np.testing.assert_allclose([function(jump - 1e-9), function(jump + 1e-9)], values, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("expression", "surface", "vanishes"),
+    [
+        ("0", "q", True),
+        ("q", "q", True),
+        ("q*v", "q", True),
+        ("q**2 - v**2", "q - v", True),
+        ("(q - c)*v", "2*q - 2*c", True),
+        ("sin(q) - k", "sin(q) - k", True),
+        ("1", "q", False),
+        ("v", "q", False),
+        ("q + v", "q - v", False),
+        ("q - 2*c", "q - c", False),
+    ],
+)
+def test_what_vanishes_on_a_surface(expression, surface, vanishes):
+    symbols = model_symbols(2, 2)
+    names = dict(zip(("q", "v", "k", "c"), (*symbols.x, *symbols.p), strict=True))
+    assert vanishes_on(*(sympy.sympify(each, locals=names) for each in (expression, surface))) == vanishes

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import sympy
 
-from hybrid.symbolic.expressions import Absolute, Level, Sign
+from hybrid.symbolic.expressions import Absolute, Less, Level, Select, Sign
 from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.switches import Surfaces, Switches, _first_atom, switching_names
+from hybrid.symbolic.switches import Surfaces, Switches, _first_atom, _without_truths, switching_names
 from hybrid.symbolic.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
@@ -206,3 +206,12 @@ def test_fractional_powers_of_heights_are_zero_beyond_their_surface():
     assert np.isnan(value(found.bare[0], 0.0, 0.4, 0.0))
     other = switches.resolved({0: -1})
     assert np.isnan(value(other.entries[0], 0.0, 0.0, -0.1))
+
+
+def test_numbers_that_serve_as_conditions_count_as_true():
+    condition = Less(Q, V)
+    number, switching, known = Select(Q - V, T, V), Select(condition, T, V), Select(K, Q, V)
+    assert _without_truths(2 * number + switching) == 2 * T + switching
+    assert _without_truths(known) == Q
+    assert _without_truths(switching + Q) == switching + Q
+    assert _without_truths(Select(Sign(Q), T, V)) == Select(Sign(Q), T, V)

@@ -80,6 +80,37 @@ def test_kind_of_values():
     fails("HybridSystem: period must return a number", period=lambda p: "long")
 
 
+@pytest.mark.parametrize(
+    ("value", "is_number"),
+    [
+        (2.5, True),
+        (2, True),
+        (True, True),
+        (np.float64(2.5), True),
+        (np.int64(2), True),
+        (np.uint8(2), True),
+        (np.bool_(True), True),
+        (np.array(2.5), True),
+        (np.array(2), True),
+        (np.array(2, dtype=np.uint8), True),
+        (np.array(True), True),
+        (np.array([2.5]), False),
+        (np.array("a"), False),
+        (np.array(2.5j), False),
+        (np.array(None), False),
+        (2.5j, False),
+        ("2.5", False),
+        ([2.5], False),
+    ],
+)
+def test_what_counts_as_a_number(value, is_number):
+    field = lambda t, x, p: (x.v, value)  # noqa: E731
+    if is_number:
+        system(field)
+    else:
+        fails("Mode 'flight': field: value 1 is not a number", field=field)
+
+
 def test_shape_of_derivatives():
     fails("Mode 'flight': jacobian returned 1 rows of 2 values", jacobian=lambda t, x, p: ((0.0, 1.0),))
     fails("it must return 2 rows of 2 or 3 values", jacobian=lambda t, x, p: ((0.0,), (1.0,)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hybrid import StatusCode, from_equations, simulate
-from hybrid.transform.corners import are_apart, arrivals, exits
+from hybrid.transform.corners import are_apart, arrivals, attraction, exits, may_slide, slides, speeds
 from tests.hybrid.transform.test_cells import numbers, pieces_of
 
 QUADRANTS = [(-1, -1), (-1, 1), (1, -1), (1, 1)]
@@ -154,3 +154,36 @@ def test_oblique_surfaces_are_apart_by_their_normals():
     assert are_apart(pieces, dict.fromkeys(on, 0), on)
     tilted, _ = pieces_of(lambda t, x, p: (-2.0 * np.sign(x.x), np.sign(x.x) - np.sign(x.x + x.y)))
     assert not are_apart(tilted, dict.fromkeys(on, 0), on)
+
+
+def test_conditions_for_sliding_where_jumps_add_up():
+    """``x' = sign(y)/2 - 2 sign(x)`` and ``y' = 1/4 - sign(y)``; along ``y = 0`` the sign of ``y`` is 1/4."""
+    pieces, _ = pieces_of(lambda t, x, p: (0.5 * np.sign(x.y) - 2.0 * np.sign(x.x), 0.25 - np.sign(x.y)))
+    x, y = numbers(pieces)
+
+    def rounded(expressions):
+        return [float(each) for each in expressions]
+
+    assert slides(pieces, {x: 2, y: -2}) == []
+    assert rounded(slides(pieces, {x: 0, y: 2})) == [2.5, 1.5]
+    assert rounded(slides(pieces, {x: 2, y: 0})) == [1.25, 0.75]
+    both = {x: 0, y: 0}
+    assert rounded(speeds(pieces, both, x)) == [2.125, -1.875]
+    assert rounded(speeds(pieces, both, y)) == [1.25, -0.75]
+    assert float(attraction(pieces, both)) == 8.0
+    assert sorted(rounded(slides(pieces, both))) == [1.25 * 0.75, 2.125 * 1.875, 8.0]
+    assert may_slide(pieces, both)
+    assert may_slide(pieces, {x: 2, y: 2})
+
+
+@pytest.mark.parametrize(
+    ("field", "along_both"),
+    [
+        (lambda t, x, p: (-np.sign(x.x), -np.sign(x.y)), True),
+        (lambda t, x, p: (-np.abs(x.x), -np.sign(x.y)), False),
+    ],
+)
+def test_surfaces_without_a_jump_hold_no_orbit(field, along_both):
+    pieces, _ = pieces_of(field)
+    x, y = numbers(pieces)
+    assert may_slide(pieces, {x: 0, y: 0}) == along_both

@@ -137,3 +137,19 @@ def test_chatter_ends_in_the_piece_of_the_state(start):
     assert last.t == pytest.approx(limit, abs=1e-9)
     expected = slowed(slowed(start, limit), 2.0 * (4.5 - limit))
     assert arc.x[-1] == pytest.approx([0.0, 0.0, expected], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "fired"),
+    [
+        ("lands on either side", ["u>0->u>0", "u>0->u<0"]),
+        ("lands on the other side", ["u>0->u<0", "u<0->u>0"]),
+        # Where there is one landing, the side that is left says enough.
+        ("lands above", ["u>0", "u>0"]),
+        ("lands below", ["u>0", "u<0"]),
+    ],
+)
+def test_copies_are_named_after_the_sides_that_matter(name, fired):
+    reset = RESETS[name]
+    arc = simulate(clock(lambda t, x, p: (1.0, reset(x.u))), (1.0, 0.5), (0.0, 2.5))
+    assert [jump.transition for jump in arc.jumps] == [f"tick ({sides})" for sides in fired]

@@ -1,5 +1,7 @@
 """One impact by several methods: what is right in each, and what the exponents follow from."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,15 @@ def test_an_elastic_impact_reverses_gap_and_rate_and_shears(windows):
     np.testing.assert_allclose(relative, [[-1.0, 0.0], [-4.891, -1.0]], atol=1e-3)
     # Halfway the rate is a thousand times as large as what remains of it.
     assert windows[0].halfway()[1, 0] == pytest.approx(-4679.0, abs=1.0)
+
+
+def test_the_map_of_the_gap_of_two_masses():
+    """With the center of mass at rest, ``x1 = m2 gap / M`` and ``x2 = -m1 gap / M``, and so the speeds."""
+    made = SimpleNamespace(system=SimpleNamespace(parameters={"m1": 1.0, "m2": 3.0}))
+    contact = np.arange(16.0).reshape(4, 4) ** 2
+    parts = np.array([[0.75, 0.0], [-0.25, 0.0], [0.0, 0.75], [0.0, -0.25]])
+    expected = np.array([contact[0] - contact[1], contact[2] - contact[3]]) @ parts
+    np.testing.assert_allclose(study.Impact.relative(made, contact), expected, rtol=1e-15)
 
 
 def test_ode23s_errs_in_the_shear_alone(windows):

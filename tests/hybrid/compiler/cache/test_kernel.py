@@ -1,12 +1,15 @@
 """Compiled kernels: every kind of argument and result, alone and from the file that stores them."""
 
+import gc
 import subprocess
 import sys
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from hybrid.compiler.cache.kernel import file_of, kernels_in
+from hybrid.compiler.cache.loader import _without_collection
 from hybrid.kernels.types.export import exports_of, object_code
 from hybrid.kernels.types.kinds import (
     CUBE,
@@ -147,3 +150,16 @@ def test_the_file_needs_no_compiler(content, tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout == "3.0 False\n", done.stderr
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_the_search_for_garbage_goes_on_as_before(collects):
+    before = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        with suppress(ZeroDivisionError), _without_collection():
+            assert not gc.isenabled()
+            raise ZeroDivisionError
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if before else gc.disable)()

@@ -1,5 +1,6 @@
 """Kernels that a second process compiles at the same time."""
 
+import os
 import subprocess
 
 import pytest
@@ -56,5 +57,14 @@ def test_neither_does_a_program_that_is_its_own_interpreter(empty_cache, monkeyp
     second_process.start(["hybrid.kernels.steps.step"])
 
 
-def test_finish_has_nothing_to_wait_for_without_a_start():
+def test_there_is_nothing_to_wait_for_without_a_start():
     second_process.wait_for(lambda: False)
+
+
+def test_processors_are_those_of_the_process(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3, 5, 8}, raising=False)
+    assert second_process.processors() == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    for count, found in ((6, 6), (None, 1)):
+        monkeypatch.setattr(os, "cpu_count", lambda count=count: count)
+        assert second_process.processors() == found

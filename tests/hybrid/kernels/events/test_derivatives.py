@@ -1,6 +1,7 @@
 """Which side of a guard a state on it goes to, where rounding hides or reverses speed and acceleration."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from numba import njit
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
 from hybrid.kernels.events import derivatives, sides
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.simulation.trajectory import start
+from tests.hybrid.kernels.plain import plain
 
 _side_of, _moment = sides.side_of, derivatives.moment_of_rounding
 EPS = np.finfo(float).eps
@@ -166,3 +169,48 @@ def test_a_flat_root_fires_once_however_its_rounding_falls(power, counts, solver
             swings(power, counts), (b[k], 0.0), (0.0, END), parameters={"a": a[k], "s": s[k]}, solver=solver
         )
         np.testing.assert_allclose(arc.jumps.t, low, rtol=0, atol=1e-9, err_msg=f"{a[k]!r} {b[k]!r} {s[k]!r}")
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(
+    ("slopes", "curve", "base", "reverses"),
+    [
+        # Sizes of 1, 4 and of the time, 16; all arguments together move the derivative by the sum of all.
+        ((1.0, 0.0, 0.0), 0.0, 0.9, True),
+        ((1.0, 0.0, 0.0), 0.0, 1.1, False),
+        ((0.0, -1.0, 0.0), 0.0, 3.9, True),
+        ((0.0, -1.0, 0.0), 0.0, 4.1, False),
+        ((0.0, 0.0, 1.0), 0.0, 15.9, True),
+        ((0.0, 0.0, 1.0), 0.0, 16.1, False),
+        ((1.0, -1.0, 0.5), 0.0, 12.9, True),
+        ((1.0, -1.0, 0.5), 0.0, 13.1, False),
+        # A derivative that is least here is moved nowhere.
+        ((0.0, 0.0, 0.0), 1.0, 0.5, False),
+        ((0.0, 0.0, 0.0), 1.0, -0.5, True),
+    ],
+)
+def test_derivatives_that_rounding_may_reverse(slopes, curve, base, reverses, sign):
+    """In units of the rounding of a number of the size one."""
+    share = derivatives.SHARE
+    x, t = np.zeros(2), 16.0
+
+    def derivative(model, transition, moment, place, second, work):
+        a, b, c = (place[0] - x[0]) / share, (place[1] - x[1]) / share, (moment - t) / share
+        return sign * (base + slopes[0] * a + slopes[1] * b + slopes[2] * c + curve * a * a), 0.0
+
+    tested = plain(derivatives, _derivative=derivative)._may_reverse
+    model, run = SimpleNamespace(dimension=2, period=0.0), SimpleNamespace(scale=np.array([1.0, 4.0]))
+    work = SimpleNamespace(rounding=np.zeros((4, 2)))
+    assert bool(tested(model, run, 0, t, x, sign, False, work)) == reverses
+    assert share > EPSILON
+
+
+@pytest.mark.parametrize(
+    ("value", "rounding", "sign", "is_open"),
+    [(2.0, 1.0, 1, False), (1.0, 1.0, 1, True), (-2.0, 1.0, 1, True), (-2.0, 1.0, -1, False),
+     (0.0, 0.0, 1, False), (0.0, 0.5, 1, True), (-1.0, 0.0, 1, True)],
+)  # fmt: skip
+def test_derivatives_that_are_not_certain_of_a_sign(value, rounding, sign, is_open):
+    kernels = plain(derivatives)
+    assert kernels._is_open(value, rounding, sign) == is_open
+    assert kernels._certain(value, rounding) == (0 if abs(value) <= rounding else np.sign(value))

@@ -253,3 +253,42 @@ def test_a_state_beside_a_guard():
     np.testing.assert_allclose(out, [1.6, 1.2], rtol=1e-15)
     displace(model, np.array([1.0, 2.0]), 5.0, np.array([0.0, 0.0, 9.0]), out)
     assert out.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("value", "direction", "before", "after"),
+    [
+        (2.0, 1, 0, 1),
+        (-2.0, 1, 1, -1),
+        (2.0, 0, -1, 1),
+        # Within rounding it has not crossed yet, if it has a side at all.
+        (0.5, 1, 1, -1),
+        (-0.5, 1, -1, -1),
+        (0.5, -1, -1, 1),
+        (0.0, -1, 1, 1),
+        (0.5, 1, 0, 0),
+        (0.5, 0, 1, 1),
+        (np.nan, 1, 1, 1),
+        (np.nan, 1, -1, -1),
+        (1.0, 1, 1, -1),
+    ],
+)
+def test_sides_at_a_state(value, direction, before, after):
+    """The second mode has the transitions 2 and 0, and 1 is none of them; rounding is 1."""
+    asked = []
+
+    def gradient(transition, t, x, parameters, out):
+        asked.append(transition)
+
+    tested = plain(guards, guard_value=lambda *given: value, rounding_band=lambda *given: 1.0).sides_at
+    model = SimpleNamespace(
+        first_outgoing=np.array([0, 1, 3]),
+        outgoing=np.array([1, 2, 0]),
+        direction=np.array([direction, 5, direction]),
+        guard_gradient=gradient,
+        parameters=None,
+    )
+    run = SimpleNamespace(mode=1, y=None, side=np.array([before, 7, before]))
+    tested(model, run, 0.0, SimpleNamespace(scalar=None, gradient=None))
+    assert run.side.tolist() == [after, 7, after]
+    assert asked == [2, 0]

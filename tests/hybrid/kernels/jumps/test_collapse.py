@@ -277,3 +277,62 @@ def test_transitions_that_fire_in_turn_at_one_instant(fired, here, turn):
     model = SimpleNamespace(target=np.array([0] * 6 + [1, 0]), direction=np.array([1] * 7 + [0]))
     run = SimpleNamespace(jumps=64, jumps_here=here, recent=recent, visits=np.zeros((64, 1)), mode=0)
     assert plain(module).round_at_once(model, run) == turn
+
+
+@pytest.mark.parametrize(
+    ("turn", "affine", "rounds", "found"),
+    [
+        (0, True, [], (0, 0.0)),
+        (3, True, [8.0, 4.0], (3, 8.0)),
+        (3, True, [4.0, 16.0], (3, 16.0)),
+        (3, False, [4.0, 16.0], (0, 0.0)),
+        (3, True, [0.0], (0, 0.0)),
+        (3, True, [4.0, 0.0], (0, 0.0)),
+    ],
+)
+def test_a_limit_is_followed_twice(turn, affine, rounds, found):
+    """Once more from where it was found, with the rounding of as many rounds."""
+    asked, waiting, most = [], list(rounds), 1.0
+
+    def follow_doubling(model, run, turn, start, before, work):
+        asked.append((start.tolist(), before))
+        work.settled[:] = 10.0 * len(asked)
+        return waiting.pop(0)
+
+    tested = plain(
+        module,
+        round_at_once=lambda model, run: turn,
+        follow_doubling=follow_doubling,
+        is_affine=lambda *given: affine,
+    ).limit_at_once
+    work = SimpleNamespace(second_error=np.zeros(2), settled=np.zeros(2))
+    run = SimpleNamespace(y=np.array([1.0, 2.0]))
+    assert tested(SimpleNamespace(dimension=2), run, work) == found
+    expected = [([1.0, 2.0], 1.0), ([10.0, 10.0], rounds[0] if rounds else most)][: len(rounds)]
+    assert asked == expected
+
+
+def test_the_jacobian_of_a_round():
+    """Each reset at the state that the one before has made: ``x -> (x y, y + 2)``, then ``x -> (y, x^2)``."""
+
+    def reset(transition, t, x, parameters, out):
+        assert t == 7.0
+        out[:] = (x[0] * x[1], x[1] + 2.0) if transition == 5 else (x[1], x[0] ** 2)
+
+    def reset_jacobian(transition, t, x, parameters, out):
+        out[:] = (
+            [[x[1], x[0], 9.0], [0.0, 1.0, 9.0]]
+            if transition == 5
+            else [[0.0, 1.0, 9.0], [2.0 * x[0], 0.0, 9.0]]
+        )
+
+    model = SimpleNamespace(dimension=2, parameters=None, reset=reset, reset_jacobian=reset_jacobian)
+    run = SimpleNamespace(
+        jumps=9, recent=np.array([0] * 7 + [5, 6] + [0] * 7), visits=np.zeros((16, 1)), phase=7.0
+    )
+    work = SimpleNamespace(
+        new=np.zeros(2), sizes=np.zeros((2, 2)), state=np.zeros(2), reset_jacobian=np.zeros((2, 3))
+    )
+    out, (x, y) = np.full((2, 2), 99.0), (3.0, 4.0)
+    plain(module).round_jacobian(model, run, 2, np.array([x, y]), out, work)
+    assert out.tolist() == [[0.0, 1.0], [2.0 * x * y * y, 2.0 * x * y * x]]

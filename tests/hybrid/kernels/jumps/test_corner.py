@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
-from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
+from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, JUMPING
 from hybrid.kernels.jumps import corner as module
+from hybrid.kernels.types.codes import NO_TRANSITION, STALE
 from tests.hybrid.kernels.plain import plain
 
 
@@ -166,3 +167,89 @@ def test_a_guard_that_only_touches(before):
     assert not turns_back(before, speed=0.6 * before, order=BY_SPEED, side=-before)
     assert turns_back(before, speed=0.6 * before, order=BY_SPEED, side=before)
     assert turns_back(before, speed=0.6 * before, order=BY_STEP, side=-before)
+
+
+@pytest.mark.parametrize(
+    ("on_guard", "has_program", "in_series", "order"),
+    [(0, True, 0, JUMPING), (0, True, 1, BY_SPEED), (0, False, 0, BY_SPEED), (BY_STEP, True, 0, BY_STEP)],
+)
+def test_a_guard_that_has_crossed_zero_and_is_not_small_has_jumped(on_guard, has_program, in_series, order):
+    def take_sides(model, run, *given):
+        run.on_guard[0] = on_guard
+
+    tested = plain(
+        module,
+        task_of=lambda task: task,
+        take_sides=take_sides,
+        turns_back=lambda *given: False,
+        allowed=lambda *given: True,
+        has_program=lambda *given: has_program,
+    ).first_in_order
+    model = SimpleNamespace(
+        first_outgoing=[0, 1],
+        outgoing=[0],
+        direction=[-1],
+        affine_guard=[0],
+        guard_in_series=[in_series],
+        marker=[0],
+    )
+    run = SimpleNamespace(
+        mode=0,
+        phase=0.0,
+        y=None,
+        side=[1],
+        due=[0],
+        on_guard=[9],
+        rehearsal=np.zeros((4, 1)),
+        order_mattered=0,
+    )
+    task = (None, model, None, run, None, SimpleNamespace(scalar=None))
+    assert tested(task, 0) == 0
+    assert (run.on_guard[0], run.side[0], run.due[0], run.order_mattered) == (order, -1, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("direction", "before", "affine", "turned", "permitted", "side"),
+    [
+        (-1, 1, 1, False, True, -1),
+        (1, -1, 1, False, True, 1),
+        (0, 1, 1, False, True, -1),
+        (0, -1, 1, False, True, 1),
+        (1, -1, 1, True, True, 0),
+        (1, -1, 0, True, True, 1),
+        # One that may not fire is behind all the same.
+        (1, -1, 1, True, False, 0),
+        (1, -1, 1, False, False, 0),
+    ],
+)
+def test_the_side_after_a_crossing(direction, before, affine, turned, permitted, side):
+    """A touch is recorded and does not fire; the next step shows the side after it, and after a refusal."""
+    asked, touches = [], []
+
+    def turns_back(model, run, fired, near, work):
+        asked.append(near)
+        return turned
+
+    tested = plain(
+        module,
+        task_of=lambda task: task,
+        take_sides=lambda *given: None,
+        turns_back=turns_back,
+        allowed=lambda *given: permitted,
+        guard_value=lambda *given: 0.0,
+        keep_grazing=lambda *given: touches.append(given[3]),
+    ).first_in_order
+    model = SimpleNamespace(
+        first_outgoing=[0, 1], outgoing=[0], direction=[direction], affine_guard=[affine], marker=[0]
+    )
+    run = SimpleNamespace(
+        mode=0, phase=0.0, y=None, side=[before], due=[0], on_guard=[1], rehearsal=np.zeros((4, 1)),
+        order_mattered=0, stage=0, last_step=1.0,
+    )  # fmt: skip
+    touched = turned and affine == 1 and permitted
+    task = (None, model, None, run, None, SimpleNamespace(scalar=None))
+    assert tested(task, 0) == (NO_TRANSITION if touched or not permitted else 0)
+    assert asked == ([before] if affine else [])
+    assert touches == ([0] if touched else [])
+    assert (run.side, run.due) == ([side], [0 if touched or not permitted else 1])
+    assert (run.stage, run.last_step) == ((STALE, 0.0) if touched or not permitted else (0, 1.0))

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
 from hybrid.kernels.jumps import jump
+from hybrid.kernels.types.codes import ENTERING, GRAZING, TRANSVERSE
 from hybrid.simulation.trajectory import start
 from lyapunov import lyapunov_spectrum
 from tests.hybrid.kernels.plain import plain
@@ -355,3 +356,76 @@ def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():
     assert not calls
     assert carried(True, False, strain=0.5)[1] - carried(True, False)[1] == pytest.approx(0.5, rel=1e-12)
     assert carried(True, False, strain=1e9) == (100.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("phase", "cycle", "here"), [(3.0, 2, 6), (3.0, 1, 1), (2.0, 2, 1)], ids=["same", "period", "time"]
+)
+def test_a_jump_moves_the_run(phase, cycle, here):
+    """Jumps at one instant are counted, and each stay is as long as it was."""
+    model = SimpleNamespace(dimension=2)
+    run = SimpleNamespace(
+        y=np.zeros(2),
+        scale=np.array([2.0, 2.0]),
+        phase=3.0,
+        cycle=2,
+        last_jump_phase=phase,
+        last_jump_cycle=cycle,
+        jumps_here=5,
+        recent=np.full(8, 9),
+        visits=np.zeros((8, 2)),
+        jumps=10,
+        last_fired=0,
+        stay=np.zeros(3),
+        since_entry=0.75,
+        previous_mode=0,
+        mode=1,
+        stage=0,
+    )
+    plain(jump, remember_visit=lambda model, run: None).move(model, run, 4, 2, np.array([1.0, -3.0]))
+    assert (run.y.tolist(), run.scale.tolist()) == ([1.0, -3.0], [2.0, 3.0])
+    assert (run.jumps_here, run.last_jump_phase, run.last_jump_cycle) == (here, 3.0, 2)
+    assert (run.jumps, run.last_fired, run.recent.tolist()) == (11, 4, [9, 9, 4, 9, 9, 9, 9, 9])
+    assert (run.mode, run.previous_mode, run.stage) == (2, 1, ENTERING)
+    assert (run.stay.tolist(), run.since_entry) == ([0.0, 0.75, 0.0], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("speed", "acceleration", "last", "grazes"),
+    [
+        # The depth ``v^2 / 2 a`` of the dip, compared with a band of 1/2.
+        (2.0, 4.0, {}, True),
+        (2.0, -4.0, {}, True),
+        (2.1, 4.0, {}, False),
+        (-2.1, 4.0, {}, False),
+        # After a grazing by the same transition, on the way back, at most twice as fast.
+        (3.0, 1.0, {"way_in": -1.5}, True),
+        (-3.0, 1.0, {"way_in": 1.5}, True),
+        (3.1, 1.0, {"way_in": -1.5}, False),
+        (3.0, 1.0, {"way_in": 1.5}, False),
+        (3.0, 1.0, {"way_in": -1.5, "kind": TRANSVERSE}, False),
+        (3.0, 1.0, {"way_in": -1.5, "fired": 0}, False),
+    ],
+)
+def test_dips_that_the_tolerances_cannot_tell(speed, acceleration, last, grazes):
+    run = SimpleNamespace(
+        mode=0,
+        phase=0.0,
+        y=np.zeros(1),
+        last_transversality=last.get("way_in", 9.0),
+        last_kind=last.get("kind", GRAZING if last else TRANSVERSE),
+        last_fired=last.get("fired", 1),
+    )
+    tested = plain(jump, guard_acceleration=lambda *given: acceleration, error_band=lambda *given: 0.5)
+    model, work = SimpleNamespace(dimension=1), SimpleNamespace(gradient=None)
+    assert tested.is_grazing(model, None, run, 1, speed, work) == grazes
+
+
+@pytest.mark.parametrize(
+    ("entry", "largest", "singular"), [(-9.0, 9.0, 0), (1.0, 5.0, 0), (np.inf, np.inf, 1)]
+)
+def test_matrices_that_are_not_finite_are_counted(entry, largest, singular):
+    run = SimpleNamespace(largest_saltation=5.0, singular_jumps=0)
+    work = SimpleNamespace(saltation=np.array([[0.5, entry], [0.0, 1.0]]))
+    plain(jump).judge(run, 2, work)
+    assert (run.largest_saltation, run.singular_jumps) == (largest, singular)

@@ -1,11 +1,238 @@
 """Pulses far narrower than a step belong to one mode, or come once in each period: none is stepped over."""
 
+import math
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Taylor, Transition, Tsit5, simulate
+from hybrid.kernels.steps import forcing
+from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
+from hybrid.kernels.types.layout import EPSILON
+from tests.hybrid.kernels.plain import plain
+
+METHOD = SimpleNamespace(atol=0.5, rtol=0.25, nodes="nodes", b=np.zeros(2))
+
+
+def model_with(*kinds, components=(-1, 1, -1)):
+    """The second of two modes has forcings of these kinds; there are two transitions."""
+    count = len(kinds)
+    return SimpleNamespace(
+        dimension=2,
+        target=np.zeros(2),
+        timed=np.array([0, 1]),
+        first_forcing=np.array([0, 0, count]),
+        forcing_kind=np.array(kinds, dtype=int),
+        forcing_component=np.array(components),
+        programs=SimpleNamespace(first=np.arange(8), checked=np.ones(8, dtype=int)),
+    )
+
+
+def new_run(**values):
+    given = {"mode": 1, "phase": 3.0, "cycle": 2, "y": np.array([7.0, -2.0]), "coarse": 0, "unresolved": 0}
+    given |= {"calm_mode": 0, "calm_cycle": 2, "calm_until": 0.0, "calm_wait": 0, "since_entry": 0.0}
+    return SimpleNamespace(**(given | values))
+
+
+def test_tolerances_of_forcings():
+    """Of the component that a forcing enters; none if that is unknown. The first component counts as well."""
+    model = model_with(IN_TIME, IN_TIME, IN_TIME, components=(-1, 1, 0))
+    found = [plain(forcing)._tolerance(model, METHOD, new_run(), i) for i in range(3)]
+    assert found == [0.0, 0.5 + 0.25 * 2.0, 0.5 + 0.25 * 7.0]
+
+
+class TestCalm:
+    """Forcings in time that are monotone for 16 steps are not looked at again before."""
+
+    def calm(self, *answers, kinds=(IN_TIME, IN_TIME), h=0.25, **values):
+        asked, answers = [], list(answers)
+
+        def is_steady(model, program, path, order, clock, start, span, negligible, work):
+            asked.append((program, clock, start, span, negligible))
+            return answers.pop(0)
+
+        run = new_run(**values)
+        tested = plain(forcing, is_steady=is_steady)._is_calm
+        found = tested(model_with(*kinds), METHOD, run, 1, None, 1, h, None)
+        return bool(found), [program for program, *_ in asked], run, asked
+
+    def test_what_is_known_is_not_asked(self):
+        known = {"calm_mode": 2, "calm_until": 3.25}
+        assert self.calm(**known)[:2] == (True, [])
+        for other in ({"calm_until": 3.2}, {"calm_mode": 1}, {"calm_cycle": 1}):
+            found, asked, run, _ = self.calm((True, 0.0), (True, 0.0), **(known | other))
+            assert (found, asked) == (True, [2, 3])
+            assert (run.calm_mode, run.calm_cycle, run.calm_until) == (2, 2, 7.0)
+
+    def test_each_forcing_in_time_is_asked_for_sixteen_steps(self):
+        found, asked, run, given = self.calm((True, 0.0), (True, 0.0))
+        assert (found, asked, run.calm_wait) == (True, [2, 3], -1)
+        assert given[0][1:] == (-1, 3.0, 4.0, 0.0)
+        assert self.calm((True, 0.0), kinds=(ARGUMENTS, IN_TIME, TERMS))[1] == [3]
+
+    def test_after_a_turn_some_steps_go_by(self):
+        found, asked, run, _ = self.calm((False, 0.0))
+        assert (found, asked, run.calm_wait, run.calm_mode) == (False, [2], 8, 0)
+        found, asked, run, _ = self.calm(calm_wait=2)
+        assert (found, asked, run.calm_wait) == (False, [], 1)
+        assert self.calm((True, 0.0), (True, 0.0), calm_wait=1)[0]
+
+    def test_noise_counts_against_a_tenth_of_the_tolerance(self):
+        """Of 1 for the second forcing, over the time 4; the first one has none."""
+        assert self.calm((True, 0.0), (True, 0.024))[0]
+        assert not self.calm((True, 0.0), (True, 0.026))[0]
+        assert not self.calm((True, 1e-9))[0]
+
+
+@pytest.mark.parametrize(
+    ("kinds", "has"),
+    [((), False), ((IN_TIME,), False), ((ARGUMENTS, TERMS), True), ((IN_TIME, ARGUMENTS), False)],
+)
+def test_modes_with_terms_in_the_state(kinds, has):
+    assert bool(plain(forcing)._has_terms_in_state(model_with(*kinds), 1)) == has
+
+
+@pytest.mark.parametrize(
+    ("change", "checked", "found"),
+    [
+        (7.9, 1, False),
+        (8.1, 1, True),
+        (-8.1, 1, False),
+        (8.1, 0, False),
+        (math.nan, 1, True),
+        (math.inf, 1, True),
+    ],
+)
+def test_arguments_of_exponentials_that_change(change, checked, found):
+    """By more than 8 on the step; only rows that are checked count."""
+    asked = []
+
+    def bound(programs, program, path, order, clock, start, pace, middle, radius, registers):
+        asked.append((program, clock, start, pace, middle, radius))
+        registers[:, LOW], registers[:, HIGH] = 2.0, 2.0
+        registers[1, HIGH] = 2.0 + change
+        return 1
+
+    model = model_with(IN_TIME, ARGUMENTS, TERMS)
+    model.bound = bound
+    model.programs = SimpleNamespace(first=np.array([0, 0, 0, 1, 3, 4]), checked=np.array([1, 1, checked, 1]))
+    work = SimpleNamespace(registers=np.full((3, 6), 99.0))
+    assert bool(plain(forcing)._arguments_change(model, 1, None, 1, -1, 3.0, 0.5, work)) == found
+    assert asked == [(3, -1, 3.0, 1.0, 0.25, 0.25)]
+    model.programs.first[:] = 0
+    assert plain(forcing)._arguments_change(model, 1, None, 1, -1, 3.0, 0.5, work)
+    assert not plain(forcing)._arguments_change(model_with(IN_TIME), 1, None, 1, -1, 3.0, 0.5, work)
+
+
+class TestLongest:
+    def longest(
+        self, answer, *, kinds=(IN_TIME,), timed=True, swings=False, calm=False, clock=-1, change=True, **run
+    ):
+        """The step up to 1 for what ``first_hidden`` says of each program and length."""
+        asked = []
+
+        def first_hidden(model, program, path, order, *given):
+            told, start, nodes, h, tolerance, finest, of_state, _ = given
+            assert (told, start, nodes) == (clock, 3.0, "nodes")
+            asked.append((program, h, tolerance, bool(of_state)))
+            assert finest == 2.0 * EPSILON * ((3.0 if clock < 0 else 0.0) + self.step)
+            found = answer(program, h)
+            self.step = self.next(found, h)
+            return found
+
+        self.step = 1.0
+        tested = plain(
+            forcing,
+            first_hidden=first_hidden,
+            _is_calm=lambda *given: calm,
+            _arguments_change=lambda *given: change,
+        )._longest_explained
+        made = new_run(**run)
+        given = (None, 1, clock, "nodes", timed, swings, 1.0, None)
+        return tested(model_with(*kinds), METHOD, made, *given), asked, made
+
+    @staticmethod
+    def next(found, h):
+        place, other, _ = found
+        return h if place >= h else place if 2.0 * place >= other else other
+
+    def test_all_is_explained(self):
+        step, asked, run = self.longest(lambda program, h: (h, h, 0.0))
+        assert (step, asked, run.coarse) == (1.0, [(2, 1.0, 0.0, False)], 0)
+
+    def test_a_step_is_cut_until_it_is_explained(self):
+        """To where it is explained, or to the first place that is not, if that is hardly anything."""
+        step, asked, _ = self.longest(lambda program, h: (0.6, 0.7, 0.0) if h > 0.6 else (h, h, 0.0))
+        assert (step, [h for _, h, *_ in asked]) == (0.6, [1.0, 0.6])
+        step, asked, _ = self.longest(lambda program, h: (0.1, 0.3, 0.0) if h > 0.3 else (h, h, 0.0))
+        assert (step, [h for _, h, *_ in asked]) == (0.3, [1.0, 0.3])
+
+    def test_who_is_asked(self):
+        yes = lambda program, h: (h, h, 0.0)  # noqa: E731
+        kinds = (IN_TIME, ARGUMENTS, TERMS)
+        both = self.longest(yes, kinds=kinds, timed=True, swings=True)[1]
+        assert both == [(2, 1.0, 0.0, False), (4, 1.0, 0.0, True)]
+        assert self.longest(yes, kinds=kinds, timed=False, swings=True)[1] == both[1:]
+        assert self.longest(yes, kinds=kinds, timed=True, swings=False)[1] == both[:1]
+        assert self.longest(yes, kinds=kinds, swings=True, calm=True)[1] == both[1:]
+        assert self.longest(yes, kinds=kinds, swings=True, change=False)[1] == both[:1]
+        assert self.longest(yes, kinds=kinds, calm=True)[1] == []
+        # Calm is known of time alone, not of a clock.
+        assert self.longest(yes, kinds=kinds, calm=True, clock=1)[1] == both[:1]
+
+    def test_coarse_pieces_are_counted(self):
+        """More than ten tolerances, of 1 here, and of forcings in time."""
+        second = (ARGUMENTS, IN_TIME)
+        for rest, coarse in ((9.9, 0), (10.1, 1)):
+            assert self.longest(lambda program, h, r=rest: (h, h, r), kinds=second)[2].coarse == coarse
+        found = self.longest(lambda program, h: (h, h, 99.0), kinds=(ARGUMENTS, TERMS), swings=True)
+        assert found[2].coarse == 0
+
+    def test_what_is_never_explained_is_passed_in_the_shortest_steps(self):
+        """At last in the steps that the method proposes."""
+        shortest = 64.0 * EPSILON * 3.0 + EPSILON
+        never = lambda program, h: (0.0, 0.5 * h, 0.0)  # noqa: E731
+        for before, step in ((0, shortest), (99, shortest), (100, 1.0)):
+            found, _, run = self.longest(never, unresolved=before)
+            assert (found, run.unresolved) == (step, before + 1)
+
+
+@pytest.mark.parametrize(("share", "step"), [(1.0, 0.5), (0.75, 0.9 * 0.375)])
+def test_a_cubic_stands_for_an_attempted_step(share, step):
+    """``y = 1 + 2 s - s^2 + 3 s^3`` and ``-2 + s^3`` on a step of 1/2, of which a share is explained."""
+    asked = []
+
+    def longest(model, method, run, path, order, clock, nodes, timed, swings, h, work):
+        asked.append((path[:4].tolist(), order, clock, nodes, timed, swings))
+        return share * h
+
+    tested = plain(forcing, _longest_explained=longest).explained_attempt
+    work = SimpleNamespace(
+        stages=np.array([[2.0, 0.0], [9.0, 9.0], [2.0 - 1.0 + 2.25, 0.75]]),
+        new=np.array([1.0 + 1.0 - 0.25 + 0.375, -2.0 + 0.125]),
+        path=np.full((6, 2), 99.0),
+    )
+    run = new_run(y=np.array([1.0, -2.0]))
+    assert tested(model_with(ARGUMENTS, TERMS), METHOD, run, 0.5, work) == step
+    assert asked == [([[1.0, -2.0], [2.0, 0.0], [-1.0, 0.0], [3.0, 1.0]], 3, -1, "nodes", False, True)]
+    assert tested(model_with(IN_TIME), METHOD, run, 0.5, work) == 0.5
+    work.new[1] = math.inf
+    assert tested(model_with(ARGUMENTS, TERMS), METHOD, run, 0.5, work) == 0.5
+    assert len(asked) == 1
+
+
+def test_rates_at_the_start_stand_for_a_step():
+    asked = []
+    tested = plain(
+        forcing,
+        _longest_explained=lambda *given: asked.append((given[3][:2].tolist(), *given[4:10])) or 0.125,
+    ).explained_step
+    work = SimpleNamespace(stages=np.array([[2.0, 3.0]]), path=np.full((6, 2), 99.0))
+    assert tested(model_with(IN_TIME), METHOD, new_run(), 0.5, work) == 0.125
+    assert asked == [([[7.0, -2.0], [2.0, 3.0]], 1, -1, "nodes", True, False, 0.5)]
+
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 # A lag of one unit of time, that long after a pulse of height 1 and width 0.01: the integral of

@@ -8,20 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numba import njit
 
-from hybrid.kernels.steps import series_guards, series_roots
+from hybrid.kernels.steps import series_guards
 from hybrid.kernels.types.codes import HIGHEST_ORDER as ORDER
-from tests.hybrid.kernels.plain import plain
 
 _judge, _to_bernstein, _leading = (
     series_guards.judge_leading,
     series_guards.leading_to_bernstein,
     series_guards.leading_powers,
 )
-_expanded_at, _root_between, _keeps_half = (
-    series_roots.expanded_at,
-    series_roots.root_between,
-    series_guards.keeps_half,
-)
+_keeps_half = series_guards.keeps_half
 CLEAR, CROSSES, UNKNOWN = series_guards.CLEAR, series_guards.CROSSES, series_guards.UNKNOWN
 
 
@@ -138,102 +133,3 @@ def test_bernstein_coefficients(degree):
         for i in range(degree + 1)
     ]
     np.testing.assert_allclose(_converted(powers, degree), shares, rtol=1e-12, atol=1e-13)
-
-
-@njit
-def _expanded(powers, first, s):
-    return _expanded_at(powers.reshape((-1, 1)), 0, first, len(powers) - 1, s)
-
-
-@njit
-def _root(powers, known_roots, low, high):
-    series = powers.reshape((-1, 1))
-    left, _, _ = _expanded_at(series, 0, known_roots, len(powers) - 1, low)
-    right, _, _ = _expanded_at(series, 0, known_roots, len(powers) - 1, high)
-    return _root_between(series, 0, len(powers) - 1, known_roots, 1.0, low, high, left, right)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 8, 27, 28])
-@pytest.mark.parametrize("first", [0, 1])
-def test_value_and_derivatives(order, first):
-    powers = np.random.default_rng(order).normal(size=order + 1)
-    divided = np.polynomial.Polynomial(powers[first:])
-    exact = [divided(0.7), divided.deriv()(0.7), divided.deriv(2)(0.7) / 2]
-    np.testing.assert_allclose(_expanded(powers, first, 0.7), exact, rtol=1e-12, atol=1e-12)
-
-
-@given(
-    root=st.floats(0.05, 0.95),
-    gap=st.floats(1e-7, 0.04),
-    known_roots=st.integers(0, 2),
-    tail=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12),
-)
-def test_a_root_next_to_a_turning_point(root, gap, known_roots, tail):
-    """The bracket ends where the guard turns back: the slope vanishes at one end of it."""
-    # (s - root) (s - root - 2 gap) times a factor away from zero.
-    rest = np.polynomial.Polynomial([1.0, *(0.3 * v / len(tail) for v in tail)])
-    pair = np.polynomial.Polynomial.fromroots([root, root + 2.0 * gap])
-    powers = np.concatenate([np.zeros(known_roots), (pair * rest).coef])
-    found = _root(powers, known_roots, 0.0 if known_roots == 0 else 1e-3, root + gap)
-    # Rounding of the terms, divided by the slope.
-    assert abs(found - root) <= 64 * 2.2e-16 / (2.0 * gap * root**known_roots)
-
-
-def test_a_root_to_rounding():
-    """The cosine as a series of the length that exact modes use."""
-    powers = np.array([0.0 if k % 2 else (-1.0) ** (k // 2) / math.factorial(k) for k in range(ORDER + 1)])
-    assert _root(powers, 0, 1.0, 2.0) == pytest.approx(math.pi / 2, abs=2.3e-16)
-
-
-@njit
-def _root_with_ends(powers, low, high, left, right):
-    return _root_between(powers.reshape((-1, 1)), 0, len(powers) - 1, 0, 1.0, low, high, left, right)
-
-
-def test_a_root_that_rounding_puts_on_the_other_side_of_an_end():
-    """The signs at the ends come from sums with other rounding errors than those of the series itself.
-
-    The root is then just outside of the bracket as the series has it: it is at the end, to rounding.
-    """
-    orders = np.arange(ORDER + 1)
-    sizes = np.array([(-1.0) ** (k // 2) * 1.3**k / math.factorial(k) for k in orders])
-    cosine, sine = np.where(orders % 2 == 0, sizes, 0.0), np.where(orders % 2 == 1, sizes, 0.0)
-    for beyond in (-1e-16, 0.0, 1e-17, 1e-16, 1e-15, 1e-12):
-        for end, ends in ((1.0, (-1.0, 1e-17)), (0.5, (-1e-17, 1.0))):
-            root = end + beyond if end == 1.0 else end - beyond
-            powers = math.cos(1.3 * root) * sine - math.sin(1.3 * root) * cosine
-            found = _root_with_ends(powers, 0.5, 1.0, *ends)
-            assert found == pytest.approx(end, abs=max(4e-16, abs(beyond)))
-
-
-@pytest.mark.parametrize("known_roots", [0, 1, 2])
-@pytest.mark.parametrize("rounding", [1e-9, -1e-9, 0.0])
-def test_a_root_is_one_of_the_whole_series(known_roots, rounding):
-    """A guard that is known to be zero at the start is divided by the place; what is left there counts."""
-    # ``rounding + s^k (s - 1)``, and a second column that must not matter.
-    series = np.full((4, 2), 7.0)
-    series[:, 0] = 0.0
-    series[known_roots, 0], series[known_roots + 1, 0] = -1.0, 1.0
-    series[0, 0] += rounding
-    found = plain(series_roots).root_between(series, 0, 3, known_roots, 2.0, 0.5, 1.5, -0.5, 0.5)
-    # To first order; for ``s - 1`` that is exact.
-    assert found == pytest.approx(1.0 - rounding, rel=0, abs=1e-15 if known_roots == 0 else 1e-17 / 1e-2)
-
-
-def test_a_root_is_not_moved_to_the_start_of_a_step():
-    """A value of rounding at the start, as large as the guard where it turns, is none of the way."""
-    series = np.array([[-0.5], [-1.0], [1.0]])
-    found = plain(series_roots).root_between(series, 0, 2, 1, 2.0, 0.5, 1.5, -0.5, 0.5)
-    assert found == 1.0
-
-
-@pytest.mark.parametrize("span", [0.0, 1e-9, 0.3, 1.0, 3.0, 4.0])
-def test_the_place_where_a_clock_shows_a_time(span):
-    """The clock ``3 s + s^2``, and one that starts at speed zero, ``s^2``; places end with the step."""
-    time_of = plain(series_roots).time_of
-    even = np.array([[9.0, 0.0], [9.0, 3.0], [9.0, 1.0]])
-    assert time_of(even, 1, 2, 1.0, span) == pytest.approx(
-        (np.sqrt(9.0 + 4.0 * span) - 3.0) / 2.0, rel=1e-6 if span == 1e-9 else 1e-14, abs=0.0
-    )
-    still = np.array([[9.0, 0.0], [9.0, 0.0], [9.0, 1.0]])
-    assert time_of(still, 1, 2, 2.0, span) == pytest.approx(np.sqrt(span), rel=1e-14, abs=0.0)
