@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from hybrid.compiler.cache.kernel import file_of, kernels_in
+from hybrid.kernels.types.codes import NARROW
 from hybrid.kernels.types.export import exports_of, object_code
 from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, REAL, VECTOR, text_of
 from hybrid.kernels.types.options import KERNEL, exported
@@ -77,6 +78,13 @@ def count(start, stop, step, out):
         out[1] += k
     for k in range(start, stop, step):
         out[2] += k
+    for k in range(stop, start, -step):
+        out[2] += 3 * k
+    for k in range(stop, start, -NARROW):
+        out[2] += 5 * k
+    turns_of = range(3) if step > 2 else range(5, 0, -1)
+    for k in turns_of:
+        out[3] += 11 * k
     for _ in range(2):
         for k in range(3):
             out[3] += k
@@ -149,18 +157,3 @@ def test_writing(compiled, in_python, seed, k, x):
     in_python.write(expected, k, x)
     for name in ("vector", "matrix", "cube", "indices", "index_matrix", "names", "columns"):
         np.testing.assert_allclose(getattr(ours, name), getattr(expected, name), rtol=1e-15, atol=1e-15)
-
-
-def test_a_range_is_named_by_its_loop():
-    """A loop over one of two ranges has no step that is known when it is compiled."""
-
-    @njit(**KERNEL)
-    def either(k):
-        turns = range(3) if k > 0 else range(5, 0, -1)
-        total = 0
-        for i in turns:
-            total += i
-        return total
-
-    with pytest.raises(NotImplementedError, match="A loop must name its range itself"):
-        either.compile("int64(int64)")
