@@ -183,6 +183,8 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     the middle of a jump, and has to begin again where this call began, with all parts. Nothing is allocated.
     """
     model, run = task.model, task.run
+    if run.horizon == 0.0 and run.steps == 0:
+        run.horizon = max(time_left(model, run, stop_cycle, stop_phase), 0.0)
     while True:
         if run.pending != NO_TRANSITION:
             code = fire(parts, task, stop_cycle, stop_phase, max_jumps)

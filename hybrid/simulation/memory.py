@@ -146,14 +146,19 @@ def _first_entries() -> tuple[np.ndarray, np.ndarray]:
 
 
 def fresh_run(
-    layout: Any, model: Any, state: np.ndarray, tangent: np.ndarray | None, t0: float
+    layout: Any,
+    model: Any,
+    state: np.ndarray,
+    tangent: np.ndarray | None,
+    t0: float,
+    horizon: float = 0.0,
 ) -> tuple[Any, float]:
-    """The run at its start, in no mode yet, and the phase of the start."""
+    """The run at its start, in no mode yet, and the phase of the start; ``horizon`` is how long it takes."""
     run, n = layout.zeros(), model.dimension
     y = run.y
     cycle, phase = split_time(t0, model.period)
     run.counters[:], run.numbers[:] = _first_entries()
-    run.cycle, run.phase = cycle, phase
+    run.cycle, run.phase, run.horizon = cycle, phase, horizon
     y[:n] = state
     if tangent is not None:
         y[n:] = tangent.T.ravel()

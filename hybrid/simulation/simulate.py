@@ -88,7 +88,15 @@ def simulate(
     vectors = None if tangent is None or tangent is False else _tangent_matrix(tangent, system)
     most = arguments.count("max_jumps", max_jumps, 0)
     trajectory = start(
-        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors, time="t_span"
+        system,
+        x0,
+        t0,
+        mode=mode,
+        parameters=parameters,
+        solver=solver,
+        tangent=vectors,
+        time="t_span",
+        horizon=t1 - t0,
     )
     check_time("t_span", t1, trajectory.model.period)
     arc = _Recorder(trajectory, times, t1).run(t1, most)

@@ -35,12 +35,14 @@ def start(
     solver: Solver | None = None,
     tangent: np.ndarray | None = None,
     time: str = "t0",
+    horizon: float = 0.0,
     stop: Stop = CTRL_C,
 ) -> Trajectory:
     """A trajectory at its start, everything about the call checked.
 
     ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
-    name of the argument that ``t0`` comes from, ``stop`` who may end the run early.
+    name of the argument that ``t0`` comes from, ``horizon`` how long the run takes, 0 if that is not known,
+    ``stop`` who may end the run early.
     """
     as_system("system", system)
     state = system.variables.state_values("x0", x0)
@@ -55,7 +57,7 @@ def start(
     plan = plan_of(compiled, solver, tangents)
     model = compiled.given(parameters, plan.model)
     check_time(time, t0, model.period)
-    run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0)
+    run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0, horizon)
     work = fresh_work(plan.work_layout, plan.method)
     run.mode, beyond = choose_mode(system, plan.parts_so_far, model, run, work, mode)
     if beyond and model.propagator[run.mode] in (codes.DESINGULARISED, codes.ROOTED):

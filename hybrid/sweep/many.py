@@ -266,7 +266,9 @@ class _Runs:
             return
         plan, found, part = self.plan, self.found, slice(block.start, block.stop)
         origins, states = found.origins[part], found.states[part]
-        run, phase0 = fresh_run(plan.run_layout, self.model, origins[0], None, self.t_span[0])
+        run, phase0 = fresh_run(
+            plan.run_layout, self.model, origins[0], None, self.t_span[0], self.t_span[1] - self.t_span[0]
+        )
         work = fresh_work(plan.work_layout, plan.method)
         solver = self.options["solver"]
         trajectory = Trajectory(
@@ -342,6 +344,13 @@ class _Runs:
     def _refuse(self, i: int) -> None:
         """Keep why a run cannot start, in the words of `simulate`."""
         try:
-            start(self.system, self.found.origins[i], self.t_span[0], time="t_span", **self.options)
+            start(
+                self.system,
+                self.found.origins[i],
+                self.t_span[0],
+                time="t_span",
+                horizon=self.t_span[1] - self.t_span[0],
+                **self.options,
+            )
         except HybridError as failure:
             self.found.tell(i, Status(StatusCode.FAILED, str(failure)))

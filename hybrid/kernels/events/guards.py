@@ -143,13 +143,15 @@ def widen_scale(model, run, work):
     """Make rounding bands alike at the start and the end of a run, whatever steps lead there.
 
     The scale of each component is at least its change while its rate changes by its own size, or while the
-    fastest feedback between two components acts, if that is shorter. A rate that changes by no more than
-    rounding tells nothing. Then a run that ends on a guard and a run that starts there agree that the guard
-    is zero, in any units. ``work.field`` is current.
+    fastest feedback between two components acts, if that is shorter, or during the run. A rate that changes
+    by no more than rounding tells nothing. Then a run that ends on a guard and a run that starts there agree
+    that the guard is zero, in any units. ``work.field`` is current.
     """
     n, mode, t = model.dimension, run.mode, run.phase
     jacobian_with_opposites(model, mode, t, run.y, work.jacobian)
     rounding, feedback = work.state, 0.0
+    longest = max(run.horizon, size_of_time(model, t))
+    longest = longest if longest > 0.0 else math.inf
     for i in range(n):
         size = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
         for place in range(model.first_slope[mode, i], model.first_slope[mode, i + 1]):
@@ -169,6 +171,7 @@ def widen_scale(model, run, work):
         if feedback > 0.0:
             moment = min(moment, 1.0 / math.sqrt(feedback))
         if moment < math.inf:
+            moment = min(moment, longest)
             run.scale[i] = max(run.scale[i], rate * moment)
 
 

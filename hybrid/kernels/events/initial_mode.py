@@ -12,6 +12,13 @@ from hybrid.kernels.types.options import KERNEL, exported
 
 
 @njit(**KERNEL)
+def forget_scale(model, run):
+    """The state alone tells how large its components are, as at the start of a run."""
+    for i in range(model.dimension):
+        run.scale[i] = abs(run.y[i])
+
+
+@njit(**KERNEL)
 def verdicts_on(parts, model, run, work, first, stop, verdicts):
     """Enter the modes ``first`` to ``stop - 1`` at the start of a run, one after another.
 
@@ -23,6 +30,8 @@ def verdicts_on(parts, model, run, work, first, stop, verdicts):
     for mode in range(first, stop):
         run.mode = mode
         fires = parts.enter(model, run, work)
+        # What is large in one mode tells nothing of the others.
+        forget_scale(model, run)
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
             transition = model.outgoing[slot]
             if not abs(guard_value(model, transition, t, run.y, work.scalar)) < math.inf:

@@ -217,6 +217,7 @@ NUMBERS = (
     "since_entry",
     "phase_low",
     "calm_until",
+    "horizon",
 )
 
 
@@ -232,6 +233,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
     - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
       guards before the crossings found on the last step.
+    - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
