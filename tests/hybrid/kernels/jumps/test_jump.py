@@ -315,9 +315,12 @@ def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():
     vectors = np.array([[0.6, 0.0, -0.8], [0.0, -1.0, 0.0]])
     calls = []
 
-    def orthonormalise(y, n, tangents, growth, terms, images):
+    def orthonormalise(y, n, tangents, growth, terms, images, annihilated):
+        assert annihilated == 0
         calls.append((y[3:].copy(), terms.copy(), images))
         growth[0] += 10.0 ** len(calls)
+        # So many directions are lost.
+        return len(calls)
 
     kernels = plain(jump, orthonormalise=orthonormalise)
 
@@ -328,6 +331,7 @@ def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():
             growth=np.zeros(2),
             log_determinant=1.0,
             strain=strain,
+            indistinct=0,
         )
         work = SimpleNamespace(
             saltation=saltation,
@@ -342,6 +346,7 @@ def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():
         np.testing.assert_allclose(run.y[3:], images.ravel(), rtol=1e-15)
         np.testing.assert_array_equal(run.y[:3], [9.0, 8.0, 7.0])
         assert run.log_determinant == pytest.approx(1.0 + np.log(abs(np.linalg.det(saltation))), rel=1e-14)
+        assert run.indistinct == sum(range(1, len(calls) + 1))
         return added, run.strain
 
     # The growth that the second call finds is that of the jump alone.
