@@ -151,7 +151,7 @@ def bracket_crossing(coefficients, degree, side, direction, stack):
         top -= 1
     if coefficients[degree] == 0.0:
         # The sign before 1 alone does not show whether the root at 1 is odd or even: use the slope.
-        slope = -coefficients[degree - 1]
+        slope = -coefficients[max(degree - 1, 0)]
         after = 1 if slope > 0.0 else (-1 if slope < 0.0 else side)
         if after != side:
             side = after

@@ -226,6 +226,9 @@ def test_a_grazing_pair_fires_in_the_right_direction():
 def test_the_zero_polynomial_crosses_nothing():
     for side in (-1, 1):
         assert crossing(np.zeros(8), side) == (NONE, side)
+        for before in (-3.0, 3.0):
+            # A constant has no slope; what lies before it in memory is none.
+            assert crossing(np.array([before, 0.0])[1:], side) == (NONE, side)
 
 
 def test_a_side_that_differs_at_once_is_a_crossing_at_the_start():
