@@ -150,8 +150,7 @@ def widen_scale(model, run, work):
     n, mode, t = model.dimension, run.mode, run.phase
     jacobian_with_opposites(model, mode, t, run.y, work.jacobian)
     rounding, feedback = work.state, 0.0
-    longest = max(run.horizon, size_of_time(model, t))
-    longest = longest if longest > 0.0 else math.inf
+    longest = max(run.horizon, size_of_time(model, t)) if run.horizon > 0.0 else math.inf
     for i in range(n):
         size = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
         for place in range(model.first_slope[mode, i], model.first_slope[mode, i + 1]):

@@ -166,6 +166,7 @@ def task_of(**values):
         "cycle": 2,
         "phase": 0.0,
         "phase_low": 0.0,
+        "horizon": 0.0,
         "since_entry": 0.5,
         "next_step": 1.0,
         "last_step": 1.0,
@@ -292,9 +293,11 @@ class TestAdvance:
     ):
         calls, pending, full = [], list(pending), values.pop("full", False)
         most, orthonormal = values.pop("max_steps", 99), values.pop("orthonormal", 0)
+        seen = values.pop("seen", [])
 
         def stepped(parts, task, left):
             calls.append(left)
+            seen.append(task.run.horizon)
             task.run.steps += 1
             if pending:
                 task.run.pending = pending.pop(0)
@@ -339,6 +342,12 @@ class TestAdvance:
         # A step that is longer by rounding, or on purpose, ends there too.
         found = self.advanced(step=lambda left: (GO_ON, left + 1e-9))
         assert found == (codes.DONE, [5.0], (3, 1.0))
+
+    def test_the_first_call_tells_how_long_the_run_takes(self):
+        for known, steps, told in ((0.0, 0, 5.0), (7.0, 0, 7.0), (0.0, 3, 0.0)):
+            horizons = []
+            self.advanced(horizon=known, steps=steps, seen=horizons)
+            assert horizons == [told] * 4
 
     def test_a_mode_is_entered_first(self):
         assert self.advanced(stage=ENTERING)[1][:2] == ["enter", 5.0]

@@ -144,6 +144,13 @@ def test_sizes_are_at_least_what_the_flow_changes_while_rates_change():
     feedback = np.abs(J[:, :3] * J[:, :3].T).max()
     moments = np.minimum(np.abs(f / change), feedback**-0.5)
     np.testing.assert_allclose(trajectory.run.scale, np.maximum(0.1, np.abs(f) * moments), rtol=1e-12)
+    # A run that is known to be short does not take that long, but as long as its clock has come.
+    assert moments.max() > T
+    for horizon, longest in ((0.9 * T, T), (0.5 * (T + moments.max()), 0.5 * (T + moments.max()))):
+        trajectory.run.scale[:], trajectory.run.horizon = 0.0, horizon
+        widened(trajectory.model, trajectory.run, T, trajectory.work)
+        expected = np.abs(f) * np.minimum(moments, longest)
+        np.testing.assert_allclose(trajectory.run.scale, expected, rtol=1e-12)
     large = np.full(3, 100.0)
     trajectory.run.scale[:] = large
     widened(trajectory.model, trajectory.run, T, trajectory.work)

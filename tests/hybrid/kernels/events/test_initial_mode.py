@@ -15,6 +15,7 @@ def verdicts(*, fires=NO_TRANSITION, value=0.0, side=0, on=0, due=0, marker=0, p
     """What transition 0, which leaves the second mode in the direction 1, says of that mode."""
     tested = plain(initial_mode, guard_value=lambda *given: value, allowed=lambda *given: allowed).verdicts_on
     model = SimpleNamespace(
+        dimension=2,
         first_outgoing=np.array([0, 0, 1, 1]),
         outgoing=np.array([0]),
         direction=np.array([1, 1]),
@@ -23,7 +24,8 @@ def verdicts(*, fires=NO_TRANSITION, value=0.0, side=0, on=0, due=0, marker=0, p
     )
     run = SimpleNamespace(
         phase=0.0,
-        y=None,
+        y=np.array([-3.0, 0.5]),
+        scale=np.array([3.0, 0.5]),
         mode=0,
         side=np.array([side, 0]),
         on_guard=np.array([on, 0]),
@@ -33,10 +35,13 @@ def verdicts(*, fires=NO_TRANSITION, value=0.0, side=0, on=0, due=0, marker=0, p
 
     def enter(model, run, work):
         modes.append(run.mode)
+        # A mode may make components count as larger than they are.
+        run.scale[:] = 1e9
         return fires
 
     answer = tested(SimpleNamespace(enter=enter), model, run, SimpleNamespace(scalar=None), 1, 2, found)
     assert modes == [1]
+    assert run.scale.tolist() == [3.0, 0.5]
     assert found[1] == NO_OBJECTION
     return answer, found[0]
 
