@@ -317,8 +317,6 @@ class Estimate:
         self, intervals: int, mean: TaperedMean, batches: Any, history: bool, bar: Progress
     ) -> tuple[np.ndarray, int]:
         trajectory = self.trajectory
-        kernel = load_kernels("lyapunov.kernels").growth_rates
-        advance = load_kernels().advance
         kept = [np.empty((0, trajectory.tangents))]
         bursts, code = Bursts([trajectory]), codes.DONE
         while mean.count < intervals and code == codes.DONE:
@@ -326,17 +324,7 @@ class Estimate:
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), trajectory.tangents + 1))
             filled, resumed = 0, False
             while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
-                code = kernel(
-                    advance,
-                    trajectory.parts,
-                    self.task,
-                    self.end,
-                    self.interval,
-                    bursts.most(),
-                    resumed,
-                    rates[filled:],
-                    *batches,
-                )
+                code = self._rates(bursts.most(), resumed, rates[filled:], batches)
                 done = int(self.end.done)
                 filled += done
                 bar.update(done)
@@ -346,6 +334,22 @@ class Estimate:
             if history:
                 kept.append(rates[:filled, :-1])
         return np.concatenate(kept), code
+
+    def _rates(self, most: int, resumed: bool, rates: np.ndarray, batches: Any) -> int:
+        """One burst of the kernel: growth rates over the next intervals, in the rows of ``rates``."""
+        kernel, advance = load_kernels("lyapunov.kernels").growth_rates, load_kernels().advance
+        trajectory, end = self.trajectory, self.end
+        end.done = 0
+        return trajectory.plan.called(
+            lambda parts: kernel(
+                advance, parts, self.task, end, self.interval, most, resumed, rates, *batches
+            ),
+            trajectory.run,
+            trajectory.work,
+            end.counters,
+            end.numbers,
+            *batches,
+        )
 
     def _replace_annihilated(self) -> None:
         """Give a new direction to each tangent vector that a jump has annihilated.

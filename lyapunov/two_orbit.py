@@ -309,21 +309,17 @@ def _follow(
     tasks = [run.task(run.no_record()) for run in runs]
     kept, total, code = [np.empty((0, 2))], 0, codes.DONE
     bursts = Bursts(runs)
+    memory = [end.counters, end.numbers, *(part for run in runs for part in (run.run, run.work))]
     while total < intervals and code in (codes.DONE, codes.GO_ON):
         bursts.most()
         out = np.empty((min(INTERVALS_AT_ONCE, intervals - total), 2))
-        code = kernel(
-            advance,
-            reference.parts,
-            *tasks,
-            end,
-            interval,
-            separation,
-            reference.max_steps,
-            bursts.steps,
-            code == codes.GO_ON,
-            out,
-        )
+        resumed, end.done = code == codes.GO_ON, 0
+
+        def more(parts: Any, resumed: bool = resumed, out: np.ndarray = out) -> int:
+            most = reference.max_steps, bursts.steps
+            return kernel(advance, parts, *tasks, end, interval, separation, *most, resumed, out)
+
+        code = reference.plan.called(more, *memory)
         done = int(end.done)
         code = bursts.judged(code)
         kept.append(out[:done])

@@ -170,22 +170,21 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     kernel = load_kernels("hybrid.kernels.events.sections").strobe
     reached = np.zeros(1, dtype=np.int64)
     record, bursts = trajectory.no_record(), Bursts([trajectory])
+    advance, phase = load_kernels().advance, trajectory.phase0
     first, total, code = int(trajectory.run.cycle) + 1, 0, codes.GO_ON
     # Points need no tangent vectors, which the trajectory may have.
     plain = attrs.evolve(trajectory, tangents=0)
     task = plain.task(record)
     while code == codes.GO_ON:
-        code = kernel(
-            load_kernels().advance,
-            trajectory.parts,
-            task,
-            trajectory.phase0,
-            bursts.most(),
-            UNLIMITED,
-            states[total:],
-            places[total:],
-            reached,
-        )
+        most = bursts.most()
+        reached[0] = 0
+
+        def more(parts: Any, most: int = most, total: int = total) -> int:
+            return kernel(
+                advance, parts, task, phase, most, UNLIMITED, states[total:], places[total:], reached
+            )
+
+        code = trajectory.plan.called(more, trajectory.run, trajectory.work, reached)
         total += int(reached[0])
         code = bursts.judged(code)
         if code == codes.GO_ON:

@@ -18,6 +18,7 @@ from hybrid.kernels.types.layout import Attempts, Method, Parts, Task
 from hybrid.simulation.memory import MOST_LAYOUTS, run_layout, work_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
+from hybrid.status import StatusCode
 
 DEFAULT_SOLVER = Taylor()
 
@@ -59,6 +60,30 @@ class Plan:
         if not self.parts_so_far.complete:
             self.parts_so_far = completed(self.parts_so_far)
         return self.parts_so_far
+
+    def called(self, call: Callable[[Any], Any], *memory: Any) -> int:
+        """The code that ``call(parts)`` returns: first with the parts so far, with all if it needs them.
+
+        ``memory`` are the structures and arrays that the call changes. They are put back before the second
+        call, so that it does the same to the last bit. The code is INTERRUPTED if Ctrl-C comes while the
+        missing parts are compiled.
+        """
+        if self.parts_so_far.complete:
+            return int(call(self.parts_so_far))
+        before = [each.copy() if isinstance(each, np.ndarray) else each.saved() for each in memory]
+        code = int(call(self.parts_so_far))
+        if code != codes.INCOMPLETE:
+            return code
+        for each, held in zip(memory, before, strict=True):
+            if isinstance(each, np.ndarray):
+                each[...] = held
+            else:
+                each.restore(held)
+        try:
+            parts = self.parts
+        except KeyboardInterrupt:
+            return StatusCode.INTERRUPTED
+        return int(call(parts))
 
 
 def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: int | None = None) -> Plan:

@@ -18,7 +18,6 @@ from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
-from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import Unexplored
 
@@ -90,11 +89,6 @@ class Trajectory:
     def method(self) -> Any:
         """The kernel's view of the solver."""
         return self.plan.method
-
-    @property
-    def parts(self) -> Any:
-        """The pieces that the driver is handed."""
-        return self.plan.parts
 
     @property
     def system(self) -> HybridSystem:
@@ -197,22 +191,13 @@ class Trajectory:
         return code
 
     def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
-        parts, run, work = self.plan.parts_so_far, self.run, self.work
-        call = self.task(record), cycle, phase, max_steps, max_jumps
-        if parts.complete:
-            return int(load_kernels().advance(parts, *call))
-        before = run.saved(), work.saved(), record.used.copy()
-        code = int(load_kernels().advance(parts, *call))
-        if code != codes.INCOMPLETE:
-            return code
-        run.restore(before[0])
-        work.restore(before[1])
-        record.used[:] = before[2]
-        try:
-            parts = self.plan.parts
-        except KeyboardInterrupt:
-            return StatusCode.INTERRUPTED
-        return int(load_kernels().advance(parts, *call))
+        advance, task = load_kernels().advance, self.task(record)
+        return self.plan.called(
+            lambda parts: advance(parts, task, cycle, phase, max_steps, max_jumps),
+            self.run,
+            self.work,
+            record.used,
+        )
 
     def task(self, record: Any, *, orthonormal: bool = False) -> Any:
         """What the driver works on: this run and a record.

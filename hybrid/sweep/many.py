@@ -275,38 +275,25 @@ class _Runs:
             self.compiled, plan, self.model, run, work, 0, solver.max_steps, phase0, stop=CTRL_C
         )
         memory = [plan.run_layout.words(run), plan.work_layout.words(work)]
-        fresh = [words.copy() for words in memory]
+        words = [each for held in memory for each in (held, held.copy())]
         places = np.zeros((len(block), 3), dtype=np.int64)
         verdicts = np.zeros(len(self.system.transitions), dtype=np.int64)
         kernel = load_kernels("hybrid.kernels.events.many").many_runs
         advance, task = load_kernels().advance, trajectory.task(trajectory.no_record())
         reached = np.zeros(1, dtype=np.int64)
+        starts = origins, self.cycles, self.phases, self.named
+        results = states, places, verdicts, reached
         begin, resumed, told = 0, 0, []
         bursts = Bursts([trajectory])
         while begin < len(block):
             bursts.most()
-            code = kernel(
-                advance,
-                plan.parts,
-                task,
-                memory[0],
-                fresh[0],
-                memory[1],
-                fresh[1],
-                origins,
-                self.cycles,
-                self.phases,
-                self.named,
-                begin,
-                resumed,
-                solver.max_steps,
-                bursts.steps,
-                self.max_jumps,
-                states,
-                places,
-                verdicts,
-                reached,
-            )
+            limits = solver.max_steps, bursts.steps, self.max_jumps
+
+            def more(parts: Any, progress: tuple[int, ...] = (begin, resumed, *limits)) -> int:
+                return kernel(advance, parts, task, *words, *starts, *progress, *results)
+
+            reached[0] = begin
+            code = plan.called(more, *memory, places, verdicts, reached)
             i = int(reached[0])
             resumed = int(code == codes.GO_ON)
             if code == codes.REFUSED:

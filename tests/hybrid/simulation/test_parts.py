@@ -1,9 +1,12 @@
 """A run that calls a part which was not compiled begins again, and comes out the same to the last bit."""
 
+import attrs
 import numpy as np
 import pytest
+import xarray
 
 import hybrid
+import lyapunov
 import models
 from hybrid.compiler.cache.loader import LIMITS
 from hybrid.simulation import plan
@@ -63,6 +66,54 @@ def test_same_to_the_last_bit(name, tangent, monkeypatch):
         np.testing.assert_array_equal(one, other)
     if tangent:
         np.testing.assert_array_equal(found.fundamental, complete.fundamental)
+
+
+def forced_ball():
+    """A ball on a floor that shakes: its impacts accumulate a while after the start, again and again."""
+    return hybrid.HybridSystem(
+        state=("q", "v"),
+        modes=[hybrid.Mode("flight", lambda t, x, p: (x.v, -1.0 + 1.5 * np.sin(2.0 * np.pi * t)))],
+        transitions=[
+            hybrid.Transition(
+                "flight",
+                "flight",
+                hybrid.Guard(lambda t, x, p: x.q, -1),
+                hybrid.Reset(lambda t, x, p: (0.0, -0.3 * x.v)),
+                name="impact",
+            )
+        ],
+        period=1.0,
+    )
+
+
+def values_of(result):
+    """All arrays and numbers of a result."""
+    if isinstance(result, xarray.Dataset):
+        return [each.values for each in result.data_vars.values()]
+    return [
+        getattr(result, each.name)
+        for each in attrs.fields(type(result))
+        if isinstance(getattr(result, each.name), float | int | np.ndarray)
+    ]
+
+
+ANALYSES = {
+    "spectrum": lambda system: lyapunov.lyapunov_spectrum(system, (4.0, 0.0), intervals=12, transient=3),
+    "strobe": lambda system: hybrid.stroboscopic_section(system, (4.0, 0.0), periods=12, transient=1),
+    "many": lambda system: hybrid.simulate_many(system, [(1.0, 0.0), (4.0, 0.1), (2.0, 0.0)], (0.0, 12.0)),
+}
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_analyses_begin_the_burst_again(analysis, monkeypatch):
+    complete = ANALYSES[analysis](forced_ball())
+    kept, asked = plan.is_kept, []
+    monkeypatch.setattr(plan, "is_kept", lambda module: module != LIMITS and kept(module))
+    monkeypatch.setattr(plan, "completed", lambda parts, load=plan.completed: asked.append(1) or load(parts))
+    found = ANALYSES[analysis](forced_ball())
+    assert len(asked) == 1
+    for one, other in zip(values_of(found), values_of(complete), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 def test_ctrl_c_while_a_part_is_compiled(not_compiled, monkeypatch):
