@@ -17,6 +17,8 @@ from hybrid.errors import ArgumentError, unknown_name
 from hybrid.errors import shown as shown
 
 Kind = TypeVar("Kind")
+# Of these a list is known to hold real numbers, without looking at each.
+_PLAIN = {float, int}
 LARGEST_COUNT = int(np.iinfo(np.int64).max)
 
 
@@ -191,8 +193,11 @@ def floats(value: object) -> np.ndarray | None:
             return None
         if value.dtype.kind in "fiu":
             return np.array(value, dtype=float)
-    elif isinstance(value, list | tuple) and all(type(each) is float for each in value):
-        return np.array(value, dtype=float)
+    elif isinstance(value, list | tuple) and all(type(each) in _PLAIN for each in value):
+        try:
+            return np.array(value, dtype=float)
+        except OverflowError:  # an integer beyond the largest float
+            pass
     if isinstance(value, bytes | bytearray):
         return None
     try:
