@@ -10,7 +10,7 @@ from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.events import crossings
 from hybrid.kernels.events.crossings import MOST_PIECES
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING
-from hybrid.kernels.events.sampled import NOWHERE, SETTLED
+from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.plain import plain
@@ -32,9 +32,9 @@ def approx(place, roundings):
 class Curve:
     """A guard as a function of the place, its slope, and the places where either may turn.
 
-    It jumps or has a vertical tangent at the places ``steep``, and has a value on ``domain`` alone. Its bounds
-    are its ranges, ``noise`` wider, and those of its slope ``tilts`` wider. With ``loose``, a range is that of
-    the mean value theorem.
+    It jumps or has a vertical tangent at the places ``steep``, and has a value on ``domain`` alone; with
+    ``sure`` its slope is bounded even so. Its bounds are its ranges, ``noise`` wider, and those of its slope
+    ``tilts`` wider. With ``loose``, a range is that of the mean value theorem.
     """
 
     def __init__(
@@ -48,7 +48,9 @@ class Curve:
         steep=(),
         domain=(-math.inf, math.inf),
         loose=False,
+        sure=False,
     ):
+        self.sure = sure
         self.value, self.slope, self.turns = value, slope, turns
         self.noise, self.tilts, self.steep, self.domain, self.loose = noise, tilts, steep, domain, loose
         self.asked = []
@@ -66,7 +68,9 @@ class Curve:
         slopes = [self.slope(each) for each in places]
         flat, steep = min(slopes) - self.tilts, max(slopes) + self.tilts
         values = [self.value(each) for each in places]
-        if any(low <= each <= high for each in self.steep) or least > low or most < high:
+        if any(low <= each <= high for each in self.steep) or (
+            not self.sure and (least > low or most < high)
+        ):
             flat, steep = -math.inf, math.inf
         if self.loose and steep < math.inf:
             most = max(abs(flat), abs(steep)) * (high - middle)
@@ -356,10 +360,7 @@ class TestTurnBetween:
     @pytest.mark.parametrize("unit", UNITS)
     def test_is_where_the_slope_changes_its_sign(self, way, unit):
         for turn in (0.3, 0.01, 0.8):
-            curve = Curve(
-                lambda place: way * (place - unit * turn) ** 2,
-                lambda place: way * 2.0 * (place - unit * turn),
-            )
+            curve = polynomial(unit * turn, unit * turn, factor=way)
             for low, high in ((0.0, 1.0), (0.005, 0.9)):
                 del curve.asked[:]
                 assert self.turn(curve, unit * low, unit * high, way) == approx(unit * turn, 2.0)
@@ -506,6 +507,91 @@ class TestFirstChange:
 
     @pytest.mark.parametrize("way", [1, -1])
     @pytest.mark.parametrize("unit", UNITS)
+    def test_of_a_guard_that_ends_and_falls_up_to_there(self, way, unit):
+        """Its slope keeps its sign, but the signs at the ends of the step do not tell."""
+        for domain, expected in (
+            ((0.0, 0.4), (approx(0.3 * unit, 4.0), -way)),
+            ((0.25, 0.95), (approx(0.3 * unit, 4.0), -way)),
+            ((0.0, 0.2), (NOWHERE, way)),
+            ((0.05, 0.2), (NOWHERE, way)),
+        ):
+            curve = Curve(
+                lambda place: way * (0.3 - place / unit),
+                lambda place: -way / unit,
+                domain=(domain[0] * unit, domain[1] * unit),
+                sure=True,
+            )
+            found, run = self.change(curve, way, length=unit)
+            assert found == (*expected, unit)
+            assert (run.unproved, run.grazing_place) == (0, NO_ROOT)
+
+    @pytest.mark.parametrize("way", [1, -1])
+    def test_of_a_guard_with_a_value_on_a_small_part_alone(self, way):
+        for domain, root in (((0.0, 0.1), 0.05), ((0.9, 1.0), 0.95), ((0.45, 0.48), 0.47)):
+            curve = Curve(lambda place, root=root: way * (root - place), lambda place: -way, domain=domain)
+            found, _ = self.change(curve, way)
+            assert found == (approx(root, 4.0), -way, 1.0)
+
+    @pytest.mark.parametrize("way", [1, -1])
+    @pytest.mark.parametrize("unit", UNITS)
+    def test_a_cusp_that_reaches_zero_is_a_touch(self, way, unit):
+        place = 0.4 * unit
+        curve = Curve(
+            lambda s: way * math.sqrt(abs(s - place) / unit),
+            lambda s: way * math.copysign(0.5, s - place) / math.sqrt((abs(s - place) + 1e-300) * unit),
+            (place,),
+            steep=(place,),
+            noise=1e-6,
+        )
+        found, run = self.change(curve, way, length=unit)
+        assert found == (NOWHERE, way, unit)
+        assert run.grazing_place == pytest.approx(0.4, rel=1e-6)
+        assert (run.grazing_guard, run.next_grazing, run.unproved) == (TRANSITION, NO_ROOT, 0)
+
+    @pytest.mark.parametrize("way", [1, -1])
+    def test_a_guard_that_leaves_zero_at_the_start_does_not_touch_it_there(self, way):
+        for on_guard, touches in ((BY_ACCELERATION, False), (0, True)):
+            curve = polynomial(1e-9, 1e-9, factor=way, noise=1e-16)
+            found, run = self.change(curve, way, on_guard=on_guard)
+            assert found == (NOWHERE, way, 1.0)
+            assert (run.grazing_place < 1.0) == touches
+
+    @pytest.mark.parametrize("way", [1, -1])
+    def test_a_guard_that_jumps_at_the_start_may_be_before_its_jump_by_rounding(self, way):
+        """Time has a rounding of 16 units: the state is sure only after that, or after half of the step."""
+        edge = 16.0 * EPSILON * START / PACE
+        for jump, scale, place in (
+            (0.9 * edge, 1.0, 0.75),
+            (20.0 * edge, 1.0, 0.0),
+            (0.4, 1e17, 0.75),
+        ):
+            curve = Curve(
+                lambda s, jump=jump: -way if s < jump or s >= 0.75 else way,
+                lambda s: 0.0,
+                (jump, 0.75),
+                steep=(jump, 0.75),
+            )
+            found, run = self.change(curve, way, on_guard=JUMPING, scale=scale)
+            assert found == (approx(place, 2.0) if place else 0.0, -way, 1.0)
+            assert run.grazing_place == NO_ROOT
+
+    @pytest.mark.parametrize("way", [1, -1])
+    def test_a_guard_that_leaves_its_jump_by_signs_may_cross_after_them(self, way):
+        """Up to there either sign is possible; its transition may fire again at once."""
+        for root, hidden in ((0.75, 0.25), (0.125, 0.0625)):
+            curve = Curve(
+                lambda s, root=root, hidden=hidden: way * (-1.0 if s < 0.5 * hidden or s >= root else 1.0),
+                lambda s: 0.0,
+                (0.5 * hidden, root),
+                steep=(0.5 * hidden, root),
+            )
+            found, _ = self.change(
+                curve, way, on_guard=JUMPING, hidden=hidden, fired=TRANSITION, since_entry=0.0
+            )
+            assert found == (approx(root, 2.0), -way, 1.0)
+
+    @pytest.mark.parametrize("way", [1, -1])
+    @pytest.mark.parametrize("unit", UNITS)
     def test_a_touch_is_no_change(self, way, unit):
         curve = polynomial(0.4 * unit, 0.4 * unit, factor=way, noise=1e-15 * unit**2)
         found, run = self.change(curve, way, length=unit)
@@ -537,10 +623,12 @@ class TestFirstChange:
                 assert run.grazing_place == NO_ROOT
 
     @pytest.mark.parametrize("way", [1, -1])
-    def test_two_touches(self, way):
-        curve = polynomial(0.3, 0.3, 0.8, 0.8, factor=way, noise=1e-15)
-        found, run = self.change(curve, way)
-        assert found == (NOWHERE, way, 1.0)
+    @pytest.mark.parametrize("unit", UNITS)
+    def test_two_touches(self, way, unit):
+        touches = (unit * each for each in (0.3, 0.3, 0.8, 0.8))
+        curve = polynomial(*touches, factor=way, noise=1e-15 * unit**4)
+        found, run = self.change(curve, way, length=unit)
+        assert found == (NOWHERE, way, unit)
         assert run.grazing_place == pytest.approx(0.3, rel=1e-6)
         assert run.next_grazing == pytest.approx(0.8, rel=1e-6)
 
@@ -565,12 +653,24 @@ class TestFirstChange:
 
     @pytest.mark.parametrize("way", [1, -1])
     def test_a_guard_that_is_zero_at_the_start_is_searched_after_that(self, way):
-        for on_guard, roots in ((BY_SPEED, 1), (BY_ACCELERATION, 2)):
-            for rounding in (0.0, 1e-14, -1e-14):
-                curve = polynomial(*[0.0] * (roots - 1), rounding, 0.5, factor=-way, noise=1e-16)
-                found, run = self.change(curve, way, on_guard=on_guard)
-                assert found == (pytest.approx(0.5, rel=1e-13), -way, 1.0)
-                assert run.grazing_place == NO_ROOT
+        """The rest of its value there, and of its slope if that is zero too, is rounding."""
+        for on_guard, roots in ((BY_SPEED, 1), (BY_ACCELERATION, 2), (BY_STEP, 3)):
+            for rounding in (0.0, 1e-7, -1e-7):
+                for unit in UNITS:
+                    exact = polynomial(*[0.0] * roots, 0.5 * unit, factor=-way / unit ** (roots + 1))
+
+                    def value(place, exact=exact, rounding=rounding, roots=roots, unit=unit):
+                        return exact(place) - way * rounding * (1.0 + (place / unit if roots > 1 else 0.0))
+
+                    def slope(place, exact=exact, rounding=rounding, roots=roots, unit=unit):
+                        return exact.slope(place) - way * (rounding / unit if roots > 1 else 0.0)
+
+                    curve = Curve(value, slope, exact.turns, noise=1e-12)
+                    found, run = self.change(curve, way, on_guard=on_guard, length=unit)
+                    # Once the whole guard is on its side, its later root is what counts.
+                    assert found == (pytest.approx(0.5 * unit, rel=4e-6), -way, unit)
+                    assert run.grazing_place == NO_ROOT
+                    assert run.unproved == 0
 
     @pytest.mark.parametrize("way", [1, -1])
     def test_a_guard_that_is_zero_and_goes_the_other_way_crosses_at_the_start(self, way):
@@ -620,7 +720,7 @@ class TestFirstChange:
             curve.ranges = ranges
             found, run = self.change(curve, way)
             assert found == (NOWHERE, way, proved)
-            assert MOST_PIECES < sum(radius > 0.0 for _, radius in curve.asked)
+            assert sum(radius > 0.0 for _, radius in curve.asked) > MOST_PIECES
             assert (run.unproved > 0) == (edge < 0.01)
 
 
@@ -672,6 +772,34 @@ class TestCrossingOnPath:
                 )  # fmt: skip
                 assert found == (0.0 if crosses else NO_ROOT, after, 1.0)
                 assert run.on_guard.tolist() == [5, 0]
+
+    @pytest.mark.parametrize("way", [1, -1])
+    def test_a_guard_that_jumps_is_left_by_its_signs(self, way):
+        """It is beside the jump for a moment of 1/16, two of which are a place of 1/8."""
+        for beside, fired, expected in ((way, TRANSITION, 0.5), (-way, TRANSITION, NO_ROOT), (way, -1, 0.0)):
+            curve = Curve(
+                lambda s: way if 0.1 <= s < 1.0 else -way, lambda s: 0.0, (0.1, 1.0), steep=(0.1, 1.0)
+            )
+            model, method, run, work = scene(curve, side=way, on_guard=JUMPING, fired=fired)
+            asked = []
+
+            def field(mode, t, x, parameters, out):
+                assert (mode, t, x is run.y, out is work.field) == (0, START, True, True)  # noqa: B023
+                asked.append(mode)  # noqa: B023
+
+            def signs_beside(*given, beside=beside):
+                assert given[2:4] == (TRANSITION, START)
+                return -beside, beside, 0.0625
+
+            model.field = field
+            tested = plain(crossings, signs_beside=signs_beside).crossing_on_path
+            found = tested(model, method, run, TRANSITION, *ALONG, 2.0, 0.0, True, work)
+            assert len(asked) == (fired == TRANSITION)
+            if fired == TRANSITION:
+                assert found[0] == approx(expected, 4.0) if beside == way else found[0] <= NO_ROOT
+            else:
+                assert found[0] == expected
+            assert run.on_guard.tolist() == [5, 0]
 
     @pytest.mark.parametrize("way", [1, -1])
     def test_the_rest_of_the_step_after_noise(self, way):
