@@ -213,6 +213,7 @@ NEAREST = {
         "compiler/bounds/test_pulses_in_state.py",
     ),
     "hybrid/kernels/steps/series_guards.py": (
+        "kernels/steps/test_series_guard_rules.py",
         "kernels/events/test_onset.py",
         "simulation/test_simulate.py",
         "kernels/events/test_crossings.py",
