@@ -81,6 +81,8 @@ NEAREST = {
         "kernels/events/test_crossings.py",
     ),
     "hybrid/kernels/events/crossings.py": (
+        "kernels/events/test_crossing_places.py",
+        "kernels/events/test_crossing_rules.py",
         "kernels/events/test_crossings.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_jumps_and_gaps.py",
@@ -186,6 +188,7 @@ NEAREST = {
     ),
     "hybrid/kernels/steps/radau.py": ("solvers/test_radau.py",),
     "hybrid/kernels/steps/runge_kutta.py": (
+        "kernels/steps/test_runge_kutta_step.py",
         "accuracy/test_order.py",
         "solvers/test_tableau.py",
         "solvers/test_taylor.py",
@@ -210,6 +213,7 @@ NEAREST = {
         "compiler/bounds/test_pulses_in_state.py",
     ),
     "hybrid/kernels/steps/series_guards.py": (
+        "kernels/steps/test_series_guard_rules.py",
         "kernels/events/test_onset.py",
         "simulation/test_simulate.py",
         "kernels/events/test_crossings.py",
