@@ -184,7 +184,7 @@ NEAREST = {
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),
-    "hybrid/kernels/steps/radau.py": ("solvers/test_radau.py",),
+    "hybrid/kernels/steps/radau.py": ("kernels/steps/test_radau_rules.py", "solvers/test_radau.py"),
     "hybrid/kernels/steps/runge_kutta.py": (
         "accuracy/test_order.py",
         "solvers/test_tableau.py",
