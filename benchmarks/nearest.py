@@ -81,6 +81,7 @@ NEAREST = {
         "kernels/events/test_crossings.py",
     ),
     "hybrid/kernels/events/crossings.py": (
+        "kernels/events/test_crossing_rules.py",
         "kernels/events/test_crossings.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_jumps_and_gaps.py",
