@@ -200,6 +200,8 @@ NEAREST = {
         "kernels/events/test_resolution.py",
     ),
     "hybrid/kernels/steps/series.py": (
+        "kernels/steps/test_series_rules.py",
+        "kernels/steps/test_series_step.py",
         "compiler/taylor/test_series.py",
         "solvers/test_taylor.py",
         "solvers/test_fragile_series.py",
