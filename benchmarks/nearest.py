@@ -246,6 +246,7 @@ NEAREST = {
     ),
     "hybrid/simulation/memory.py": ("simulation/test_simulate.py",),
     "hybrid/simulation/plan.py": (
+        "simulation/test_parts.py",
         "simulation/test_memory.py",
         "simulation/test_trajectory.py",
         "simulation/test_simulate.py",
