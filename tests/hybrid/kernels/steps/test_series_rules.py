@@ -93,25 +93,23 @@ def test_rounding_is_tried_in_both_directions():
 
 
 @pytest.mark.parametrize("remaining", [0.1, 0.5, 0.9])
-def test_a_clock_stops_at_the_end_of_the_run(remaining):
-    """The clock shows ``s + s^2``; or it turns at 1, where it shows 1, and ``2 s - s^2`` elsewhere."""
-    for second in (1.0, -1.0):
-        series = np.zeros((3, 4))
-        series[1:, 3] = (1.0, 1.0) if second > 0.0 else (2.0, -1.0)
-        # The pace of the root is in the next column: the clock runs while it is positive.
-        work = SimpleNamespace(polynomial=np.zeros(9), stack=np.zeros((60, 12)))
-        wide = np.zeros((3, 16))
-        wide[:, 3] = series[:, 3]
-        wide[:2, 8] = (1.0, 0.0) if second > 0.0 else (1.0, -1.0)
-        found = kernels.step_until(wide, 3, 2, 3.0, remaining, work)
-        expected = (
-            (math.sqrt(1.0 + 4.0 * remaining) - 1.0) / 2.0
-            if second > 0.0
-            else 1.0 - math.sqrt(1.0 - remaining)
-        )
-        assert found == pytest.approx(expected, rel=1e-14)
-    # A turn before the end of the run: the step is kept.
-    assert kernels.step_until(wide, 3, 2, 3.0, 1.25, work) == 3.0
+@pytest.mark.parametrize(("clock", "root"), [(3, 8), (5, 8), (7, 16)])
+def test_a_clock_stops_at_the_end_of_the_run(clock, root, remaining):
+    """The clock shows ``s + s^2``; or ``2 s - s^2``, which turns at 1. Its root is in a column of its own."""
+    work = SimpleNamespace(polynomial=np.zeros(9), stack=np.zeros((60, 12)))
+    series = np.zeros((3, 24))
+    series[:2, root] = 1.0, 0.0
+    series[1:, clock] = 1.0, 1.0
+    expected = (math.sqrt(1.0 + 4.0 * remaining) - 1.0) / 2.0
+    assert kernels.step_until(series, clock, 2, 3.0, remaining, work) == pytest.approx(expected, rel=1e-14)
+    # Where the end is not reached the step is kept.
+    assert kernels.step_until(series, clock, 2, 0.5, 0.76, work) == 0.5
+    # The root is ``1 - s``: beyond 1 its clock runs backwards.
+    series[:2, root] = 1.0, -1.0
+    series[1:, clock] = 2.0, -1.0
+    expected = 1.0 - math.sqrt(1.0 - remaining)
+    assert kernels.step_until(series, clock, 2, 3.0, remaining, work) == pytest.approx(expected, rel=1e-14)
+    assert kernels.step_until(series, clock, 2, 3.0, 1.25, work) == 3.0
 
 
 class TestAccept:
@@ -122,7 +120,7 @@ class TestAccept:
         series[: order + 1, 8:16] = np.arange(24.0).reshape(3, 8)
         series[: order + 1, 16:24] = 100.0 + np.arange(24.0).reshape(3, 8)
         series[order + 1, :6] = 5.0, 6.0, 9.0, 9.0, 9.0, 0.75
-        series[order + 2, :6] = 7.0, 8.0, 9.0, 9.0, 9.0, 9.0
+        series[order + 2, :6] = 0.5, 8.0, 9.0, 9.0, 9.0, 9.0
         model = SimpleNamespace(
             dimension=n,
             first_outgoing=np.array([0, 1, 3]),
@@ -141,10 +139,10 @@ class TestAccept:
         return run, series
 
     def test_sizes(self):
-        assert self.accepted(0)[0].scale.tolist() == [7.0, 8.0]
+        assert self.accepted(0)[0].scale.tolist() == [0.5, 8.0]
         for on_guard in ((1, 0, 0), (0, 2, 0)):
             assert self.accepted(0, on_guard)[0].scale.tolist() == [7.5, 8.0]
-        assert self.accepted(0, (0, 0, 1))[0].scale.tolist() == [7.0, 8.0]
+        assert self.accepted(0, (0, 0, 1))[0].scale.tolist() == [0.5, 8.0]
 
     def test_tangent_vectors_and_divergence(self):
         run, _ = self.accepted(0)
@@ -247,18 +245,22 @@ class TestReachGuard:
 
 
 def test_the_shortest_way_to_a_guard():
-    """``3 x + 4 y`` is 50 too large: 10 along ``(0.6, 0.8)``."""
-    for gradient, expected in (((3.0, 4.0, 7.0), [7.0 - 6.0, 9.0 - 8.0]), ((0.0, 0.0, 7.0), [7.0, 9.0])):
+    """``3 x + 4 y`` is 50 too large: 10 along ``(0.6, 0.8)``; so is a hundredth of it in its unit."""
+    for unit, gradient, expected in (
+        (1.0, (3.0, 4.0, 7.0), [1.0, 1.0]),
+        (0.01, (0.03, 0.04, 7.0), [1.0, 1.0]),
+        (1.0, (0.0, 0.0, 7.0), [7.0, 9.0]),
+    ):
 
         def guard_gradient(transition, t, x, parameters, out, gradient=gradient):
             assert (transition, t) == (1, T)
             out[:] = gradient
 
-        tested = plain(module, guard_value=lambda *given: 50.0).project_on_guard
+        tested = plain(module, guard_value=lambda *given, unit=unit: 50.0 * unit).project_on_guard
         run = SimpleNamespace(y=np.array([7.0, 9.0, 5.0]))
         model = SimpleNamespace(dimension=2, parameters=None, guard_gradient=guard_gradient)
         tested(model, run, 1, T, SimpleNamespace(gradient=np.zeros(3), scalar=None))
-        np.testing.assert_allclose(run.y, [*expected, 5.0], rtol=1e-15)
+        np.testing.assert_allclose(run.y, [*expected, 5.0], rtol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -266,6 +268,7 @@ def test_the_shortest_way_to_a_guard():
     [
         (8.0, 0.0, 1.0, 10.0),
         (8.0, 5.0, 1.0, 5.0),
+        (8.0, 7.5, 1.0, 2.5),
         (8.0, 8.0, 1.0, math.inf),
         (8.0, 9.0, 1.0, math.inf),
         (0.0, 0.0, 1.0, math.inf),
@@ -291,6 +294,8 @@ def test_flights_without_an_end():
     for resting in (np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[1.0, 1.0], [0.0, 0.0]])):
         run.next_step = 0.0
         assert kernels.unhurried(resting, 2, run) == 1.0
+    run.next_step = 0.0
+    assert kernels.unhurried(0.125 * series, 2, run) == 200.0
     run.next_step = 6e49
     assert kernels.unhurried(series, 2, run) == 6e49
     assert run.next_step == 1e50

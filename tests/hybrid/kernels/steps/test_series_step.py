@@ -96,10 +96,10 @@ class TestStep:
             out[: order + 3] = 0.0
             out[:3, :2] = [[2.0, 3.0], [8.0, 0.0], [0.0, 1.0]]
             # Guards, then the clock: ``s / 2 + s^2``.
-            out[0, 2:4] = 7.0
+            out[0, 2 : 2 + guards] = -7.0
             out[1, n + guards] = 0.5
-            out[2, n + guards] = 1.0
-            out[:, 0] *= others.get("factor", 1.0)
+            out[2, n + guards] = others.get("bend", 1.0)
+            out[0, 0] *= others.get("factor", 1.0)
 
         model = SimpleNamespace(
             dimension=n,
@@ -160,6 +160,9 @@ class TestStep:
         self.step(guards=0)
         assert self.evaluated == [(6, 0.5, 0, 4)]
         assert "earliest_on_series" not in self.calls.names()
+        assert "sides_at" not in self.calls.names()
+        self.step(guards=1)
+        assert self.called("earliest_on_series") == [(6, T, 0.5, -1)]
 
     def test_exact_and_polynomial_modes(self):
         self.step(kind=EXACT)
@@ -176,9 +179,11 @@ class TestStep:
             assert self.step(2.5, degree=2, max_step=0.75) == (GO_ON, 0.75)
         assert self.step(math.inf, degree=2) == (GO_ON, 7.0)
         assert self.called("unhurried") == [(2,)]
+        assert self.step(2.5, degree=1) == (GO_ON, 2.5)
+        assert self.given[0][3] == 1
         # The root of the next series is looked for behind a series of the full order.
         self.step(2.0, degree=2)
-        assert self.work.series[7, :6].tolist() == [0.0, 0.0, 7.0, 7.0, 0.0, 0.0]
+        assert self.work.series[7, :6].tolist() == [0.0, 0.0, -7.0, -7.0, 0.0, 0.0]
 
     def test_numbers_too_large_for_powers(self):
         reach = 2.0 ** (MOST_BITS / self.ORDER)
@@ -259,7 +264,7 @@ class TestStep:
         h = SHORTER**3 * 0.5
         assert self.step(earliest_on_series=lambda calls: next(answers)) == (GO_ON, h)
         assert len(self.called("restore_sides")) == 3
-        assert [each[1] for each in self.evaluated] == [0.5, SHORTER * 0.5, SHORTER**2 * 0.5, h]
+        assert self.evaluated == [(6, each, 0, 8) for each in (0.5, SHORTER * 0.5, SHORTER**2 * 0.5, h)]
         assert self.called("earliest_on_series")[-1] == (6, T, h, -1)
         # No further than four roundings of time, and not too often.
         blurred = {"earliest_on_series": (2.0, NO_TRANSITION, 1.0, 2)}
@@ -300,6 +305,7 @@ class TestStep:
             assert self.called("step_until") == [(4, 6, 0.5, remaining)]
             assert self.evaluated == [(6, 0.5, 0, 8), (6, 0.375, 0, 8)]
             assert self.called("accept_series") == [(0, 6, 0.375)]
+        assert self.step(kind=DESINGULARISED, bend=-0.25) == (GO_ON, 0.1875)
         # No time beyond the end of the run.
         assert self.step(0.3, kind=DESINGULARISED) == (GO_ON, 0.3)
         # What is less than rounding of the clock or of the time is no rest.
@@ -320,7 +326,7 @@ class TestStep:
             (0.501 / CRAWL, STEP_TOO_SMALL, MOST_CRAWLING + 1),
         ):
             found = self.step(kind=DESINGULARISED, since_entry=since, crawling=MOST_CRAWLING)
-            assert found[0] == code
+            assert found == (code, 0.5 if code == GO_ON else 0.0)
             assert self.run.crawling == count
         crawling = {"kind": DESINGULARISED, "since_entry": 0.501 / CRAWL}
         assert self.step(**crawling, crawling=MOST_CRAWLING - 1) == (GO_ON, 0.5)
