@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import SETTLED
+from hybrid.kernels.arithmetic.bernstein import AT_END, SETTLED
 from hybrid.kernels.events.path import value_at
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -95,12 +95,14 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
     The error after a step of Halley's is about the cube of the step, over the square of the length on which
     the guard bends: where that is rounding, it need not be looked at.
     """
-    s, last = low + (high - low) * (left / (left - right)), high - low
-    if not low < s < high:
-        s = 0.5 * (low + high)
+    share, last = left / (left - right), high - low
+    s = low + (high - low) * (share if AT_END < share < 1.0 - AT_END else 0.5)
     for _ in range(100):
         value, slope, bend = expanded_at(series, column, known_roots, order, s)
-        if value == 0.0:
+        if slope * left > 0.0:
+            # Another root, at an end of the bracket up to rounding, attracts from here.
+            slope = 0.0
+        elif value == 0.0:
             return s
         if (value > 0.0) == (left > 0.0):
             low = s
