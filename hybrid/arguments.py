@@ -135,8 +135,8 @@ def items(name: str, value: object, wanted: str) -> list[Any]:
         raise refusal(name, wanted, value)
     try:
         return list(value)
-    except TypeError:  # a zero-dimensional array
-        raise refusal(name, wanted, value) from None
+    except Exception as error:  # a zero-dimensional array, or what only promises to be a collection
+        raise refusal(name, wanted, value) from error
 
 
 def instance(name: str, value: object, kind: type[Kind], hint: str = "") -> Kind:

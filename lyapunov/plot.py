@@ -122,7 +122,8 @@ def plot_convergence(
     ax.set_xlabel("intervals $M$")
     ax.set_ylabel("exponent estimate")
     ax.grid(True, axis="y")
-    ax.legend()
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend()
     return ax
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import HybridSystem, arguments, filippov
+from hybrid import ArgumentError, HybridSystem, arguments, filippov
 
 
 def dry_friction_oscillator() -> HybridSystem:
@@ -76,6 +76,8 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
         The amplitude, or ``nan`` if the motion does not exist.
     """
     f, A, w = arguments.not_negative("f", f), arguments.number("A", A), arguments.positive("w", w)
+    if w == 1.0:
+        raise ArgumentError("w must not be 1: the motion has no bound at resonance.")
     D = -f * np.tan(np.pi / (2 * w))
     X = np.sqrt(np.maximum((A / (1 - w**2)) ** 2 - (D / w) ** 2, 0.0))
     s = np.linspace(0.0, np.pi / w, 4001)[1:-1]

@@ -61,7 +61,7 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     nonsmooth discontinuous vibroimpact system", 2017.
     """
     contact = Hertz(hertz_stiffness()) if contact is None else contact
-    if isinstance(contact, type) or not isinstance(contact, ContactLaw):
+    if isinstance(contact, type) or not isinstance(contact, ContactLaw) or not callable(contact.modes):
         wanted = "be a law of contact from models.contact, for example Rigid(e=0.8)"
         raise arguments.refusal("contact", wanted, contact)
     bodies = Bodies(_field, lambda t, x, p: x.x1 - x.x2, lambda t, x, p: x.v1 - x.v2, _collided)

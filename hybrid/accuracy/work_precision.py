@@ -250,7 +250,7 @@ def work_precision(
         raise arguments.refusal("tolerances", "be positive and at least one", tolerances)
     repeats = arguments.count("repeats", repeats, 1)
     longest = arguments.positive("longest", longest, "be a positive number of seconds", infinite=True)
-    arguments.function("clock", clock, "no arguments")
+    _check_clock(clock)
     known_errors = {
         arguments.known("reference_error: Quantity", quantity, QUANTITIES, "Quantities"): (
             arguments.not_negative(f"reference_error[{quantity!r}]", value)
@@ -343,6 +343,18 @@ def _own(
     if arc.status.code == StatusCode.INTERRUPTED:
         raise KeyboardInterrupt
     return arc
+
+
+def _check_clock(clock: object) -> None:
+    """Whether a function tells the time as a number."""
+    wanted = "be a function without arguments that returns seconds"
+    if not callable(clock) or isinstance(clock, type):
+        raise arguments.refusal("clock", wanted, clock)
+    try:
+        told = clock()
+    except Exception as error:
+        raise arguments.refusal("clock", wanted, clock) from error
+    arguments.number("clock: the time returned", told)
 
 
 def _measured(

@@ -119,7 +119,10 @@ def _as_arc(arc: object) -> HybridArc:
 
 
 def _components(names: Sequence[str], components: object) -> list[int]:
-    given = arguments.items("components", components, "be names or indices of components of the state")
+    wanted = "be names or indices of components of the state, at least one"
+    given = arguments.items("components", components, wanted)
+    if not given:
+        raise arguments.refusal("components", wanted, components)
     return [as_component("components", names, each) for each in given]
 
 

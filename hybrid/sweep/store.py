@@ -239,9 +239,17 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:
 
 def as_path(path: object, name: str = "store") -> Path:
     """A path, or an ArgumentError."""
-    if not isinstance(path, str | os.PathLike) or not str(path):
-        raise arguments.refusal(name, "be the path of a folder", path)
-    return Path(os.fspath(path))
+    wanted = "be the path of a folder"
+    text = os.fspath(path) if isinstance(path, str | os.PathLike) else ""
+    if not isinstance(text, str) or not text:
+        raise arguments.refusal(name, wanted, path)
+    try:
+        os.lstat(text)
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass
+    except (OSError, ValueError) as error:  # no file can have such a name
+        raise arguments.refusal(name, wanted, path) from error
+    return Path(text)
 
 
 def _listed(points: Points) -> dict[str, Any]:

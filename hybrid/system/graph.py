@@ -17,7 +17,7 @@ from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_functions
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
-from hybrid.system.growth import Growth
+from hybrid.system.growth import Growth, grows
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
@@ -45,6 +45,18 @@ def _as_period(value: Any) -> Any:
     if value is None or callable(value):
         return value
     return arguments.positive("HybridSystem: period", value, "be a positive time or a function of p")
+
+
+def _as_notes(value: Iterable[str]) -> tuple[str, ...]:
+    lines = arguments.items("HybridSystem: notes", value, "be a list of lines of text")
+    return tuple(arguments.instance(f"HybridSystem: notes[{i}]", line, str) for i, line in enumerate(lines))
+
+
+def _growth(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if value is not None and not grows(value):
+        raise arguments.refusal(
+            "HybridSystem: growth", "be left out: split and from_equations give it", value
+        )
 
 
 def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
@@ -92,9 +104,9 @@ class HybridSystem(Portable):
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
     # Lines for `repr`: what short names in a derived system stand for.
-    notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, repr=False)
+    notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_notes, repr=False)
     # What makes further modes, for a system that is made in stages.
-    growth: Growth | None = attrs.field(default=None, kw_only=True, repr=False)
+    growth: Growth | None = attrs.field(default=None, kw_only=True, validator=_growth, repr=False)
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 

@@ -49,6 +49,13 @@ class Growth(Protocol):
         ...
 
 
+def grows(value: object) -> bool:
+    """Whether an object can make further modes of a system."""
+    methods = ("leads_on", "extend", "place")
+    is_object = not isinstance(value, type) and isinstance(getattr(value, "written", None), dict)
+    return is_object and all(callable(getattr(value, name, None)) for name in methods)
+
+
 class Unexplored(Exception):
     """A run needs modes that have been made only now."""
 

@@ -221,16 +221,31 @@ def turned(
     name: str, system: HybridSystem, flip: Iterable[str] | Callable[[np.ndarray], np.ndarray]
 ) -> Callable[[np.ndarray], np.ndarray]:
     """The involution of the state: ``flip`` itself, or the sign change of the components named in it."""
-    if callable(flip):
-        return flip
     known = system.state_names
     wanted = "be names of components of the state, or a function of it"
+    if callable(flip):
+        return lambda x: _turned_by(name, flip, x)
     names = [
         arguments.known(f"{name}: State component", each, known, "State components")
         for each in arguments.items(name, flip, wanted)
     ]
     signs = np.array([-1.0 if each in names else 1.0 for each in known])
     return lambda x: signs * x
+
+
+def _turned_by(name: str, flip: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
+    """What a user's function makes of a state."""
+    wanted = f"be a function that returns {x.size} numbers for a state"
+    try:
+        given: object = flip(x.copy())
+    except Exception as error:
+        raise arguments.refusal(
+            name, f"{wanted}; it fails with {type(error).__name__}: {error}", flip
+        ) from error
+    found = arguments.numbers(f"{name}: the state returned", given, f"hold {x.size} numbers")
+    if found.shape != x.shape:
+        raise arguments.refusal(name, wanted, flip)
+    return found
 
 
 def _mode_after(case: Case, j: int) -> str:

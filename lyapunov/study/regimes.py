@@ -42,7 +42,11 @@ def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, 
     """Small multiples, a column a regime: phase portrait, section, first exponent over the intervals."""
     import matplotlib.pyplot as plt
 
-    for i, panel in enumerate(arguments.items("panels", panels, "be a list of Panel objects")):
+    wanted = "be a list of Panel objects, at least one"
+    panels = arguments.items("panels", panels, wanted)
+    if not panels:
+        raise arguments.refusal("panels", wanted, panels)
+    for i, panel in enumerate(panels):
         system = arguments.instance(f"panels[{i}]", panel, Panel).arc.system
         x, y = (
             system.state_names[as_component(name, system.state_names, c)] for name, c in (("x", x), ("y", y))

@@ -4,8 +4,10 @@ The table is checked against the signatures, so that a new argument without an e
 """
 
 import inspect
+from decimal import Decimal
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 import hybrid
@@ -103,10 +105,6 @@ def public_functions():
     return [each for each in found if each.__name__ not in NOT_CALLED]
 
 
-# What only a system that has been split has.
-BY_SPLIT = ("notes", "growth")
-
-
 def arguments_of(function):
     """Names of the arguments that a caller gives."""
     if not callable(function):
@@ -114,7 +112,7 @@ def arguments_of(function):
     return [
         name
         for name in inspect.signature(function).parameters
-        if name not in ("self", "cls", "args", "kwargs", "options", *BY_SPLIT)
+        if name not in ("self", "cls", "args", "kwargs", "options")
     ]
 
 
@@ -182,5 +180,63 @@ def test_nonsense(made):
                     failures.append(f"{what}: {type(error).__name__}: {error}")
                 else:
                     failures.append(f"{what}: accepted")
+        plt.close("all")
+    assert not failures, "\n" + "\n".join(failures)
+
+
+ODD_LIST: list = []
+ODD_LIST.append(ODD_LIST)
+
+
+class Unwilling:
+    """A collection that raises an error of its own when it is looked into."""
+
+    def __len__(self):
+        raise ValueError("no length")
+
+    def __iter__(self):
+        raise ValueError("no items")
+
+
+ODDITIES = {
+    "unwilling": Unwilling(),
+    "object": object(),
+    "int": int,
+    "type": type,
+    "len": len,
+    "no arguments": lambda: 1.0,
+    "nothing": lambda *given: None,
+    "raises": lambda *given: 1 / 0,
+    "empty list": [],
+    "empty mapping": {},
+    "empty array": np.array([]),
+    "error": ValueError,
+    "system": BALL,
+    "nul": "a\0b",
+    "surrogate": "\ud800",
+    "long": "a" * 10_000,
+    "memory": memoryview(b"abc"),
+    "fields": np.zeros(2, dtype=[("a", float)]),
+    "itself": ODD_LIST,
+    "decimal": Decimal("1.5"),
+    "date": np.datetime64("2020-01-01"),
+}
+# Each of its calls runs a system many times.
+SLOW = ("check_system",)
+
+
+@pytest.mark.parametrize("oddity", ODDITIES)
+def test_no_oddity_raises_an_error_from_inside(made, oddity):
+    """Each argument of each function accepts it, or refuses it by an error of the library."""
+    failures = []
+    for function, positional, options in [each for each, _ in table(made)]:
+        for argument in arguments_of(function) if function.__name__ not in SLOW else ("elastic",):
+            given = dict(zip(inspect.signature(function).parameters, positional, strict=False)) | options
+            try:
+                function(**{**given, argument: ODDITIES[oddity]})
+            except (HybridError, hybrid.testing.PropertyError):
+                pass
+            except Exception as error:
+                failures.append(f"{function.__qualname__}({argument}): {type(error).__name__}: {error}")
         plt.close("all")
     assert not failures, "\n" + "\n".join(failures)

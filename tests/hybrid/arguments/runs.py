@@ -38,7 +38,7 @@ from tests.hybrid.arguments.values import (
 def runs(made):
     start = (OSCILLATOR, (0.0, 0.0))
     ball = (BALL, (1.0, 0.0))
-    section = Guard(lambda t, x, p: x.v, -1)
+    section = Guard(lambda t, x, p: x.v, +1)
     solvers = {"rtol": [*POSITIVE, 1e-16, 1e300], "atol": POSITIVE, "max_steps": [0, *COUNT]}
     solvers["max_step"] = LIMIT
     exponents = {**EXPONENTS, "k": [0, 3, *COUNT[1:]], "history": FLAG}

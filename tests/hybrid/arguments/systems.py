@@ -98,6 +98,8 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "notes": [None, "a", 3, [1], [None], Odd()],
+                "growth": [*FUNCTION, {}, HybridSystem, BALL, Odd()],
             },
         ),
         (
