@@ -29,7 +29,9 @@ def rooted(mode: Equations) -> Propagator | str:
     powers = "half-integer" if all(root.order == 2 for root in roots) else "fractional"
     reason = f"{powers} powers of a guard, whose root is smooth"
     largest = max(root.order for root in roots)
-    return Propagator(ROOTED, 0, reason, written, tuple(mode.held), root=largest)
+    # The roots of other guards have no series at zero: those of a tank that the first one feeds, say.
+    fragile = len(roots) < len(mode.bases)
+    return Propagator(ROOTED, 0, reason, written, tuple(mode.held), fragile=fragile, root=largest)
 
 
 def _write_rooted(
