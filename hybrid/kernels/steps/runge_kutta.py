@@ -15,7 +15,8 @@ from hybrid.kernels.events.touches import note_touch, remember_touch, share_with
 from hybrid.kernels.steps.runge_kutta_guards import (
     NOT_THERE,
     earliest_crossing,
-    land,
+    is_beyond,
+    land_on_first,
     reach,
     reach_any,
 )
@@ -158,11 +159,11 @@ def find_event(task, h):
             break
         side = run.rehearsal[3, fired]
         rounding = measured_time(model, run, mode)
-        shortened, correction = land(
-            attempts, model, method, fired, side, mode, t, rounding, h, theta, run.y, tangents, work
+        shortened, correction, first = land_on_first(
+            attempts, model, method, run, fired, t, rounding, h, theta, tangents, work
         )
         if shortened != NOT_THERE:
-            return shortened, correction, fired
+            return shortened, correction, first
         if drowns(model, method, run, fired, t, theta, h, work):
             attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
             return theta * h, 0.0, fired
@@ -196,14 +197,6 @@ def drowns(model, method, run, transition, t, theta, h, work):
         if abs(value) > rounding_band(model, run, transition, t + place * h, work.state, work):
             return False
     return True
-
-
-@njit(**KERNEL)
-def is_beyond(model, run, transition, side, t, work):
-    """Whether the end of the attempted step, at ``t``, is surely not on a side of a guard."""
-    value = guard_value(model, transition, t, work.new, work.scalar)
-    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
-    return -value * side > rounding_band(model, run, transition, t, work.new, work)
 
 
 @njit(**INLINE)

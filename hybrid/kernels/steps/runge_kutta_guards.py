@@ -309,3 +309,59 @@ def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y,
             elif not low < length < high:
                 break
     return NOT_THERE, 0.0
+
+
+@njit(**KERNEL)
+def is_beyond(model, run, transition, side, t, work):
+    """Whether the end of the attempted step, at ``t``, is surely not on a side of a guard."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    return -value * side > rounding_band(model, run, transition, t, work.new, work)
+
+
+@njit(**KERNEL)
+def passed_before(model, run, fired, t, work):
+    """A transition whose guard a landing on the guard of ``fired``, at ``t``, lies beyond; or none.
+
+    The guard has a crossing on the step that fires, and is on one side up to that crossing.
+    """
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        side = run.rehearsal[3, transition]
+        # Where no crossing fires, the side is already that at the end of the step.
+        fires = side != 0 and side == run.side[transition] and run.passed[transition] == NO_ROOT
+        if transition != fired and fires and is_beyond(model, run, transition, side, t, work):
+            return transition
+    return NO_TRANSITION
+
+
+@njit(**KERNEL)
+def land_on_first(parts, model, method, run, fired, t, rounding, h, theta, tangents, work):
+    """Land on the guard of ``fired``, or on one that the landing shows to be crossed before.
+
+    The error of the interpolant may put guards that cross almost together in the wrong order. Returns the
+    lengths as ``land`` does, and the transition.
+    """
+    mode, side = run.mode, run.rehearsal[3, fired]
+    length, correction = land(
+        parts, model, method, fired, side, mode, t, rounding, h, theta, run.y, tangents, work
+    )
+    for _ in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        if not length > 0.0:
+            break
+        other = passed_before(model, run, fired, t + length + correction, work)
+        if other == NO_TRANSITION:
+            break
+        side, end = run.rehearsal[3, other], length
+        length, correction = land(
+            parts, model, method, other, side, mode, t, rounding, end, 1.0, run.y, tangents, work
+        )
+        if length == NOT_THERE:
+            # The guard only comes close to zero: the landing before stands.
+            side = run.rehearsal[3, fired]
+            length, correction = land(
+                parts, model, method, fired, side, mode, t, rounding, end, 1.0, run.y, tangents, work
+            )
+            break
+        fired = other
+    return length, correction, fired
