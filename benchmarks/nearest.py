@@ -186,7 +186,7 @@ NEAREST = {
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),
-    "hybrid/kernels/steps/radau.py": ("solvers/test_radau.py",),
+    "hybrid/kernels/steps/radau.py": ("kernels/steps/test_radau_rules.py", "solvers/test_radau.py"),
     "hybrid/kernels/steps/runge_kutta.py": (
         "kernels/steps/test_runge_kutta_step.py",
         "accuracy/test_order.py",
@@ -202,6 +202,8 @@ NEAREST = {
         "kernels/events/test_resolution.py",
     ),
     "hybrid/kernels/steps/series.py": (
+        "kernels/steps/test_series_rules.py",
+        "kernels/steps/test_series_step.py",
         "compiler/taylor/test_series.py",
         "solvers/test_taylor.py",
         "solvers/test_fragile_series.py",
@@ -247,6 +249,7 @@ NEAREST = {
     ),
     "hybrid/simulation/memory.py": ("simulation/test_simulate.py",),
     "hybrid/simulation/plan.py": (
+        "simulation/test_parts.py",
         "simulation/test_memory.py",
         "simulation/test_trajectory.py",
         "simulation/test_simulate.py",

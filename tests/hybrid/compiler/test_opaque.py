@@ -1,10 +1,12 @@
 """Functions that are compiled as they are: their values and slopes, and what is said where that fails."""
 
 import math
+from functools import partial
 
+import numpy as np
 import pytest
 
-from hybrid.compiler.opaque import LONGEST_REASON, OpaqueFunction, _short, compiled_functions
+from hybrid.compiler.opaque import LONGEST_REASON, OpaqueFunction, _short, check_plain, compiled_functions
 from hybrid.errors import ModelError
 
 NAMED, COUNTED = ("q", "v"), 2
@@ -72,3 +74,24 @@ class TestTextOfTheCompiler:
         most = "x" * LONGEST_REASON
         assert _short(ValueError(f"{most}y")) == f"ValueError: {most} ..."
         assert _short(ValueError(most)) == f"ValueError: {most}"
+
+
+def test_what_may_be_compiled_as_it_is():
+    """Functions, but no other object that can be called, and none that catches errors."""
+
+    def careful(t, x, p):
+        try:
+            return math.sqrt(x[0])
+        except ValueError:
+            return 0.0
+
+    def plain(t, x, p):
+        return x[0] if x[0] > 1.0 else 0.0
+
+    check_plain("Mode 'a': field", plain)
+    check_plain("Mode 'a': field", lambda t, x, p: x[0])
+    for function in (partial(plain, 0.0), math.sqrt, np.sin, float):
+        with pytest.raises(ModelError, match="only if it is a plain function; got"):
+            check_plain("Mode 'a': field", function)
+    with pytest.raises(ModelError, match="what catches errors"):
+        check_plain("Mode 'a': field", careful)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER, ROOTED, RUNGE_KUTTA
+from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER, INCOMPLETE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Attempts
 from hybrid.simulation import plan
 from hybrid.simulation.memory import MOST_LAYOUTS
@@ -156,3 +156,55 @@ def test_modes_whose_tangent_vectors_need_series_get_them(solver, tangents, kind
         needs_series=lambda mode: mode == 0,
     )
     assert plan.propagator_kinds(compiled, solver, tangents) == kinds
+
+
+class Memory:
+    """A structure with one number."""
+
+    def __init__(self):
+        self.number = 1
+
+    def saved(self):
+        return self.number
+
+    def restore(self, held):
+        self.number = held
+
+
+class TestCalls:
+    """The call adds one to its memory, and asks for missing parts unless they are complete."""
+
+    def called(self, complete, monkeypatch, *, asks=True, stopped=False):
+        def compiled(parts):
+            if stopped:
+                raise KeyboardInterrupt
+            return SimpleNamespace(complete=1)
+
+        def call(parts):
+            self.calls.append(parts.complete)
+            self.structure.number += 1
+            self.array += 1.0
+            return INCOMPLETE if asks and not parts.complete else 7
+
+        monkeypatch.setattr(plan, "completed", compiled)
+        self.calls, self.structure, self.array = [], Memory(), np.array([1.0, 2.0])
+        made = plan.Plan(*[None] * 8)
+        made.parts_so_far = SimpleNamespace(complete=complete)
+        return made.called(call, self.structure, self.array)
+
+    def test_missing_parts_are_compiled_and_the_call_repeated(self, monkeypatch):
+        assert self.called(0, monkeypatch) == 7
+        assert self.calls == [0, 1]
+        assert self.structure.number == 2
+        assert self.array.tolist() == [2.0, 3.0]
+
+    @pytest.mark.parametrize(("complete", "asks"), [(1, True), (0, False)])
+    def test_a_call_that_needs_no_other_parts_is_made_once(self, complete, asks, monkeypatch):
+        assert self.called(complete, monkeypatch, asks=asks) == 7
+        assert self.calls == [complete]
+        assert self.structure.number == 2
+
+    def test_an_interrupted_compilation_leaves_the_memory_as_it_was(self, monkeypatch):
+        assert self.called(0, monkeypatch, stopped=True) == hybrid.StatusCode.INTERRUPTED
+        assert self.calls == [0]
+        assert (self.structure.number, self.array.tolist()) == (1, [1.0, 2.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.solvers.tableau import bernstein_from_powers, times_one_minus_theta, times_theta
+from hybrid.solvers.tableau import Tableau, bernstein_from_powers, times_one_minus_theta, times_theta
 
 SOLVERS = (hybrid.DOP853, hybrid.Tsit5)
 every_solver = pytest.mark.parametrize("solver", SOLVERS)
@@ -245,3 +245,22 @@ def test_nodes_are_the_ends_and_the_places_of_stages_that_count(solver):
         if any(parts)
     }
     assert tableau.nodes.tolist() == sorted({0.0, 1.0} | counted)
+
+
+def test_the_nodes_of_a_method_are_those_with_weight_and_the_ends():
+    """Places with a weight in the step, in one of its error estimates, or in several of them."""
+    places = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+    for weighed in ("b", "error", "second_error"):
+        weights = {"b": np.zeros(4), "error": np.zeros(5), "second_error": np.zeros(5)}
+        for stage, place in enumerate(places[:4]):
+            weights[weighed][:] = 0.0
+            weights[weighed][stage] = 0.125
+            tableau = Tableau(
+                order=2,
+                error_order=1,
+                a=np.zeros((5, 5)),
+                c=places,
+                interpolant=np.zeros((2, 5)),
+                **{name: values.copy() for name, values in weights.items()},
+            )
+            assert tableau.nodes.tolist() == sorted({0.0, place, 1.0})

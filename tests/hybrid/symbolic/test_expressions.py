@@ -29,6 +29,7 @@ from hybrid.symbolic.expressions import (
     Select,
     Sign,
     Step,
+    Together,
     Truncate,
     TruncatedRemainder,
     close_gates,
@@ -186,3 +187,16 @@ def test_all_functions_are_real():
     for each in (Absolute(x), Maximum(x, y), Floor(x), Select(x, y, x), Less(x, y)):
         assert each.is_real
         assert not each.is_zero
+
+
+def test_products_of_products_with_numbers_beyond_the_range_stay_apart():
+    """2^600 times 2^-600 is computed factor by factor: neither number leaves the range."""
+    large, small = sympy.Mul(sympy.Integer(2) ** 400, x), sympy.Mul(sympy.Integer(2) ** 300, y)
+    made = product(large, small)
+    assert set(made.args) == {Together(large), Together(small)}
+    assert product(large, y) == sympy.Mul(large, y)
+    # A factor that is no product needs nothing that holds it together.
+    assert set(product(large, sympy.Integer(2) ** 300).args) == {Together(large), sympy.Integer(2) ** 300}
+    # So do powers that would be collected.
+    one, other = x**9 * y, x**10 * y
+    assert set(product(one, other).args) == {Together(one), Together(other)}

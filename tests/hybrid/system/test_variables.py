@@ -4,7 +4,7 @@ import pytest
 import models
 from hybrid import simulate
 from hybrid.errors import ArgumentError, ModelError
-from hybrid.system.variables import PARAMETERS, Variables, named_values, plain_class
+from hybrid.system.variables import PARAMETERS, Variables, as_state, named_values, plain_class
 
 
 def test_values_are_read_by_name_by_index_and_in_order():
@@ -76,3 +76,10 @@ def test_compiled_code_takes_the_plain_class():
     numba = pytest.importorskip("numba")
     parameters = plain_class(PARAMETERS, ("count", "e"))
     assert numba.njit(lambda e: parameters(e, 2.0).count)(3.0) == 3.0
+
+
+def test_names_in_an_array():
+    assert as_state(np.array(["q", "v"])) == ("q", "v")
+    for names in (np.array([["q", "v"]]), np.array("q")):
+        with pytest.raises((ArgumentError, ModelError), match="tuple of names or a number of components"):
+            as_state(names)

@@ -260,3 +260,33 @@ def test_lines_are_read_by_llvm():
     assert "fmul contract double" in str(module)
     # LLVM takes no volatile store apart.
     assert str(module).count("store volatile double") == 1
+
+
+@pytest.mark.parametrize("operator", "+-*/")
+def test_four_numbers_at_once_and_one(operator):
+    """One number counts for all four, before and after the operator."""
+    lines = [
+        f"store(out, 0, 0, load(out, 0, 0) {operator} 3)",
+        f"store(out, 1, 0, 3 {operator} load(out, 1, 0))",
+        f"store(out, 2, 0, load(out, 2, 0) {operator} x[1])",
+        f"store(out, 3, 0, x[1] {operator} load(out, 3, 0))",
+        f"store(out, 4, 0, load(out, 4, 0) {operator} load(out, 5, 0))",
+        "store(out, 5, 0, -load(out, 5, 0))",
+    ]
+    start = np.arange(1.0, 25.0).reshape(6, 4)
+    found = []
+    for run in both(lines):
+        out = start.copy()
+        run(0, 0.25, X, P, 0, out)
+        found.append(out)
+    apply = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}[operator]
+    expected = [
+        apply(start[0], 3.0),
+        apply(3.0, start[1]),
+        apply(start[2], X[1]),
+        apply(X[1], start[3]),
+        apply(start[4], start[5]),
+        -start[5],
+    ]
+    np.testing.assert_array_equal(found[0], expected)
+    np.testing.assert_array_equal(found[1], expected)

@@ -1,5 +1,6 @@
 """Root isolation on polynomials with known roots, in exact arithmetic up to the last rounding."""
 
+import math
 from fractions import Fraction
 from itertools import pairwise
 from math import comb
@@ -338,3 +339,23 @@ def test_a_multiplication_undoes_a_division(values):
     assert room[0] == 0.0
     assert deflated(room, 1) == degree
     np.testing.assert_allclose(room[:-1], values, rtol=1e-14, atol=1e-300)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_zero_at_the_very_end_is_crossed_if_the_slope_there_leads_across(sign):
+    for coefficients, direction, expected in (
+        ([1.0, 0.0], 0, (1.0, -1)),
+        ([1.0, 0.0], -1, (1.0, -1)),
+        ([1.0, 0.0], 1, (NONE, -1)),
+        # There and back, and there again.
+        ([-1.0, 2.0, 0.0], -1, (1.0, -1)),
+        ([-1.0, 2.0, 0.0], 1, (0.2, 1)),
+        # A touch at the end is no crossing.
+        ([1.0, 0.0, 0.0], 0, (NONE, 1)),
+        ([1.0, -1.0, 0.0, 0.0], 1, (NONE, -1)),
+    ):
+        side = int(math.copysign(1, coefficients[0]))
+        found = first_crossing(
+            sign * np.array(coefficients), len(coefficients) - 1, sign * side, sign * direction
+        )
+        assert found == (pytest.approx(expected[0], rel=1e-14), sign * expected[1])
