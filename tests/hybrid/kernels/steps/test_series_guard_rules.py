@@ -1,5 +1,6 @@
 """Guards along a series, rule by rule, on polynomials whose roots are known."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
