@@ -294,3 +294,30 @@ class TestSumRule:
                 return super().simulate(system, x0, t_span, **{**options, **short})
 
         assert "step" in discarded(check_sum_rule, ball(engine=Fails()))
+
+
+class TestSaltation:
+    """Three matrices are compared with the differences of the flow."""
+
+    def test_the_matrix_that_is_asked_for(self):
+        for factor in (0.99, 1.01):
+            with pytest.raises(PropertyError, match="between the tangent maps before and after"):
+                check_saltation(ball(engine=Off(factor)))
+
+    def test_the_matrix_of_the_jump(self, monkeypatch):
+        right = module._Window.product
+        for factor in (0.99, 1.01):
+            monkeypatch.setattr(module._Window, "product", lambda window, f=factor: f * right(window))
+            with pytest.raises(PropertyError, match="saltation matrix of the jump: "):
+                check_saltation(ball())
+
+    def test_the_tangent_map_of_the_run(self):
+        for factor in (0.99, 1.01):
+            with pytest.raises(PropertyError, match=r"run across the event: simulate\(tangent=True\)"):
+                check_saltation(ball(engine=Off(run=factor)))
+
+    def test_runs_that_start_behind_a_passable_guard_are_not_made(self, monkeypatch):
+        monkeypatch.setattr(module._Window, "through", lambda window, xi: 1 / 0)
+        check_saltation(attrs.evolve(ball(), passable=("bounce",)))
+        with pytest.raises(ZeroDivisionError):
+            check_saltation(attrs.evolve(ball(), passable=("another",)))

@@ -1,5 +1,6 @@
 """Guards along a series, rule by rule, on polynomials whose roots are known."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -261,6 +262,13 @@ class TestEarliest:
                 assert self.run.rehearsal[0, 1] == way
 
     @pytest.mark.parametrize("way", [1.0, -1.0])
+    def test_a_crossing_on_the_later_half(self, way):
+        """``3 + t - 1.5 t^2`` rises before it falls."""
+        found = self.earliest([3.0 * way, way, -1.5 * way])
+        assert found[:2] == (pytest.approx((1.0 + math.sqrt(19.0)) / 6.0, rel=1e-14), 1)
+        assert self.run.rehearsal[3, 1] == way
+
+    @pytest.mark.parametrize("way", [1.0, -1.0])
     def test_the_earliest_of_several(self, way):
         near, far, none = (self.powers(root, factor=way) for root in (0.5, 1.5, 9.0))
         for guards, place in (((near, far, none), 1), ((far, none, near), 3), ((none, near, near), 2)):
@@ -311,6 +319,8 @@ class TestEarliest:
         # A value at the start is rounding, too.
         self.earliest([5.0, 0.5e-3], sides=[1], on_guard=[BY_SPEED], rounding=1.01e-3)
         assert self.run.on_guard[1] == BY_SPEED
+        self.earliest([5.0, 0.5e-3], sides=[1], on_guard=[BY_SPEED], rounding=0.99e-3)
+        assert self.run.on_guard[1] == 0
         # It is one of a root in the series of a root.
         self.earliest([0.0, 0.5e-3], sides=[1], on_guard=[BY_SPEED], rounding=1.1e-6, kind=ROOTED)
         assert self.run.on_guard[1] == BY_SPEED
