@@ -119,6 +119,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "due": (transitions,),
         "recent": (RECENT,),
         "rehearsal": (4, transitions),
+        "passed": (transitions,),
         "visits": (RECENT, n + 2),
         "first_step": (modes,),
         "stay": (modes,),

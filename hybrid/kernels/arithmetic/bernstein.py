@@ -15,6 +15,8 @@ NO_ROOT = 2.0
 CLUSTER = 1e-14
 # A relative Newton step below this is in the range of quadratic convergence to a numerically simple root.
 SETTLED = 1e-8
+# A root closer to an end than this share of an interval may be one at the end itself, moved by rounding.
+AT_END = 1e-8
 
 
 @njit(**KERNEL)
@@ -43,7 +45,10 @@ def value_and_slope(coefficients, degree, theta):
 
 @njit(**KERNEL)
 def simple_root(coefficients, degree, sign_left):
-    """The only root in (0, 1) of a polynomial with one sign variation: Newton's method in a bracket."""
+    """The only root in (0, 1) of a polynomial with one sign variation: Newton's method in a bracket.
+
+    Another root may be at an end, up to rounding. There the slope has the other sign.
+    """
     low, high, last = 0.0, 1.0, 1.0
     # Start at the root of the secant, unless an end is a root: that root is not in the open interval.
     theta = coefficients[0] / (coefficients[0] - coefficients[degree])
@@ -51,9 +56,15 @@ def simple_root(coefficients, degree, sign_left):
         theta = 0.5
     for _ in range(100):
         value, slope = value_and_slope(coefficients, degree, theta)
-        if value == 0.0:
+        turned = slope * sign_left > 0.0
+        if turned:
+            slope = 0.0
+        elif value == 0.0:
             return theta
-        if (value > 0.0) == (sign_left > 0):
+        if turned and not AT_END < theta < 1.0 - AT_END:
+            # So close to the other root, rounding may have made the sign of the value.
+            pass
+        elif (value > 0.0) == (sign_left > 0):
             low = theta
         else:
             high = theta

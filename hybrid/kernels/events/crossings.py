@@ -423,6 +423,8 @@ def first_change(
             side = after
             if crosses_towards(direction, after) and not again:
                 return place, side, length
+            if not again:
+                run.passed[transition] = place / length
         elif touch != NOWHERE and depth < _distance_at(
             model, transition, path, order, clock, start, pace, high, side, work
         ):

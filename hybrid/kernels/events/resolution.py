@@ -13,6 +13,7 @@ and its level has reached the guard ``h`` there.
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT, first_crossing
 from hybrid.kernels.events.guards import displace, error_band, guard_speed, guard_value, rounding_band
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
@@ -20,6 +21,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 
 # The signs at the ends of a step must bear so many times its estimated error.
 MARGIN = 100.0
+# The side of a guard before an event, in ``run.rehearsal``, if the step before has not told it.
+NOT_KNOWN = 2
 # The last terms of a series for a guard below this size may have lost their digits.
 UNDERFLOW = 1e-250
 # Speeds as near to a guard as its rounding, and so many times farther, tell how the speed grows with the
@@ -33,6 +36,7 @@ def keep_side(run, transition):
     """Remember what is known of a guard at the start of a step."""
     run.rehearsal[0, transition] = run.side[transition]
     run.rehearsal[1, transition] = run.on_guard[transition]
+    run.rehearsal[3, transition], run.passed[transition] = 0, NO_ROOT
 
 
 @njit(**INLINE)
@@ -42,9 +46,46 @@ def keep_change(run, transition, side):
     An event of another guard may end the step before. Where rounding hides the guard there, its side is that
     from the start of the step.
     """
-    run.side[transition] = side
-    if side != run.rehearsal[0, transition]:
-        run.rehearsal[3, transition] = run.rehearsal[0, transition]
+    run.side[transition], run.passed[transition] = side, NO_ROOT
+    before = run.rehearsal[0, transition]
+    if side != before:
+        run.rehearsal[3, transition] = before if before != 0 else NOT_KNOWN
+
+
+@njit(**KERNEL)
+def keep_passage(run, transition, direction, coefficients, degree, side, hidden, stack):
+    """Note where a polynomial that crosses in its ``direction`` on a step has changed sides before that.
+
+    It has if it starts on the ``side`` to which it crosses; zero if that is not known. Its Bernstein
+    coefficients are those on the step beyond the share ``hidden``.
+    """
+    if direction == 0 or side == -direction:
+        return
+    theta, _ = first_crossing(coefficients, degree, side, -direction, stack)
+    if theta < NO_ROOT:
+        run.passed[transition] = hidden + theta * (1.0 - hidden)
+
+
+@njit(**INLINE)
+def keep_crossing(run, transition, theta, side):
+    """Note a crossing at the share ``theta`` of the step, to ``side``."""
+    run.rehearsal[3, transition] = -side
+    if run.passed[transition] < NO_ROOT:
+        run.passed[transition] = 0.5 * (run.passed[transition] + theta)
+
+
+@njit(**KERNEL)
+def set_sides_before(model, run, earliest):
+    """Make the kept sides before crossings those at the ``earliest`` crossing of all guards.
+
+    A guard that crosses in its direction later may start the step on the side to which it crosses, and be
+    there still. If the event is closer to that change of sides than to the crossing, the guard has not
+    crossed again, whatever rounding and the error of the step make of its sign there.
+    """
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        if earliest < run.passed[transition] < NO_ROOT:
+            run.rehearsal[3, transition] = -run.rehearsal[3, transition]
 
 
 @njit(**KERNEL)
@@ -54,6 +95,7 @@ def restore_sides(model, run):
         transition = model.outgoing[slot]
         run.side[transition] = run.rehearsal[0, transition]
         run.on_guard[transition] = run.rehearsal[1, transition]
+        run.rehearsal[3, transition] = 0
 
 
 @njit(**KERNEL)

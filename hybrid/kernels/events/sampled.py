@@ -45,6 +45,8 @@ def sampled_change(
             again = right <= SETTLED * length and has_just_fired(run, transition, on_guard)
             if crosses_towards(direction, side) and not again:
                 return right, side, length
+            if not again:
+                run.passed[transition] = right / length
         elif side == 0 and value != 0.0:
             side = 1 if value > 0.0 else -1
         low = high

@@ -241,7 +241,7 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
                 now = beside if beside != 0 else now
                 # The guard may have jumped and fired already, within the rounding of this place.
                 before = (first if first != 0 else now) if before == 0 else before
-            on = order in (BY_SPEED, JUMPING)
+            on = order in (0, BY_SPEED, JUMPING)
             crossed = on and before == -now and (direction == 0 or now == direction)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)

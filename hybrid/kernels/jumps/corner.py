@@ -16,7 +16,7 @@ from hybrid.kernels.events.guards import (
     widen_scale,
 )
 from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, JUMPING
-from hybrid.kernels.events.resolution import leads_to_guard, stays_on_guard, underflows
+from hybrid.kernels.events.resolution import NOT_KNOWN, leads_to_guard, stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
     FLOWED,
     LANDED,
@@ -189,7 +189,7 @@ def first_in_order(task, fired):
         other = model.outgoing[slot]
         if run.rehearsal[3, other] != 0:
             # It crosses here or later on the step; it may have changed sides before.
-            run.side[other] = run.rehearsal[3, other]
+            run.side[other] = run.rehearsal[3, other] if run.rehearsal[3, other] != NOT_KNOWN else 0
             run.rehearsal[3, other] = 0
     before = run.side[fired]
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)

@@ -25,8 +25,11 @@ from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
     keep_change,
+    keep_crossing,
+    keep_passage,
     keep_side,
     keeps_sign,
+    set_sides_before,
     underflows,
 )
 from hybrid.kernels.events.touches import (
@@ -135,7 +138,6 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
     forget_touches(run)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
-        run.rehearsal[3, transition] = 0
         keep_side(run, transition)
         if transition == ignored:
             leave_guard(model, run, transition, t + h, work)
@@ -164,9 +166,10 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
                 degree = divide_by_theta(work.polynomial, degree)
             if stays(work.polynomial, degree, side, error):
                 continue
-            theta, side = first_crossing(
-                work.polynomial, degree, side, model.direction[transition], work.stack
-            )
+            direction, before = model.direction[transition], side
+            theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
+            if theta != NO_ROOT:
+                keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
             if on_guard == BY_STEP:
                 theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0
                 degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
@@ -195,9 +198,10 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
         if theta == NO_ROOT:
             keep_change(run, transition, side)
             continue
-        run.rehearsal[3, transition] = -side
+        keep_crossing(run, transition, theta, side)
         if theta < earliest:
             earliest, fired = theta, transition
+    set_sides_before(model, run, earliest)
     return earliest, fired, min(proved, share_with_one_touch(run)), blurred
 
 
@@ -221,6 +225,8 @@ def reach(model, run, transition, t, h, tangents, work):
 @njit(**KERNEL)
 def reach_any(model, run, t, h, tangents, work):
     """``reach`` for the first guard of the mode that is there and fires; the transition comes second."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        run.rehearsal[3, model.outgoing[slot]] = 0
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
         side = run.side[transition]

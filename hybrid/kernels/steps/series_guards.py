@@ -25,8 +25,11 @@ from hybrid.kernels.events.resolution import (
     MARGIN,
     UNDERFLOW,
     keep_change,
+    keep_crossing,
+    keep_passage,
     keep_side,
     keeps_sign,
+    set_sides_before,
     underflows,
 )
 from hybrid.kernels.events.touches import forget_touches, note_touches, share_with_one_touch
@@ -300,7 +303,6 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
-        run.rehearsal[3, transition] = 0
         keep_side(run, transition)
         on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
@@ -320,7 +322,7 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
             if theta == NO_ROOT:
                 keep_change(run, transition, side)
                 continue
-            run.rehearsal[3, transition] = -side
+            keep_crossing(run, transition, theta, side)
             if theta < earliest:
                 earliest, fired = theta, transition
             continue
@@ -375,12 +377,13 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
         to_bernstein(work.polynomial, degree)
         if stays(work.polynomial, degree, side, band):
             continue
-        theta, end, row, side = bracket_crossing(
-            work.polynomial, degree, side, model.direction[transition], work.stack
-        )
+        direction, before = model.direction[transition], side
+        theta, end, row, side = bracket_crossing(work.polynomial, degree, side, direction, work.stack)
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, known, h, theta * h, end * h, *ends) / h
+        if theta != NO_ROOT:
+            keep_passage(run, transition, direction, work.polynomial, degree, before, 0.0, work.stack)
         note_touches(run, transition, degree, known, 0.0, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
@@ -389,7 +392,8 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
         if theta == NO_ROOT:
             keep_change(run, transition, side)
             continue
-        run.rehearsal[3, transition] = -side
+        keep_crossing(run, transition, theta, side)
         if theta < earliest:
             earliest, fired = theta, transition
+    set_sides_before(model, run, earliest)
     return earliest, fired, min(proved, share_with_one_touch(run)), blurred

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import SETTLED
+from hybrid.kernels.arithmetic.bernstein import AT_END, SETTLED
 from hybrid.kernels.events.path import value_at
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -96,13 +96,21 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
     the guard bends: where that is rounding, it need not be looked at.
     """
     s, last = low + (high - low) * (left / (left - right)), high - low
+    first, final = low + AT_END * last, high - AT_END * last
     if not low < s < high:
         s = 0.5 * (low + high)
     for _ in range(100):
         value, slope, bend = expanded_at(series, column, known_roots, order, s)
-        if value == 0.0:
+        turned = slope * left > 0.0
+        if turned:
+            # Another root, at an end of the bracket up to rounding, attracts from here.
+            slope = 0.0
+        elif value == 0.0:
             return s
-        if (value > 0.0) == (left > 0.0):
+        if turned and not first < s < final:
+            # So close to that root, rounding may have made the sign of the value.
+            pass
+        elif (value > 0.0) == (left > 0.0):
             low = s
         else:
             high = s

@@ -233,6 +233,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
     - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
       guards before the crossings found on the last step.
+    - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
+      before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
@@ -254,6 +256,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     due: INDICES
     recent: INDICES
     rehearsal: INDEX_MATRIX
+    passed: VECTOR
     visits: MATRIX
     first_step: VECTOR
     stay: VECTOR

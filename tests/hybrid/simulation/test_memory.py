@@ -83,6 +83,7 @@ def test_a_run(shapes):
         **dict.fromkeys(("side", "on_guard", "due"), (5,)),
         "recent": (64,),
         "rehearsal": (4, 5),
+        "passed": (5,),
         "visits": (64, N + 2),
         **dict.fromkeys(("first_step", "stay"), (4,)),
         "scale": (N,),

@@ -252,6 +252,15 @@ def test_without_a_side_roots_at_the_start_up_to_rounding_are_no_crossings():
     assert crossing(cluster, 1, 0)[0] == pytest.approx(0.0, abs=1e-14)
 
 
+@given(st.floats(0.01, 0.99), st.sampled_from([0.0, 1.0]), st.sampled_from([-1.0, 1.0]))
+def test_a_root_at_an_end_up_to_rounding_does_not_stand_for_the_one_inside(root, end, sign):
+    """A step that ends at the event of one guard may begin or end at a root of another."""
+    coefficients = sign * bernstein(powers((root, end)), 5)
+    first = -1 if (sign > 0.0) == (end == 1.0) else 1
+    coefficients[int(5 * end)] = -first * 1e-17 if end == 0.0 else first * 1e-17
+    assert crossing(coefficients, -first, first)[0] == pytest.approx(root, abs=1e-12)
+
+
 def test_side_after_crossings_against_the_direction():
     assert crossing(bernstein(powers((0.2,)), 7), -1, -1) == (NONE, 1)
     assert crossing(bernstein(powers((0.2, 0.4)), 7), 1, 1)[1] == 1

@@ -51,7 +51,7 @@ class TestAlongAPath:
             scalar[0] = guard(x[0])
 
         model = SimpleNamespace(dimension=1, parameters=None, guard=write, direction=np.array([9, direction]))
-        run = SimpleNamespace(unproved=4, last_fired=1 if fired else 0, since_entry=0.0)
+        run = SimpleNamespace(unproved=4, last_fired=1 if fired else 0, since_entry=0.0, passed=np.zeros(2))
         work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
         path = np.array([[-1.0], [1.0]])
         found = plain(sampled).sampled_change(

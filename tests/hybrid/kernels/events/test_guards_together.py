@@ -1,0 +1,83 @@
+"""Several directed guards along one polynomial motion, with crossings that coincide up to rounding.
+
+The components of the state are the powers of time, each guard is a polynomial in them with given roots, and
+resets only count. So the number of crossings of each guard in its direction is known, whatever events of
+other guards end the steps.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
+
+DEGREE, GUARDS, END = 5, 3, 2.0
+PLACES = np.arange(1, 16) / 8
+SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
+
+
+@cache
+def counters(directions, modes):
+    """Guards along the powers of time that count their crossings, and change the mode if there are two."""
+    width = DEGREE + 1
+
+    def field(t, x, p):
+        return (1.0, *(k * x[k - 2] for k in range(2, width)), *(0.0 for _ in range(GUARDS)))
+
+    def transition(mode, i):
+        def polynomial(t, x, p):
+            return p[width * i] + sum(p[width * i + k] * x[k - 1] for k in range(1, width))
+
+        def count(t, x, p):
+            return tuple(x[k] + (1.0 if k == DEGREE + i else 0.0) for k in range(DEGREE + GUARDS))
+
+        guard, target = Guard(polynomial, direction=directions[i]), f"mode {(mode + 1) % modes}"
+        return Transition(f"mode {mode}", target, guard, Reset(count), name=f"{i} in {mode}")
+
+    names = [f"x{k}" for k in range(1, width)] + [f"n{i}" for i in range(GUARDS)]
+    return HybridSystem(
+        state=tuple(names),
+        parameters={f"a{i}_{k}": 1.0 for i in range(GUARDS) for k in range(width)},
+        modes=[Mode(f"mode {mode}", field) for mode in range(modes)],
+        transitions=[transition(mode, i) for mode in range(modes) for i in range(GUARDS)],
+    )
+
+
+def polynomials(rng):
+    """Factor and roots of each guard: up to rounding, several guards share roots; each has a close pair."""
+    shared = rng.choice(PLACES, size=rng.integers(2, 6), replace=False)
+    for _ in range(GUARDS):
+        roots = list(rng.permutation(shared)[: rng.integers(1, DEGREE)])
+        roots = [r + rng.choice([-1, 0, 1]) * 10.0 ** rng.uniform(-16.5, -10) for r in roots]
+        near = rng.choice(roots) + rng.choice([-1, 1]) * rng.uniform(0.02, 0.1)
+        if min(abs(near - r) for r in roots) > 0.02:
+            roots.append(near)
+        yield rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-2, 2), sorted(roots)
+
+
+def crossings(factor, roots, direction):
+    """How often a polynomial changes its sign in a direction: it has the sign of its factor at the end."""
+    after = [np.sign(factor) * (-1) ** (len(roots) - 1 - i) for i in range(len(roots))]
+    return sum(direction in (0, side) for side in after)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("modes", [1, 2])
+@pytest.mark.parametrize("directions", [(1, -1, 0), (-1, 1, 1)])
+def test_each_crossing_in_its_direction_fires_once(directions, modes, name, seed):
+    """No event of another guard loses or invents one, wherever on the step the guard changes sides."""
+    rng, system = np.random.default_rng([seed, modes]), counters(directions, modes)
+    for _ in range(20):
+        guards = list(polynomials(rng))
+        values = np.zeros((GUARDS, DEGREE + 1))
+        for row, (factor, roots) in zip(values, guards, strict=True):
+            coefficients = factor * Polynomial.fromroots(roots).coef
+            row[: len(coefficients)] = coefficients
+        parameters = dict(zip(system.parameters, values.ravel(), strict=True))
+        start = np.zeros(DEGREE + GUARDS)
+        arc = simulate(system, start, (0.0, END), mode="mode 0", parameters=parameters, solver=SOLVERS[name])
+        expected = [crossings(*guard, direction) for guard, direction in zip(guards, directions, strict=True)]
+        assert list(arc.x[-1, DEGREE:]) == expected, (guards, arc.jumps.t)
