@@ -15,7 +15,7 @@ NO_ROOT = 2.0
 CLUSTER = 1e-14
 # A relative Newton step below this is in the range of quadratic convergence to a numerically simple root.
 SETTLED = 1e-8
-# A root of the secant closer to an end than this may come from the rounding of the value there.
+# A root closer to an end than this share of an interval may be one at the end itself, moved by rounding.
 AT_END = 1e-8
 
 
@@ -56,11 +56,15 @@ def simple_root(coefficients, degree, sign_left):
         theta = 0.5
     for _ in range(100):
         value, slope = value_and_slope(coefficients, degree, theta)
-        if slope * sign_left > 0.0:
+        turned = slope * sign_left > 0.0
+        if turned:
             slope = 0.0
         elif value == 0.0:
             return theta
-        if (value > 0.0) == (sign_left > 0):
+        if turned and not AT_END < theta < 1.0 - AT_END:
+            # So close to the other root, rounding may have made the sign of the value.
+            pass
+        elif (value > 0.0) == (sign_left > 0):
             low = theta
         else:
             high = theta

@@ -56,7 +56,7 @@ def spread_rates(model, run, transition, mode, t, x, work):
         component = model.residue_component[residue]
         if _matters(model, transition, component, work):
             # Terms in time and parameters alone that may cancel.
-            spreads[component] += spread_of_terms(model, run, first + residue, t, x, work) / SHARE
+            spreads[component] += spread_of_terms(model, run, first + residue, SHARE, t, x, work) / SHARE
 
 
 @njit(**KERNEL)

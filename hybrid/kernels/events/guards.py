@@ -12,6 +12,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
+# A guard within rounding of zero jumps if it exceeds this many times the rounding that its gradient predicts.
+SMOOTH = 4.0
 # The row of ``work.rounding`` for a place beside the state.
 PLACE = 3
 
@@ -124,18 +126,32 @@ def smooth_band(model, run, transition, t, x, work):
     """``rounding_band`` from the gradient in ``work.gradient`` and from terms that may cancel."""
     band = gradient_band(model, run, t, work.gradient)
     program = transition + model.target.shape[0] + model.first_forcing[-1] + model.first_residue[-1]
-    return band + spread_of_terms(model, run, program, t, x, work)
+    return band + spread_of_terms(model, run, program, ROUNDING_OF_STATE * EPSILON, t, x, work)
 
 
 @njit(**KERNEL)
-def spread_of_terms(model, run, program, t, x, work):
-    """How far rounding can move terms from their value; 0 if they have no program or may jump."""
+def spread_of_terms(model, run, program, share, t, x, work):
+    """How far rounding can move terms from their value; 0 if they have no program or may jump.
+
+    The state and the time are off by this ``share`` of their sizes; with 0 only the terms are rounded.
+    """
     if not has_program(model, program):
         return 0.0
-    share = ROUNDING_OF_STATE * EPSILON
     clock = size_of_time(model, t)
     spread = model.spread(model.programs, program, t, clock, x, run.scale, share, work.registers)
     return spread if 0.0 < spread < math.inf else 0.0
+
+
+@njit(**KERNEL)
+def exceeds_slope(model, run, transition, t, x, value, work):
+    """Whether a guard that has a program is larger than its slope lets rounding make it, as beside a jump.
+
+    The large terms of a guard may leave a flat slope, and more rounding than the slope tells.
+    """
+    band = smooth_band(model, run, transition, t, x, work)
+    if not may_jump(model, run, transition, t, x, work):
+        band += spread_of_terms(model, run, transition, 0.0, t, x, work)
+    return abs(value) > SMOOTH * band
 
 
 @njit(**KERNEL)
@@ -160,7 +176,8 @@ def widen_scale(model, run, work):
         rounding[i] = ROUNDING_OF_STATE * EPSILON * size
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
-        spread = spread_of_terms(model, run, first + residue, t, run.y, work)
+        share = ROUNDING_OF_STATE * EPSILON
+        spread = spread_of_terms(model, run, first + residue, share, t, run.y, work)
         rounding[model.residue_component[residue]] += spread
     for i in range(n):
         change = work.jacobian[i, n] + change_of_rate(model, mode, i, work.jacobian, work.field)

@@ -21,12 +21,12 @@ from hybrid.kernels.events.derivatives import (
 )
 from hybrid.kernels.events.guards import (
     allowed,
+    exceeds_slope,
     guard_speed,
     guard_value,
     has_program,
     may_jump,
     rounding_band,
-    smooth_band,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
@@ -34,8 +34,6 @@ from hybrid.kernels.types.options import KERNEL
 
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
 STARTED, FLOWED, LANDED = range(3)
-# A guard within rounding of zero jumps if it exceeds this many times the rounding that its gradient predicts.
-SMOOTH = 4.0
 # A reset that keeps less than this share of a guard's speed holds a state that the flow pushes through it.
 KEPT = 1e-3
 
@@ -83,9 +81,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     trend, order = value, 0
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
-        if has_program(model, transition) and abs(value) > SMOOTH * smooth_band(
-            model, run, transition, t, x, work
-        ):
+        if has_program(model, transition) and exceeds_slope(model, run, transition, t, x, value, work):
             if was_on and before != 0:
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
@@ -106,6 +102,13 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     if trend < 0.0:
         return -1, order
     return before if before != 0 and (was_on or direction == 0) else -direction, order
+
+
+@njit(**KERNEL)
+def order_passed(model, transition):
+    """The order of a guard that has been crossed and is not small: one that is bounded has jumped."""
+    by_bounds = has_program(model, transition) and model.guard_in_series[transition] == 0
+    return JUMPING if by_bounds else BY_SPEED
 
 
 @njit(**KERNEL)
@@ -243,6 +246,9 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
                 before = (first if first != 0 else now) if before == 0 else before
             on = order in (0, BY_SPEED, JUMPING)
             crossed = on and before == -now and (direction == 0 or now == direction)
+            if crossed and order == 0:
+                # The step to another guard has passed this one by more than rounding.
+                order = order_passed(model, transition)
         else:
             crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
             # A guard that fires both ways and was due already: this crossing takes the first one back.

@@ -9,13 +9,12 @@ from hybrid.kernels.events.guards import (
     guard_acceleration,
     guard_speed,
     guard_value,
-    has_program,
     keep_grazing,
     may_jump,
     was_left_behind,
     widen_scale,
 )
-from hybrid.kernels.events.onset import BY_SPEED, BY_STEP, JUMPING
+from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
 from hybrid.kernels.events.resolution import NOT_KNOWN, leads_to_guard, stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
     FLOWED,
@@ -23,6 +22,7 @@ from hybrid.kernels.events.sides import (
     STARTED,
     beyond_at_start,
     end_instant,
+    order_passed,
     side_of,
     take_sides,
 )
@@ -202,9 +202,7 @@ def first_in_order(task, fired):
     )
     run.side[fired] = direction if direction != 0 else -before
     if run.on_guard[fired] == 0:
-        # A guard that has just crossed zero and is not small has jumped.
-        by_bounds = has_program(model, fired) and model.guard_in_series[fired] == 0
-        run.on_guard[fired] = JUMPING if by_bounds else BY_SPEED
+        run.on_guard[fired] = order_passed(model, fired)
     run.due[fired] = 0 if touched else 1
     if touched:
         value = guard_value(model, fired, t, run.y, work.scalar)

@@ -95,16 +95,22 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
     The error after a step of Halley's is about the cube of the step, over the square of the length on which
     the guard bends: where that is rounding, it need not be looked at.
     """
-    share, last = left / (left - right), high - low
-    s = low + (high - low) * (share if AT_END < share < 1.0 - AT_END else 0.5)
+    s, last = low + (high - low) * (left / (left - right)), high - low
+    first, final = low + AT_END * last, high - AT_END * last
+    if not low < s < high:
+        s = 0.5 * (low + high)
     for _ in range(100):
         value, slope, bend = expanded_at(series, column, known_roots, order, s)
-        if slope * left > 0.0:
+        turned = slope * left > 0.0
+        if turned:
             # Another root, at an end of the bracket up to rounding, attracts from here.
             slope = 0.0
         elif value == 0.0:
             return s
-        if (value > 0.0) == (left > 0.0):
+        if turned and not first < s < final:
+            # So close to that root, rounding may have made the sign of the value.
+            pass
+        elif (value > 0.0) == (left > 0.0):
             low = s
         else:
             high = s

@@ -178,7 +178,7 @@ def side_of(value, *, speed=0.0, acceleration=0.0, direction=1, before=0, was_on
         guard_speed=lambda *arguments: speed,
         rounding_band=lambda *arguments: band,
         has_program=lambda *arguments: jumps > 0,
-        smooth_band=lambda *arguments: 0.1,
+        exceeds_slope=lambda *arguments: abs(value) > 0.4,
         speed_sign=lambda *arguments: float(np.sign(arguments[6])),
         may_jump=lambda *arguments: jumps > 1,
         acceleration_sign=lambda *arguments: float(np.sign(acceleration)),
