@@ -125,6 +125,7 @@ def scene(curve, *, direction=0, side=0, on_guard=0, scale=1.0, fired=-1, since_
         mode=0,
         side=np.array([5, side]),
         on_guard=np.array([5, on_guard]),
+        passed=np.full(2, NO_ROOT),
         scale=np.array([scale]),
         y=np.zeros(1),
         last_fired=fired,

@@ -216,6 +216,7 @@ class TestEarliest:
             side=np.array([9, *sides]),
             on_guard=np.array([9, *(on_guard or [0] * count)]),
             rehearsal=np.full((4, 1 + count), 88),
+            passed=np.full(1 + count, 88.0),
             last_fired=given.get("fired", -1),
             since_entry=0.0,
             grazing_place=0.5,
