@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.steps import runge_kutta
+from hybrid.kernels.steps import runge_kutta, runge_kutta_guards
 from hybrid.kernels.steps.runge_kutta import CLOSEST, FINEST, GROW, SAFETY, SHRINK
 from hybrid.kernels.steps.runge_kutta_guards import NOT_THERE
 from hybrid.kernels.types.codes import NO_TRANSITION
@@ -129,7 +129,7 @@ class TestFindEvent:
         calls, left = [], list(crossings)
         answers = {
             "reach": NOT_THERE,
-            "land": (NOT_THERE, 0.0),
+            "land": (NOT_THERE, 0.0, 1),
             "drowns": False,
             "is_beyond": False,
         } | answers
@@ -156,7 +156,8 @@ class TestFindEvent:
             attempt_again=told("again"),
             note_touch=told("touch"),
             share_with_one_touch=lambda run: answers.get("share", NO_ROOT),
-            **{name: told(name, answers[name]) for name in ("reach", "land", "drowns", "is_beyond")},
+            land_on_first=told("land", answers["land"]),
+            **{name: told(name, answers[name]) for name in ("reach", "drowns", "is_beyond")},
         )
         run = SimpleNamespace(
             mode=2,
@@ -202,9 +203,9 @@ class TestFindEvent:
         assert calls[2:] == [("again", 2, 7.0, 2.0, 6)]
 
     def test_a_crossing_before_the_end_of_the_proved_part_is_landed_on(self):
-        found, calls = self.find((0.25, 1, 0.5, NO_TRANSITION), land=(0.9, self.EULER))
+        found, calls = self.find((0.25, 1, 0.5, NO_TRANSITION), land=(0.9, self.EULER, 1))
         assert found == (0.9, self.EULER, 1)
-        assert calls[2:] == [("land", 1, 2, 7.0, 2.0, 4.0, 0.25, 6)]
+        assert calls[2:] == [("land", 1, 7.0, 2.0, 4.0, 0.25, 6)]
 
     def test_a_flight_that_drowns_in_rounding_ends_at_the_crossing(self):
         found, calls = self.find((0.25, 1, 1.0, NO_TRANSITION), drowns=True)
@@ -283,7 +284,7 @@ class TestFindEvent:
         assert calls[2:] == [("reach", 1, 7.0, 1.5 * FINEST, 6), ("again", 2, 7.0, 1.5 * FINEST, 6)]
 
 
-def bent(band):
+def bent(band, module=runge_kutta):
     """A guard ``1e-3 (s - 0.5)`` on a step of 4 from the time 7, whose path is the square of the place."""
 
     def guard(transition, t, x, parameters, out):
@@ -308,7 +309,7 @@ def bent(band):
         scalar=np.zeros(1),
         gradient=np.zeros(2),
     )
-    return plain(runge_kutta, rounding_band=rounding_band), model, work
+    return plain(module, rounding_band=rounding_band), model, work
 
 
 def test_a_flight_is_all_rounding_if_its_start_middle_and_end_are():
@@ -326,7 +327,7 @@ def test_a_flight_is_all_rounding_if_its_start_middle_and_end_are():
 
 
 def test_the_end_of_a_step_is_beyond_a_guard_if_it_is_so_by_more_than_rounding():
-    tested, model, work = bent(0.125e-3)
+    tested, model, work = bent(0.125e-3, runge_kutta_guards)
     for place, side, expected in (
         (1.0, -1, True),
         (1.0, 1, False),
