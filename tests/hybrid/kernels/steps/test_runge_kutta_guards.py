@@ -42,7 +42,7 @@ def test_a_triple_root_is_crossed_once(way, solver):
 
 
 def first_landing(zeros, fired, *, side=(1, 1, 1), passed=NO_ROOT, missing=()):
-    """Length and transition of a landing on a step of 4 from the time 7; the guards are zero after ``zeros``."""
+    """Length and transition of a landing on a step of 4 from the time 7, with guards zero after ``zeros``."""
 
     def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y, tangents, work):
         assert (side, mode, t) == (1, 0, 7.0)
