@@ -25,7 +25,7 @@ from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import DOP853, Solver
-from hybrid.status import SUCCESS, Status, StatusCode
+from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
 
@@ -433,7 +433,8 @@ class _Shooting:
             return shot.status
         reason = self._objection(shot, newton, iterations, tolerance)
         if reason is None:
-            return SUCCESS
+            # With what the run along the orbit has to say of its crossings and its tangent vectors.
+            return shot.status
         return Status(
             StatusCode.NOT_CONVERGED,
             f"Newton's method did not converge: {reason}.",
