@@ -267,10 +267,16 @@ def test_a_system_that_grows_is_whole_once_nothing_leads_on():
 
     class Growth:
         def __init__(self, *names):
-            self.names, self.written = names, {}
+            self.names, self.original, self.written = names, None, {}
 
         def leads_on(self, name):
             return name in self.names
+
+        def place(self, t0, state, parameters, mode):
+            return False
+
+        def extend(self, name):
+            raise AssertionError("Nothing is asked for.")
 
     whole = HybridSystem(
         state=("q",),

@@ -183,7 +183,6 @@ def test_a_guard_that_has_crossed_zero_and_is_not_small_has_jumped(on_guard, has
         take_sides=take_sides,
         turns_back=lambda *given: False,
         allowed=lambda *given: True,
-        has_program=lambda *given: has_program,
     ).first_in_order
     model = SimpleNamespace(
         first_outgoing=[0, 1],
@@ -191,6 +190,7 @@ def test_a_guard_that_has_crossed_zero_and_is_not_small_has_jumped(on_guard, has
         direction=[-1],
         affine_guard=[0],
         guard_in_series=[in_series],
+        programs=SimpleNamespace(first=[0, int(has_program)]),
         marker=[0],
     )
     run = SimpleNamespace(
