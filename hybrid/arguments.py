@@ -55,12 +55,20 @@ def not_negative(name: str, value: object, wanted: str = "be at least 0", *, inf
 
 def count(name: str, value: object, least: int, most: int = LARGEST_COUNT, of: str = "") -> int:
     """A whole number from ``least`` to ``most``; ``of`` says what ``most`` is."""
-    whole = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else None
+    whole = whole_number(value)
     if whole is None or not least <= whole <= most:
         bounded = most < LARGEST_COUNT or (whole is not None and whole > most)
         allowed = f"from {least} to {most}{of}" if bounded else f"of at least {least}"
         raise refusal(name, f"be a whole number {allowed}", value)
     return whole
+
+
+def whole_number(value: object) -> int | None:
+    """A whole number as an int; None for anything else."""
+    # NumPy's duration is a subclass of its integers.
+    if not isinstance(value, int | np.integer) or isinstance(value, bool | np.timedelta64):
+        return None
+    return int(value)
 
 
 def flag(name: str, value: object) -> bool:
@@ -178,7 +186,7 @@ def _as_float(value: object) -> float | None:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+    if isinstance(value, bool | np.bool_ | np.timedelta64) or not isinstance(value, Real):
         return None
     try:
         return float(value)
@@ -193,6 +201,8 @@ def floats(value: object) -> np.ndarray | None:
             return None
         if value.dtype.kind in "fiu":
             return np.array(value, dtype=float)
+        if value.dtype.kind in "mM":  # an array of objects would hold their counts of a unit of time
+            return None
     elif isinstance(value, list | tuple) and all(type(each) in _PLAIN for each in value):
         try:
             return np.array(value, dtype=float)
@@ -202,7 +212,7 @@ def floats(value: object) -> np.ndarray | None:
         return None
     try:
         given = np.array(value, dtype=object)
-    except (TypeError, ValueError):
+    except Exception:  # whatever an object of the caller raises when it is converted or iterated
         return None
     found = [_as_float(each) for each in given.ravel()]
     if any(each is None for each in found):

@@ -19,12 +19,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 def as_component(name: str, names: Sequence[str], component: object) -> int:
     """Index of a component of the state, given by name or index in the argument ``name``."""
-    if isinstance(component, int | np.integer) and not isinstance(component, bool):
-        if not -len(names) <= component < len(names):
+    index = arguments.whole_number(component)
+    if index is not None:
+        if not -len(names) <= index < len(names):
             raise ArgumentError(
                 f"{name}: State component {component} does not exist; the state has {len(names)} components."
             )
-        return int(component) % len(names)
+        return index % len(names)
     return list(names).index(
         arguments.known(f"{name}: State component", component, names, "State components")
     )

@@ -195,13 +195,14 @@ class Jumps(Sequence[Jump]):
             return [self._jump(i) for i in np.flatnonzero(fired).tolist()]
         if isinstance(index, slice):
             return [self._jump(i) for i in range(*index.indices(len(self)))]
-        if not isinstance(index, int | np.integer) or isinstance(index, bool):
+        whole = arguments.whole_number(index)
+        if whole is None:
             raise arguments.refusal(
                 "jumps: the index", "be a whole number, a slice or the name of a transition", index
             )
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"jump {index} of an arc with {len(self)} jumps")
-        return self._jump(index % len(self))
+        if not -len(self) <= whole < len(self):
+            raise IndexError(f"jump {whole} of an arc with {len(self)} jumps")
+        return self._jump(whole % len(self))
 
     def __iter__(self) -> Iterator[Jump]:
         return (self._jump(i) for i in range(len(self)))

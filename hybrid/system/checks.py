@@ -217,7 +217,7 @@ def _check_numbers(title: str, values: list[Any]) -> None:
 def _is_number(value: Any) -> bool:
     if isinstance(value, np.ndarray):
         return _is_scalar(value) and value.dtype.kind in "fiub"
-    return isinstance(value, numbers.Real | np.bool_)
+    return isinstance(value, numbers.Real | np.bool_) and not isinstance(value, np.timedelta64)
 
 
 def _names(variables: Variables) -> str:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 import attrs
-import numpy as np
 
+from hybrid import arguments
 from hybrid.errors import ModelError, shown
 from hybrid.system.portable import Portable
 
@@ -84,8 +84,7 @@ class Guard(Portable):
 
     @direction.validator
     def _check_direction(self, attribute: attrs.Attribute[int], value: object) -> None:
-        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not whole or value not in (-1, 0, 1):
+        if arguments.whole_number(value) not in (-1, 0, 1):
             raise ModelError(
                 f"Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got {shown(value)}."
             )

@@ -182,12 +182,13 @@ def as_state(value: Any) -> tuple[str, ...] | int:
             f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
             f"Write state=({value!r},) for one component."
         )
-    if isinstance(value, int | np.integer):
-        if value < 1:
+    components = arguments.whole_number(value)
+    if components is not None:
+        if components < 1:
             raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
-        if value > MOST_COMPONENTS:
+        if components > MOST_COMPONENTS:
             raise ModelError(f"HybridSystem: state has at most {MOST_COMPONENTS} components; got {value}.")
-        return int(value)
+        return components
     # A set has no order.
     if not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1):
         raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)

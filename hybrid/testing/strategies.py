@@ -53,7 +53,7 @@ def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tupl
     """The strategy of states from the ranges in the argument ``name``."""
     names = as_system("system", system).state_names
     if isinstance(ranges, SearchStrategy):
-        return ranges.map(lambda x: tuple(float(value) for value in x))
+        return ranges.map(lambda x: _drawn_state(name, len(names), x))
     chosen = arguments.mapping(name, ranges, RANGES)
     for each in chosen:
         arguments.known(f"{name}: State component", each, names, "State components")
@@ -87,7 +87,7 @@ def _parameters(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[
     """The strategy of parameter values from the ranges in the argument ``name``."""
     declared = dict(as_system("system", system).parameters)
     if isinstance(ranges, SearchStrategy):
-        return ranges.map(lambda values: {**declared, **values})
+        return ranges.map(lambda values: _drawn_parameters(name, declared, values))
     chosen = arguments.mapping(name, ranges, RANGES)
     for each in chosen:
         arguments.known(f"{name}: Parameter", each, declared, "Parameters")
@@ -194,7 +194,7 @@ def _allowed(case: Case) -> list[str]:
 
 def _values(name: str, given: Any) -> SearchStrategy[float]:
     if isinstance(given, SearchStrategy):
-        return given.map(float)
+        return given.map(lambda value: arguments.number(f"{name}: a value drawn", value))
     if np.ndim(given) == 0:
         return st.just(arguments.number(name, given))
     wanted = "be (low, high), a number or a strategy"
@@ -203,6 +203,25 @@ def _values(name: str, given: Any) -> SearchStrategy[float]:
         raise arguments.refusal(name, wanted, given)
     low, high = ends.tolist()
     return _grid(0.5 * (low + high), 0.5 * (high - low))
+
+
+def _drawn_state(name: str, n: int, value: Any) -> tuple[float, ...]:
+    """A state that a user's strategy has drawn."""
+    wanted = f"draw states of {n} finite numbers"
+    x = arguments.numbers(name, value, wanted)
+    if x.shape != (n,) or not np.isfinite(x).all():
+        raise arguments.refusal(name, wanted, value)
+    return tuple(x.tolist())
+
+
+def _drawn_parameters(name: str, declared: Mapping[str, float], value: Any) -> dict[str, float]:
+    """All parameters, from those that a user's strategy has drawn."""
+    if not isinstance(value, Mapping):
+        raise arguments.refusal(name, "draw mappings of names to numbers", value)
+    drawn = dict(value)
+    for each in drawn:
+        arguments.known(f"{name}: Parameter", each, declared, "Parameters")
+    return {**declared, **{each: arguments.number(f"{name}[{each!r}]", drawn[each]) for each in drawn}}
 
 
 def _grid(centre: float, half: float) -> SearchStrategy[float]:

@@ -20,8 +20,33 @@ class Odd:
         return "<odd>"
 
 
+class Hostile:
+    """An object that raises an error of its own wherever it is converted or iterated."""
+
+    def _raise(self, *arguments, **options):
+        raise RuntimeError("converted")
+
+    __array__ = __float__ = __iter__ = __len__ = __index__ = _raise
+
+    def __repr__(self):
+        return "<hostile>"
+
+
 TEXTS = ["a", "1", b"1"]
-NO_NUMBERS = [*TEXTS, True, np.bool_(True), 1j, np.array([1.0, 2.0]), np.array([None, "a"]), [1.0], Odd(), {}]
+# NumPy counts durations among its integers.
+DURATIONS = [np.timedelta64(2), np.timedelta64(2, "s")]
+NO_NUMBERS = [
+    *DURATIONS,
+    *TEXTS,
+    True,
+    np.bool_(True),
+    1j,
+    np.array([1.0, 2.0]),
+    np.array([None, "a"]),
+    [1.0],
+    Odd(),
+    {},
+]
 INFINITE = [math.nan, math.inf, -math.inf, 10**400]
 NUMBER = [None, *NO_NUMBERS, *INFINITE]
 OPTIONAL_NUMBER = NUMBER[1:]
@@ -30,7 +55,7 @@ OPTIONAL_POSITIVE = POSITIVE[1:]
 # Infinity is allowed.
 LIMIT = [None, *NO_NUMBERS, math.nan, -math.inf, -1.0, 0.0]
 NOT_NEGATIVE = [*NUMBER, -1.0]
-COUNT = [*NUMBER, 2.7, 3.0, 1e300, -1, 10**30, Fraction(5, 2)]
+COUNT = [*NUMBER, Hostile(), 2.7, 3.0, 1e300, -1, 10**30, Fraction(5, 2)]
 FLAG = [None, "yes", 1, 0, 1.0, math.nan, [True], np.array([True]), Odd()]
 NUMBERS = [
     None,
@@ -45,6 +70,7 @@ NUMBERS = [
     Odd(),
     [None, 1.0],
 ]
+NUMBERS += [Hostile(), [np.timedelta64(2), 0.0], np.array([1, 2], "m8"), np.array([1, 2], "m8[ns]")]
 NUMBERS += [bytearray(b"ab"), np.ma.array([1.0, 2.0], mask=[False, True]), np.ma.masked]
 NUMBERS += [np.array(["a", "b"]), np.array([None, Odd()]), np.array([True, False]), np.array([1j, 2j])]
 STATE = [
@@ -68,6 +94,8 @@ SPAN = [
     ("0", "1"),
     (0.0, math.nan),
     (0.0, math.inf),
+    (0.0, np.timedelta64(1)),
+    Hostile(),
 ]
 SPAN += [b"ab", bytearray(b"ab"), {0.0, 1.0}, np.ma.array([0.0, 1.0], mask=[False, True])]
 SPAN += [(False, True), (0.0, 1j), np.array([None, 1.0]), (0.0, None), Odd()]
@@ -113,7 +141,7 @@ OF_BALL = [
 SOLVER = ["DOP853", hybrid.DOP853, 3, 0, False, "", [hybrid.DOP853()], Odd()]
 FUNCTION = ["a", 3, True, [1], np.array([1.0])]
 GUARD = [None, "a", 3, lambda t, x, p: x.q, Guard, Odd()]
-LIST = [None, "a", 3, True, math.nan, Odd()]
+LIST = [Hostile(), None, "a", 3, True, math.nan, Odd()]
 AXES = ["a", 3, math.nan, True, Odd()]
 RANGES = [
     [1],
@@ -123,7 +151,7 @@ RANGES = [
     *({"q": bad} for bad in ("a", None, math.nan, True, (2.0, 1.0), (0.0,), 1j)),
 ]
 EXECUTOR = [0, -1, 1.5, True, "a", math.nan, Odd(), {}]
-COMPONENT = ["nope", 2, -3, 1.5, True, math.nan, [0], Odd()]
+COMPONENT = [np.timedelta64(0), "nope", 2, -3, 1.5, True, math.nan, [0], Odd()]
 LABELS = ["a", 3, ("a",), math.nan]
 
 RUN = {"system": SYSTEM, "x0": STATE, "mode": NAME, "parameters": PARAMETERS, "solver": SOLVER}
