@@ -137,14 +137,17 @@ def mapping(name: str, value: object, wanted: str = "map names to numbers") -> d
     return dict(value)
 
 
-def items(name: str, value: object, wanted: str) -> list[Any]:
-    """The items of a collection; a string is not a collection here."""
+def items(name: str, value: object, wanted: str, *, least: int = 0) -> list[Any]:
+    """The items of a collection, ``least`` or more; a string is not a collection here."""
     if not isinstance(value, Iterable) or isinstance(value, str | bytes | bytearray):
         raise refusal(name, wanted, value)
     try:
-        return list(value)
+        found = list(value)
     except Exception as error:  # a zero-dimensional array, or what only promises to be a collection
         raise refusal(name, wanted, value) from error
+    if len(found) < least:
+        raise refusal(name, wanted, value)
+    return found
 
 
 def instance(name: str, value: object, kind: type[Kind], hint: str = "") -> Kind:

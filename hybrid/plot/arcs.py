@@ -120,9 +120,7 @@ def _as_arc(arc: object) -> HybridArc:
 
 def _components(names: Sequence[str], components: object) -> list[int]:
     wanted = "be names or indices of components of the state, at least one"
-    given = arguments.items("components", components, wanted)
-    if not given:
-        raise arguments.refusal("components", wanted, components)
+    given = arguments.items("components", components, wanted, least=1)
     return [as_component("components", names, each) for each in given]
 
 

@@ -43,9 +43,7 @@ def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, 
     import matplotlib.pyplot as plt
 
     wanted = "be a list of Panel objects, at least one"
-    panels = arguments.items("panels", panels, wanted)
-    if not panels:
-        raise arguments.refusal("panels", wanted, panels)
+    panels = arguments.items("panels", panels, wanted, least=1)
     for i, panel in enumerate(panels):
         system = arguments.instance(f"panels[{i}]", panel, Panel).arc.system
         x, y = (
