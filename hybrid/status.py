@@ -34,6 +34,7 @@ class StatusCode(IntEnum):
     INDISTINCT_TANGENTS = 105
     FAILED = 106
     INFINITE_SLOPE = 107
+    ROUNDED_TIME = 108
 
 
 @attrs.frozen
@@ -157,6 +158,25 @@ def discontinuous_status(jumps: Mapping[str, str]) -> Status:
         "not valid beyond such a jump.",
         "hybrid.split(system) makes modes joined by guards of a field that is written with NumPy functions, "
         "with the sliding modes between them.",
+    )
+
+
+def late_status(tolerances: float, *, declared: bool) -> Status:
+    """Status of a run in which the rounding of the time was worth so many tolerances in one step or jump.
+
+    ``declared`` says that the system has a forcing period.
+    """
+    remedy = (
+        "Shift the origin of time, or loosen rtol and atol to what the result needs."
+        if declared
+        else "If the forcing is periodic, declare the period with HybridSystem(period=...): its phase keeps all "
+        "digits. Otherwise shift the origin of time, or loosen rtol and atol to what the result needs."
+    )
+    return Status(
+        StatusCode.ROUNDED_TIME,
+        "Reached the end, but the time is so large that its rounding changes the field, a guard or a reset: "
+        f"up to {tolerances:.2g} times the tolerance in one step or jump.",
+        remedy,
     )
 
 

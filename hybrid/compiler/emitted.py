@@ -142,8 +142,8 @@ class Emitted:
         By mode: where the field jumps in the state, in words; empty where it is proved to be continuous.
     proved_period
         Whether every function is proved to have the declared period, whatever the parameters.
-    timed_guard
-        By transition: whether the guard may depend on time.
+    timed_guard, timed_reset
+        By transition: whether the guard, or the reset, may depend on time.
     steep
         By mode: the powers of guards in its field, in words, whose slope may be infinite at the guard.
     steep_inside
@@ -177,6 +177,7 @@ class Emitted:
     discontinuities: tuple[str, ...]
     proved_period: bool
     timed_guard: tuple[bool, ...]
+    timed_reset: tuple[bool, ...]
     steep: tuple[str, ...]
     steep_inside: tuple[str, ...]
     crossing: tuple[tuple[int, int], ...]

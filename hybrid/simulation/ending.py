@@ -14,11 +14,16 @@ from hybrid.status import (
     StatusCode,
     chatter_status,
     discontinuous_status,
+    late_status,
     run_status,
     steep_status,
     stuck_status,
 )
 from hybrid.system.growth import Unexplored
+
+# The rounding of the time may be worth so many tolerances in one step: it is measured between neighbouring
+# numbers, which are a few times as far apart as the time is from the nearest.
+MOST_LATENESS = 10.0
 
 
 def status_of(trajectory: Trajectory, code: int) -> Status:
@@ -121,6 +126,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
+    if code == codes.DONE and run.lateness > MOST_LATENESS:
+        return late_status(run.lateness, declared=trajectory.model.period > 0.0)
     if code == codes.DONE and ambiguous:
         jumps = trajectory.jumps
         also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""

@@ -70,7 +70,8 @@ class Model(Structure):
     ``steep`` is 1 for a mode whose field has powers of its guards that may have an infinite slope at the
     guard; ``root`` is the order of the root that the series of a mode hold for its guards. ``field_before``
     and ``field_behind`` are the numbers of the fields at the crossing of a guard, on its two sides.
-    ``timed`` is 1 for a mode whose field or one of whose guards may depend on time.
+    ``timed`` is 1 for a mode whose field or one of whose guards may depend on time, ``timed_jump`` for a
+    transition whose guard or reset may.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
     """
@@ -118,6 +119,7 @@ class Model(Structure):
     field_before: INDICES
     field_behind: INDICES
     timed: INDICES
+    timed_jump: INDICES
     tangent_start: INTEGER
     tangent_columns: INDICES
     period: REAL
@@ -218,6 +220,7 @@ NUMBERS = (
     "phase_low",
     "calm_until",
     "horizon",
+    "lateness",
 )
 
 
@@ -236,6 +239,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
       before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
+    - ``lateness``: the largest change that the rounding of the time made in a step or jump, in tolerances.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent

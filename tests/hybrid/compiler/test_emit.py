@@ -434,14 +434,22 @@ def test_guards_that_are_not_affine_have_programs():
         "plane": lambda t, x, p: 3 * x.v,
         "wave": lambda t, x, p: np.sin(x.q) - 0.3 * t,
     }
+    resets = {
+        "line": Reset(lambda t, x, p: (x.q, -x.v)),
+        "wave": Reset(lambda t, x, p: (x.q, np.cos(t))),
+    }
     system = HybridSystem(
         state=("q", "v"),
         modes=[Mode("run", lambda t, x, p: (x.v, -x.q))],
-        transitions=[Transition("run", "run", Guard(each, +1), name=name) for name, each in values.items()],
+        transitions=[
+            Transition("run", "run", Guard(each, +1), resets.get(name), name=name)
+            for name, each in values.items()
+        ],
     )
     emitted = emit(system)
     assert emitted.affine_guard == (True, False, True, False)
     assert emitted.timed_guard == (False, False, False, True)
+    assert emitted.timed_reset == (False, False, False, True)
     rows = np.diff(emitted.programs.first)[:4]
     assert (rows > 0).tolist() == [False, True, False, True]
 

@@ -180,6 +180,8 @@ def task_of(**values):
         period=4.0,
         target=np.array([1, codes.NO_MODE]),
         accumulates_to=np.array([codes.NO_MODE, 1]),
+        timed=np.array([0, 1]),
+        timed_jump=np.array([1, 0]),
     )
     return SimpleNamespace(
         model=model,
@@ -193,7 +195,7 @@ def task_of(**values):
 
 
 class TestFire:
-    def fired(self, *, ended=False, max_jumps=10, complete=1, accumulates=True, **values):
+    def fired(self, *, ended=False, max_jumps=10, complete=1, accumulates=True, late=False, **values):
         calls = []
 
         def finish_chatter(task, fired, left):
@@ -206,7 +208,12 @@ class TestFire:
             complete=complete,
         )
         task = task_of(**values)
-        tested = plain(drive, may_accumulate=lambda model, run, fired: accumulates).fire
+        tested = plain(
+            drive,
+            may_accumulate=lambda model, run, fired: accumulates,
+            is_late=lambda method, run, span: late and span == 0.5,
+            late_jump=lambda model, method, run, fired, work: calls.append(("late", fired)),
+        ).fire
         code = tested(parts, task, 3, 1.0, max_jumps)
         return code, calls, task.run.pending
 
@@ -223,6 +230,12 @@ class TestFire:
         assert self.fired(pending=0, accumulates=False, complete=0)[0] == GO_ON
         assert self.fired(pending=0, complete=0) == (codes.INCOMPLETE, [("jump", 0)], NO_TRANSITION)
         assert self.fired(pending=1, complete=0)[0] == codes.TERMINAL
+
+    def test_a_late_jump_that_depends_on_time_is_looked_at_before_it_is_made(self):
+        """The jump of an instant that another has begun has no time of its own."""
+        assert self.fired(pending=0, late=True)[1][:2] == [("late", 0), ("jump", 0)]
+        assert self.fired(pending=0, late=True, since_entry=0.0)[1][0] == ("jump", 0)
+        assert self.fired(pending=1, late=True)[1] == [("jump", 1)]
 
     def test_limits_of_jumps(self):
         assert self.fired(pending=0, jumps=9)[0] == GO_ON
@@ -293,7 +306,7 @@ class TestAdvance:
     ):
         calls, pending, full = [], list(pending), values.pop("full", False)
         most, orthonormal = values.pop("max_steps", 99), values.pop("orthonormal", 0)
-        seen = values.pop("seen", [])
+        seen, late = values.pop("seen", []), values.pop("late", 0.0)
 
         def stepped(parts, task, left):
             calls.append(left)
@@ -326,6 +339,8 @@ class TestAdvance:
             fire=fire,
             enter=enter,
             is_full=lambda record: full,
+            is_late=lambda method, run, span: span < late,
+            late_step=lambda model, method, run, span, work: calls.append(("late", run.phase)),
         ).advance
         task = task_of(**values)
         task.orthonormal = orthonormal
@@ -372,6 +387,12 @@ class TestAdvance:
         assert self.advanced(max_steps=2) == (codes.MAX_STEPS, [5.0, 3.5], (2, 3.0))
         found = self.advanced(step=lambda left: (codes.STEP_TOO_SMALL, 0.0))
         assert found == (codes.STEP_TOO_SMALL, [5.0], (2, 0.0))
+
+    def test_a_late_step_is_looked_at_at_its_end(self):
+        """In a mode that depends on time."""
+        assert self.advanced(late=1.5)[1] == [5.0, 3.5, 2.0, 0.5, ("late", 1.0)]
+        assert self.advanced(late=1.6)[1][:4] == [5.0, ("late", 1.5), 3.5, ("late", 3.0)]
+        assert self.advanced(late=9.0, mode=0)[1] == [5.0, 3.5, 2.0, 0.5]
 
     def test_vectors_are_kept_apart_inside_of_the_run(self):
         """Not after the last step: there the caller does it."""

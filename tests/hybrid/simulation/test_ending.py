@@ -141,7 +141,7 @@ def test_two_modes_send_the_state_back_across_one_guard(directions, orientation,
     assert ending._faces(run, list(range(len(transitions)))) == faces
 
 
-def finished(tangents=2, **changes):
+def finished(tangents=2, period=0.0, **changes):
     """A run that has reached its end, with something to tell."""
     counted = dict.fromkeys(
         (
@@ -162,7 +162,8 @@ def finished(tangents=2, **changes):
     return SimpleNamespace(
         tangents=tangents,
         jumps=9,
-        run=SimpleNamespace(**(counted | changes)),
+        run=SimpleNamespace(**(counted | {"lateness": 0.0} | changes)),
+        model=SimpleNamespace(period=period),
         compiled=SimpleNamespace(emitted=emitted),
         system=SimpleNamespace(mode_names=("a", "b")),
     )
@@ -184,6 +185,15 @@ def test_what_matters_to_tangent_vectors_alone(changes, code, told):
     assert found.code == code
     assert told in found.message
     assert ending._status(finished(0, **changes), codes.DONE).code == StatusCode.SUCCESS
+
+
+def test_a_time_whose_rounding_is_worth_many_tolerances_is_said():
+    found = ending._status(finished(0, lateness=31.0), codes.DONE)
+    assert found.code == StatusCode.ROUNDED_TIME
+    assert "up to 31 times the tolerance" in found.message
+    assert "declare the period" in found.remedy
+    assert "declare" not in ending._status(finished(0, 2.0, lateness=31.0), codes.DONE).remedy
+    assert ending._status(finished(0, lateness=10.0), codes.DONE).code == StatusCode.SUCCESS
 
 
 def test_an_order_that_mattered_is_said_with_what_grazed():
