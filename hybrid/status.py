@@ -169,8 +169,8 @@ def late_status(tolerances: float, *, declared: bool) -> Status:
     remedy = (
         "Shift the origin of time, or loosen rtol and atol to what the result needs."
         if declared
-        else "If the forcing is periodic, declare the period with HybridSystem(period=...): its phase keeps all "
-        "digits. Otherwise shift the origin of time, or loosen rtol and atol to what the result needs."
+        else "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase keeps "
+        "all digits. Otherwise shift the origin of time, or loosen rtol and atol to what the result needs."
     )
     return Status(
         StatusCode.ROUNDED_TIME,
