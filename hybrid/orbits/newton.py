@@ -32,7 +32,8 @@ class Point:
 class Shot:
     """What one integration over the period gives.
 
-    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value.
+    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``hidden
+    (n,)`` is the part of the gap that is lost in the rounding of components that hardly move.
     """
 
     point: Point
@@ -45,11 +46,12 @@ class Shot:
     extent: np.ndarray
     magnitude: np.ndarray
     status: Status
+    hidden: np.ndarray | float = 0.0
 
     @property
     def gap(self) -> np.ndarray:
         """Distance ``(n,)`` from the start to the end."""
-        return self.end - self.point.x
+        return np.asarray(self.end - self.point.x + self.hidden)
 
     @property
     def whole(self) -> bool:
@@ -124,6 +126,18 @@ class Newton:
         far = left[:, np.abs(parts) > farthest * sizes]
         along = far.T @ self._right(other)
         return (far * along)[:n] * self.scale[:, None]
+
+    def led_astray(self, shot: Shot, farthest: float) -> bool:
+        """Whether the method went far along a direction in which the matrix is zero to rounding.
+
+        That is more than so many times the size of the first shot. Where orbits come in families, the steps
+        leave such directions out.
+        """
+        n = len(shot.end)
+        _, sizes, right = np.linalg.svd(self._matrix(shot))
+        family = right[sizes <= (n + 1) * EPSILON * sizes[0], :n]
+        gone = family.T @ (family @ ((shot.point.x - self.anchor) / self.scale)) * self.scale
+        return bool(np.any(np.abs(gone) > farthest * self.first))
 
     def _matrix(self, shot: Shot) -> np.ndarray:
         """Derivatives of the gap, and of the place in the plane, in the state and in the period."""

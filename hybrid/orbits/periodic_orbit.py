@@ -14,6 +14,7 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
+from hybrid.orbits.hidden import FINEST_GAP, SAMPLES, hidden_gap
 from hybrid.orbits.labelled import labelled_orbit
 from hybrid.orbits.newton import EPSILON, ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.periodic_schur import ProductEigenvalues
@@ -38,10 +39,6 @@ SHORTEST_STEP = 1 / 64
 SHORTEST_PERIOD = 1e-3
 # Most jumps of the guess that are examined to find a point away from jumps.
 MOST_JUMPS_LOOKED_AT = 10_000
-# Points, besides the solver's own, that show how far an orbit moves.
-SAMPLES = 65
-# The smallest gap that Newton's method can reach, in units in the last place of the largest states.
-FINEST_GAP = 4
 # An autonomous orbit moves by more than this many times the accepted rounding.
 LEAST_MOTION = 1e3
 # Share of its states by which a point that hardly moves may still be wrong.
@@ -239,6 +236,12 @@ class _Shooting:
         code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
+        extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
+        at_rest = extent <= ROUNDING_OF_GAP * EPSILON * magnitude
+        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) == 0:
+            hidden = np.where(at_rest, hidden_gap(trajectory, arc, magnitude), 0.0)
+        else:
+            hidden = np.zeros(len(extent))
         return Shot(
             point,
             mode,
@@ -247,9 +250,10 @@ class _Shooting:
             trajectory.tangent_matrix,
             field,
             trajectory.field(),
-            np.ptp(states, axis=0),
-            np.abs(states).max(axis=0),
+            extent,
+            magnitude,
             status_of(trajectory, code),
+            hidden,
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -473,6 +477,8 @@ class _Shooting:
             return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
         step, _ = newton.step(shot)
         enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
+        if newton.led_astray(shot, FARTHEST):
+            return "it went far along a direction in which the ends do not tell where an orbit is"
         if np.all(np.abs(step) <= np.maximum(enough, nothing)):
             return None
         near = np.all((shot.extent <= FARTHEST * newton.first) & (np.abs(shot.gap) <= DRIFT * shot.extent))

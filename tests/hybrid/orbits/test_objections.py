@@ -97,6 +97,23 @@ class TestFamilies:
             assert (shooting._objection(found, newton, 3, TOLERANCE) is None) == near
 
 
+@pytest.mark.parametrize(("share", "far"), [(0.9, False), (-0.9, False), (1.1, True), (-1.1, True)])
+def test_far_along_a_direction_in_which_the_ends_agree_everywhere(share, far):
+    """The map keeps one direction; far along the other is no matter."""
+    for fundamental, kept, other in (
+        (np.diag([1.0, 0.5]), [1.0, 0.0], [0.0, 5.0]),
+        ([[1.0, 0.0], [0.5, 0.5]], [1.0, 1.0], [5.0, -5.0]),
+    ):
+        found = closed(fundamental)
+        newton = Newton.begin(found, SOLVER.atol, False)
+        for direction, said in ((kept, far), (other, False)):
+            gone = share * module.FARTHEST * 1000.0 * np.array(direction)
+            moved = attrs.evolve(newton, anchor=found.point.x - gone)
+            assert moved.led_astray(found, module.FARTHEST) == said
+            text = module._Shooting(None, None, None, SOLVER)._objection(found, moved, 3, TOLERANCE)
+            assert (text is not None and text.startswith("it went far along a direction")) == said
+
+
 @pytest.mark.parametrize("off", [-0.09, -0.03, 0.0, 0.05, 0.09])
 def test_the_guessed_period_is_moved_to_where_the_solution_returns(off):
     """Of a rotation with the period 2 pi, to half the distance between the times that are compared."""

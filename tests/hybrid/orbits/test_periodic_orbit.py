@@ -267,6 +267,42 @@ class TestNoOrbit:
         orbit = periodic_orbit(system, (1.0,), **({} if forced else period))
         assert orbit.status.code == StatusCode.NOT_CONVERGED
 
+    @pytest.mark.parametrize("pace", [1.0, 0.1, 1e-3, 1e-6])
+    @pytest.mark.parametrize(
+        "rate",
+        [
+            lambda q: np.exp(-q),
+            lambda q: 1 / (1 + q**4),
+            lambda q: 1 / np.cosh(q),
+            lambda q: 1 / (1 + np.exp(q)),
+            lambda q: (1 + q**2) ** -1.5,
+        ],
+    )
+    @pytest.mark.parametrize("push", [0.0, 1.0])
+    def test_a_drift_that_rounding_hides_is_no_orbit(self, rate, pace, push):
+        """Far out no step changes the state any more: alone, or beside a component that swings."""
+        system = HybridSystem(
+            state=("q", "v"),
+            parameters={"pace": 1.0, "push": 1.0},
+            modes=[Mode("on", lambda t, x, p: (p.pace * rate(x.q), p.push * np.cos(t) - x.v))],
+            period=2 * np.pi,
+        )
+        orbit = periodic_orbit(system, (0.0, 0.5), parameters={"pace": pace, "push": push})
+        assert orbit.status.code == StatusCode.NOT_CONVERGED
+
+    @pytest.mark.parametrize("pace", [1e-16, 1e-12, 1e-3, 1.0, 30.0])
+    @pytest.mark.parametrize("place", [0.0, 5.0, -1e6])
+    def test_a_rest_that_attracts_at_any_pace_is_one(self, place, pace):
+        system = HybridSystem(
+            state=("q", "v"),
+            parameters={"pace": 1.0, "place": 0.0},
+            modes=[Mode("on", lambda t, x, p: (p.pace * (p.place - x.q), np.cos(t) - x.v))],
+            period=2 * np.pi,
+        )
+        orbit = periodic_orbit(system, (place, 0.5), parameters={"pace": pace, "place": place})
+        assert orbit.status.ok
+        np.testing.assert_allclose(orbit.x0, (place, 0.5), rtol=1e-10)
+
     @pytest.mark.parametrize(
         "force",
         [
