@@ -64,7 +64,7 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
         return STUCK
     fired = run.pending
     run.pending = NO_TRANSITION
-    if model.timed_jump[fired] == 1 and run.since_entry > 0.0 and is_late(task.method, run, run.since_entry):
+    if model.timed_jump[fired] == 1 and run.since_entry > 0.0 and is_late(task.method, run):
         late_jump(model, task.method, run, fired, task.work)
     parts.jump(task, fired)
     if model.target[fired] == NO_MODE:
@@ -217,7 +217,8 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             return int(code)
         forward(run, model.period, span)
         run.since_entry += span
-        if model.timed[mode] == 1 and is_late(task.method, run, span):
+        run.longest_step = max(run.longest_step, span)
+        if model.timed[mode] == 1 and is_late(task.method, run):
             late_step(model, task.method, run, span, task.work)
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
             parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)

@@ -14,9 +14,12 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 
 
 @njit(**INLINE)
-def is_late(method, run, span):
-    """Whether the rounding of the time may matter to what changes by its own size over a ``span``."""
-    return method.rtol * span < EPSILON * abs(run.phase)
+def is_late(method, run):
+    """Whether the rounding of the time may matter to what changes by its own size over a step.
+
+    Short steps, and flights that chatter, are no measure: there the state is as hard to know at any time.
+    """
+    return method.rtol * run.longest_step < EPSILON * abs(run.phase)
 
 
 @njit(**INLINE)

@@ -221,6 +221,7 @@ NUMBERS = (
     "calm_until",
     "horizon",
     "lateness",
+    "longest_step",
 )
 
 
@@ -239,7 +240,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
       before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
-    - ``lateness``: the largest change that the rounding of the time made in a step or jump, in tolerances.
+    - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
+      the time made in a step or jump, in tolerances.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent

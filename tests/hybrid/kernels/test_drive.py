@@ -168,6 +168,7 @@ def task_of(**values):
         "phase_low": 0.0,
         "horizon": 0.0,
         "since_entry": 0.5,
+        "longest_step": 0.25,
         "next_step": 1.0,
         "last_step": 1.0,
     }
@@ -211,7 +212,7 @@ class TestFire:
         tested = plain(
             drive,
             may_accumulate=lambda model, run, fired: accumulates,
-            is_late=lambda method, run, span: late and span == 0.5,
+            is_late=lambda method, run: late,
             late_jump=lambda model, method, run, fired, work: calls.append(("late", fired)),
         ).fire
         code = tested(parts, task, 3, 1.0, max_jumps)
@@ -339,7 +340,7 @@ class TestAdvance:
             fire=fire,
             enter=enter,
             is_full=lambda record: full,
-            is_late=lambda method, run, span: span < late,
+            is_late=lambda method, run: run.longest_step < late,
             late_step=lambda model, method, run, span, work: calls.append(("late", run.phase)),
         ).advance
         task = task_of(**values)
@@ -390,9 +391,12 @@ class TestAdvance:
 
     def test_a_late_step_is_looked_at_at_its_end(self):
         """In a mode that depends on time."""
-        assert self.advanced(late=1.5)[1] == [5.0, 3.5, 2.0, 0.5, ("late", 1.0)]
-        assert self.advanced(late=1.6)[1][:4] == [5.0, ("late", 1.5), 3.5, ("late", 3.0)]
+        assert self.advanced(late=1.5)[1] == [5.0, 3.5, 2.0, 0.5]
+        found = [5.0, ("late", 1.5), 3.5, ("late", 3.0), 2.0, ("late", 0.5), 0.5, ("late", 1.0)]
+        assert self.advanced(late=1.6)[1] == found
         assert self.advanced(late=9.0, mode=0)[1] == [5.0, 3.5, 2.0, 0.5]
+        # The longest step so far is the measure, not the last.
+        assert self.advanced(late=1.6, longest_step=1.7)[1] == [5.0, 3.5, 2.0, 0.5]
 
     def test_vectors_are_kept_apart_inside_of_the_run(self):
         """Not after the last step: there the caller does it."""

@@ -28,9 +28,9 @@ kernels = plain(late)
 METHOD = SimpleNamespace(rtol=1e-10, atol=1e-12)
 
 
-def test_it_is_late_where_the_rounding_of_time_exceeds_the_tolerance_of_a_span():
+def test_it_is_late_where_the_rounding_of_time_exceeds_the_tolerance_of_a_step():
     for phase, span, found in ((4e5, 1.0, False), (5e5, 1.0, True), (-5e5, 1.0, True), (5e5, 1.2, False)):
-        assert kernels.is_late(METHOD, SimpleNamespace(phase=phase), span) == found
+        assert kernels.is_late(METHOD, SimpleNamespace(phase=phase, longest_step=span)) == found
 
 
 def test_the_largest_change_is_kept_in_tolerances():
