@@ -16,6 +16,7 @@ from hybrid.kernels.events.guards import (
     guard_acceleration,
     guard_speed,
 )
+from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.jumps.chatter import (
     chatter_matrix,
     remember_impulse,
@@ -79,12 +80,16 @@ def saltation(model, transition, t, x_minus, x_plus, work):
 
     ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
     (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
-    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities. The sizes of the terms
-    of each entry go to ``work.sizes``.
+    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities; but a guard may have a
+    surface that its gradient does not show: then this is its matrix. The sizes of the terms of each entry go
+    to ``work.sizes``.
     """
     n = model.dimension
     before, behind = model.field_before[transition], model.field_behind[transition]
     transversality = cross(model, transition, before, behind, t, x_minus, x_plus, work)
+    speed = transversality
+    if finds_surface(model, transition, t, x_minus, transversality, work):
+        speed = 1.0
     for i in range(n):
         terms = abs(work.field_after[i]) + abs(work.reset_jacobian[i, n])
         for j in range(n):
@@ -94,8 +99,8 @@ def saltation(model, transition, t, x_minus, x_plus, work):
             work.sizes[i, j] = abs(work.reset_jacobian[i, j])
             term = work.settled[i] * work.gradient[j]
             if term != 0.0:
-                work.saltation[i, j] += term / transversality
-                work.sizes[i, j] += abs(terms * work.gradient[j] / transversality)
+                work.saltation[i, j] += term / speed
+                work.sizes[i, j] += abs(terms * work.gradient[j] / speed)
     return transversality
 
 
@@ -157,7 +162,7 @@ def is_grazing(model, method, run, transition, transversality, work):
     acceleration = guard_acceleration(model, run, transition, run.mode, run.phase, run.y, work)
     band = error_band(method, run, work.gradient, model.dimension)
     if transversality * transversality <= 2.0 * abs(acceleration) * band:
-        return True
+        return not finds_surface(model, transition, run.phase, run.y, transversality, work)
     # Inside such a dip the steps are as short as the dip, and so are the sizes that the tolerances refer to.
     way_in = run.last_transversality
     grazed = run.last_kind == GRAZING and run.last_fired == transition
@@ -223,7 +228,7 @@ def cross_with_map(model, run, transition, tangents, work):
     """Cross a guard that sets the time of the jump, and begin an instant; returns the transversality."""
     n = model.dimension
     transversality = saltation(model, transition, run.phase, run.y, work.new, work)
-    change_of_instant(run, n, transversality, work)
+    change_of_instant(run, n, work)
     begin_instant(run, n, tangents, work)
     return transversality
 
@@ -237,8 +242,8 @@ def recall_map(model, run, tangents, work):
     if run.map_is_known == 1:
         return
     fired, x_minus = run.last_fired, run.instant[:n]
-    transversality = saltation(model, fired, run.phase, x_minus, work.new, work)
-    change_of_instant(run, n, transversality, work)
+    saltation(model, fired, run.phase, x_minus, work.new, work)
+    change_of_instant(run, n, work)
     keep_map(run, n, work)
 
 

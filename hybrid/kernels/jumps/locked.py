@@ -39,10 +39,16 @@ def restore_tangents(run, n, tangents):
 
 
 @njit(**KERNEL)
-def change_of_instant(run, n, transversality, work):
-    """Store the derivative of the time at which the guard with gradient ``work.gradient`` is crossed."""
+def change_of_instant(run, n, work):
+    """Store the derivative of the time at which the guard with gradient ``work.gradient`` is crossed.
+
+    ``work.field`` is the field before the crossing.
+    """
+    speed = work.gradient[n]
     for j in range(n):
-        run.instant[j] = -work.gradient[j] / transversality if work.gradient[j] != 0.0 else 0.0
+        speed += work.gradient[j] * work.field[j]
+    for j in range(n):
+        run.instant[j] = -work.gradient[j] / speed if work.gradient[j] != 0.0 else 0.0
 
 
 @njit(**KERNEL)

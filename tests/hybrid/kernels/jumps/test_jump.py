@@ -421,9 +421,17 @@ def test_dips_that_the_tolerances_cannot_tell(speed, acceleration, last, grazes)
         last_kind=last.get("kind", GRAZING if last else TRANSVERSE),
         last_fired=last.get("fired", 1),
     )
-    tested = plain(jump, guard_acceleration=lambda *given: acceleration, error_band=lambda *given: 0.5)
     model, work = SimpleNamespace(dimension=1), SimpleNamespace(gradient=None)
-    assert tested.is_grazing(model, None, run, 1, speed, work) == grazes
+    for found in (False, True):
+        tested = plain(
+            jump,
+            guard_acceleration=lambda *given: acceleration,
+            error_band=lambda *given: 0.5,
+            finds_surface=lambda model, transition, t, x, given, work, found=found: found and given == speed,
+        )
+        # What looks like a dip may be a flat or a jumping guard, whose surface is found.
+        hidden = found and not last
+        assert tested.is_grazing(model, None, run, 1, speed, work) == (grazes and not hidden)
 
 
 @pytest.mark.parametrize(

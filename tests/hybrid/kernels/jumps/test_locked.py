@@ -271,12 +271,14 @@ class TestMapOfAnInstant:
         assert (run.log_determinant, run.ill_conditioned_growth) == (3.0, 7)
 
     def test_the_instant_changes_with_the_state(self, kernels, run):
-        work = SimpleNamespace(gradient=np.array([2.0, 0.0, -1.0, 8.0]))
-        kernels.change_of_instant(run, self.N, -4.0, work)
+        """The speed of the guard is ``8 - 2 * 7 + 2 = -4``."""
+        work = SimpleNamespace(gradient=np.array([2.0, 0.0, -1.0, 8.0]), field=np.array([-7.0, 3.0, -2.0]))
+        kernels.change_of_instant(run, self.N, work)
         assert run.instant[:3].tolist() == [0.5, 0.0, -0.25]
         assert run.instant[3] == 9.0
         # What the guard does not feel stays zero at a speed of zero, too.
-        kernels.change_of_instant(run, self.N, 0.0, SimpleNamespace(gradient=np.zeros(4)))
+        at_rest = SimpleNamespace(gradient=np.zeros(4), field=np.ones(3))
+        kernels.change_of_instant(run, self.N, at_rest)
         assert run.instant[:3].tolist() == [0.0, 0.0, 0.0]
 
     def test_a_map_that_is_stored(self, kernels, run):
