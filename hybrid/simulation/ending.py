@@ -30,7 +30,8 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     _grow(trajectory, code)
     status = _status(trajectory, code)
-    notes = [*_start_beyond(trajectory), *_unproved(trajectory), *_unresolved(trajectory)]
+    notes = [*_start_beyond(trajectory), *_held(trajectory)]
+    notes += [*_unproved(trajectory), *_unresolved(trajectory)]
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
@@ -54,6 +55,19 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
         yield (
             f"The start lies beyond the guard of {names}. This guard counts as crossed, so only its next "
             "crossing fires."
+        )
+
+
+def _held(trajectory: Trajectory) -> Iterator[str]:
+    """A note on components without a limit where jumps have accumulated, such as counters."""
+    held = trajectory.run.trail[codes.HELD, :-1]
+    if held.any():
+        names = ", ".join(
+            repr(name) for name, one in zip(trajectory.system.state_names, held, strict=True) if one
+        )
+        yield (
+            f"Each of the infinitely many jumps of a chatter changes {names}. Such a component has no limit: "
+            "it keeps its value after the last jump that was made."
         )
 
 

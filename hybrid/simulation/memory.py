@@ -125,7 +125,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "stay": (modes,),
         "scale": (n,),
         "growth": (tangents,),
-        "trail": (3, n + 1),
+        "trail": (5, n + 1),
         "before": (n * tangents,),
         "growth_before": (tangents,),
         "instant": (n * (1 + n),),

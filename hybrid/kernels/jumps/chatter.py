@@ -13,7 +13,9 @@ from hybrid.kernels.events.guards import (
     guard_value,
     rounding_band,
 )
-from hybrid.kernels.jumps.rounds import fired_before
+from hybrid.kernels.jumps.rounds import fired_before, mark_endless
+from hybrid.kernels.jumps.slower import impact, slower_are_alike
+from hybrid.kernels.types.codes import ENDLESS
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -22,6 +24,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 BEFORE = 0
 LIMIT = 1
 IMPULSE = 2
+# A component that the impacts move at the limit, too, by this share of what the last impact has moved it.
+MOVES_ON = 0.1
 # No limit is taken before this many jumps, so that the visible jumps are in the arc.
 FEWEST_JUMPS = 16
 # The limit is taken earlier if the speed is below this share of that after the first jump: such jumps are not
@@ -102,6 +106,26 @@ def follow_mean(model, run, transition, speed, span, work):
             work.settled[i] += weight * slope[i]
 
 
+@njit(**KERNEL)
+def keep_endless(model, run, transition, speed, work):
+    """Mark the components that the impacts move for ever, such as a counter, and take out their impulse.
+
+    They keep the value after the last impact. ``speed`` is the guard's after that impact, with its sign.
+    """
+    n, rest, share = model.dimension, work.trial, work.error
+    change = speed * (1.0 + 1.0 / run.restitution)
+    for i in range(n):
+        impulse = run.trail[IMPULSE, i]
+        rest[i] = run.y[i] - speed * impulse
+        rounding = ROUNDING_OF_STATE * EPSILON * run.scale[i]
+        share[i] = math.inf if impulse == 0.0 else max(MOVES_ON * abs(impulse * change), rounding)
+    if not mark_endless(model, run, 1, run.phase, rest, share, work):
+        return
+    for i in range(n):
+        if run.trail[ENDLESS, i] != 0.0:
+            run.trail[IMPULSE, i] = 0.0
+
+
 @njit(**INLINE)
 def change_of_limit_time(model, method, run, gain, shift, span):
     """The change of the time to the limit by later jumps, in units of the tolerances.
@@ -116,6 +140,8 @@ def change_of_limit_time(model, method, run, gain, shift, span):
 def change_of_limit(model, method, run, gain, misfit, work):
     """The same for the limit in ``work.settled``; ``misfit`` is the change of its time."""
     for i in range(model.dimension):
+        if run.trail[ENDLESS, i] != 0.0:
+            continue
         limit = work.settled[i]
         scale = method.atol + method.rtol * max(abs(limit), run.scale[i])
         misfit = max(misfit, gain * abs(limit - run.trail[LIMIT, i]) / scale)
@@ -163,6 +189,7 @@ def accumulation(model, method, run, transition, since_last, work):
         gain = ratio * ratio / (1.0 - ratio * ratio)
         misfit = change_of_limit_time(model, method, run, gain, shift, span)
         if drowned or not misfit * method.rtol > FAR:
+            keep_endless(model, run, transition, side * speed, work)
             follow_mean(model, run, transition, side * speed, span, work)
             misfit = change_of_limit(model, method, run, gain, misfit, work)
         else:
@@ -173,6 +200,10 @@ def accumulation(model, method, run, transition, since_last, work):
         noise = NOISE * gain * band / height
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < min(ROUGH, noise)
         found = drowned or (shallow and (misfit <= 1.0 or floor))
+        if found:
+            apart = math.inf if drowned else misfit
+            impulse, towards = run.trail[IMPULSE], side * speed
+            found = slower_are_alike(model, method, run, transition, towards, span, impulse, apart, work)
         run.trail[IMPULSE, n] = misfit
         run.chattering += 1
     else:
@@ -304,17 +335,6 @@ def drift_with_mean(model, run, transition, span, work):
 
 
 @njit(**KERNEL)
-def impact(model, run, transition, t, x, after, work):
-    """Restitution of an impact from ``x (n,)`` to ``after (n,)``, and the change of the guard's speed."""
-    model.field(run.mode, t, x, model.parameters, work.field)
-    before = guard_speed(model, transition, t, x, work.field, work.gradient)
-    model.reset(transition, t, x, model.parameters, after)
-    model.field(run.mode, t, after, model.parameters, work.field)
-    later = guard_speed(model, transition, t, after, work.field, work.gradient)
-    return -later / before, later - before
-
-
-@njit(**KERNEL)
 def changed(up, down, noise):
     """``up - down``, or zero if that may be rounding."""
     return up - down if abs(up - down) > 64.0 * EPSILON * (abs(up) + abs(down)) + noise else 0.0
@@ -336,6 +356,8 @@ def add_turn_of_impulse(model, run, transition, t, speed, span, work):
     for i in range(n):
         noise = ROUNDING_OF_STATE * EPSILON * run.scale[i] / abs(change)
         turn[i] = changed((after[i] - place[i]) / change, impulse[i], noise) / span
+        if run.trail[ENDLESS, i] != 0.0:
+            turn[i] = 0.0
         coupling += slope[i] * turn[i]
     model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
     for i in range(n):
@@ -383,7 +405,7 @@ def add_change_of_impacts(model, run, transition, speed, span, work):
                 here = (after[i] - place[i]) / change
                 if part == 0:
                     up[i] = here
-                else:
+                elif run.trail[ENDLESS, i] == 0.0:
                     noise = ROUNDING_OF_STATE * EPSILON * run.scale[i] / abs(change)
                     work.sizes[i, j] = changed(up[i], here, noise) / (2.0 * step)
             if part == 0:

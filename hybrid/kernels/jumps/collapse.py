@@ -15,7 +15,7 @@ from numba import njit
 
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_speed
-from hybrid.kernels.jumps.rounds import fired_before
+from hybrid.kernels.jumps.rounds import LASTING, fired_before
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
@@ -104,12 +104,24 @@ def round_jacobian(model, run, turn, start, out, work):
 
 
 @njit(**KERNEL)
+def mark_tallies(matrix, n, tally):
+    """Mark the components that nothing depends on and that a round only adds to, in ``tally (n,)``."""
+    for i in range(n):
+        tally[i] = 1.0 if matrix[i, i] == 1.0 else 0.0
+        for j in range(n):
+            if j != i and matrix[j, i] != 0.0:
+                tally[i] = 0.0
+
+
+@njit(**KERNEL)
 def follow_doubling(model, run, turn, start, before, work):
     """Follow rounds from ``start (n,)`` until nothing moves, to ``work.settled (n,)``; returns their number.
 
     It is zero if there is no limit. The order of the jumps is checked after 1, 2, 4, 8, ... rounds: if the
-    speeds turned, the order would change. The start has the rounding of ``before`` rounds.
+    speeds turned, the order would change. The start has the rounding of ``before`` rounds. A counter, which
+    all rounds move by the same amount, stays where it is.
     """
+    tally = work.field_after
     n, sum_of_moves, power, product = model.dimension, work.trial, work.saltation, work.sizes
     rounds = 1.0
     if not fires_in_turn(model, run, turn, start, before, work):
@@ -117,6 +129,7 @@ def follow_doubling(model, run, turn, start, before, work):
     for i in range(n):
         sum_of_moves[i] = work.new[i] - start[i]
     round_jacobian(model, run, turn, start, power, work)
+    mark_tallies(power, n, tally)
     for _ in range(MOST_DOUBLINGS):
         moves, rounds = False, 2.0 * rounds
         for i in range(n):
@@ -124,10 +137,11 @@ def follow_doubling(model, run, turn, start, before, work):
             for j in range(n):
                 work.error[i] += power[i, j] * sum_of_moves[j]
         for i in range(n):
+            endless = tally[i] != 0.0 and abs(work.error[i]) >= LASTING * abs(sum_of_moves[i])
             sum_of_moves[i] += work.error[i]
-            work.settled[i] = start[i] + sum_of_moves[i]
+            work.settled[i] = start[i] + (0.0 if endless else sum_of_moves[i])
             hidden = rounds * ROUNDING_OF_STATE * EPSILON * abs(work.settled[i])
-            moves = moves or not abs(work.error[i]) <= hidden
+            moves = moves or not (endless or abs(work.error[i]) <= hidden)
         if not fires_in_turn(model, run, turn, work.settled, max(rounds, before), work):
             return 0.0
         if not moves:

@@ -22,6 +22,7 @@ from hybrid.kernels.jumps.drift import (
     feedback,
     rounding_of_tangents,
 )
+from hybrid.kernels.jumps.endless import may_be_held
 from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, move
 from hybrid.kernels.jumps.locked import (
     begin_instant,
@@ -84,6 +85,8 @@ def follow_impacts(task, transition, remaining):
     # Tangent vectors along the mean field have an error of third order.
     if apart and steep > max(BRIEF, noise ** (1.0 / 3.0)):
         return False
+    if not may_be_held(model, run, 1, span, x_limit, work):
+        return False
     remember_flight(run, record, model.dimension, span, x_limit)
     begin_instant(run, model.dimension, tangents, work)
     forward(run, model.period, span)
@@ -114,13 +117,15 @@ def follow_rounds(task, remaining):
 @njit(**KERNEL)
 def follow_to_rest(task):
     """``finish_chatter`` for jumps without a steady ratio, once the state has come to rest at one instant."""
-    _, model, _, run, _, work = task_of(task)
+    _, model, method, run, _, work = task_of(task)
     if run.jumps_here < MANY_AT_ONCE:
         return False
     turn = jumps_in_turn(run)
     for i in range(model.dimension):
         work.settled[i] = run.y[i]
-    return has_come_to_rest(model, run, turn, work.settled, 1.0, work) and go_to_limit(task, turn, 0.0)
+    if not has_come_to_rest(model, run, turn, work.settled, 1.0, work):
+        return False
+    return way_is_free(model, method, run, turn, 0.0, work) and go_to_limit(task, turn, 0.0)
 
 
 @njit(**KERNEL)
@@ -145,6 +150,8 @@ def go_to_limit(task, turn, left):
     n, tangents = model.dimension, task.tangents
     transition = next_in_turn(model, run, turn)
     if transition == NO_TRANSITION:
+        return False
+    if not may_be_held(model, run, turn, left, work.settled, work):
         return False
     limit_mode = model.accumulates_to[transition]
     target = run.mode if limit_mode == NO_MODE else limit_mode

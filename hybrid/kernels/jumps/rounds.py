@@ -8,7 +8,7 @@ the time that is left, and both are extrapolated to where none is left.
 from numba import njit
 
 from hybrid.kernels.events.guards import guard_value, may_jump
-from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
+from hybrid.kernels.types.codes import ENDLESS, NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -25,6 +25,10 @@ SHORTER = 0.999
 ROUNDING_OF_TIME = 64.0
 # Share of the time since the chatter began that is too short to change the limit.
 NOTHING_LEFT = 1e-7
+# A component is moved for ever if the next round moves it by at least this share of what this one does.
+LASTING = 1.0 - 1e-6
+# Share of the change over the last round that moves a component at the limit, too.
+MOVES_ON = 0.1
 # Largest distance of guards from zero, and of resets from the identity, at a limit, in sizes of the state.
 ROUGH = 1e-6
 
@@ -150,10 +154,68 @@ def extrapolate_by_rounds(model, run, turn, back, out):
 
 
 @njit(**KERNEL)
-def agree(model, method, one, other, sizes):
-    """Whether two estimates of the limit agree up to the tolerances."""
-    for i in range(model.dimension):  # noqa: SIM110 (no generators in kernels)
-        if not abs(one[i] - other[i]) <= method.atol + method.rtol * sizes[i]:
+def follow_resets(model, run, turn, t, x, work):
+    """The resets of the last ``turn`` jumps, in order, from ``x (n,)`` into ``x``."""
+    for back in range(turn - 1, -1, -1):
+        model.reset(fired_before(run, back), t, x, model.parameters, work.state)
+        for i in range(model.dimension):
+            x[i] = work.state[i]
+
+
+@njit(**KERNEL)
+def mark_endless(model, run, turn, t, x, share, work):
+    """Mark the components that rounds of ``turn`` jumps move for ever, though all others rest at ``x (n,)``.
+
+    So does a counter: it has no limit. Only moves beyond ``share (n,)`` count. A component whose moves shrink
+    has a limit of its own. Returns whether there are any.
+    """
+    n, once, twice, found = model.dimension, work.second_error, work.new, False
+    for i in range(n):
+        once[i] = x[i]
+    follow_resets(model, run, turn, t, once, work)
+    for i in range(n):
+        moves = abs(once[i] - x[i]) > share[i]
+        run.trail[ENDLESS, i] = 1.0 if moves else 0.0
+        twice[i] = once[i] if moves else x[i]
+        found = found or moves
+    if not found:
+        return False
+    follow_resets(model, run, turn, t, twice, work)
+    found = False
+    for i in range(n):
+        lasts = abs(twice[i] - once[i]) >= LASTING * abs(once[i] - x[i])
+        if run.trail[ENDLESS, i] != 0.0 and not lasts:
+            run.trail[ENDLESS, i] = 0.0
+        found = found or run.trail[ENDLESS, i] != 0.0
+    return found
+
+
+@njit(**KERNEL)
+def hold_endless(model, run, turn, t, left, work):
+    """Mark the components that rounds move for ever, and let ``work.settled`` keep their last values.
+
+    Between the jumps they move by their rate, which is that of the change from one round to the next.
+    """
+    n, share = model.dimension, work.rounding[0]
+    last, before = run.visits[slot_of(run, run.jumps)], run.visits[slot_of(run, run.jumps - turn)]
+    for i in range(n):
+        share[i] = max(MOVES_ON * abs(last[i] - before[i]), ROUNDING_OF_TIME * EPSILON * run.scale[i])
+    if not mark_endless(model, run, turn, t, work.settled, share, work):
+        return
+    earlier = run.visits[slot_of(run, run.jumps - 2 * turn)]
+    shorter = time_before(model, run, turn, 2 * turn) - time_before(model, run, 0, turn)
+    for i in range(n):
+        if run.trail[ENDLESS, i] != 0.0:
+            rate = (2.0 * before[i] - last[i] - earlier[i]) / shorter if shorter > 0.0 else 0.0
+            work.settled[i] = last[i] + rate * left
+
+
+@njit(**KERNEL)
+def agree(model, method, run, one, other, sizes):
+    """Whether two estimates of the limit agree up to the tolerances, but for what moves for ever."""
+    for i in range(model.dimension):
+        apart = not abs(one[i] - other[i]) <= method.atol + method.rtol * sizes[i]
+        if apart and run.trail[ENDLESS, i] == 0.0:
             return False
     return True
 
@@ -180,8 +242,9 @@ def is_limit(model, run, turn, t, work):
         model.reset(transition, t, place, model.parameters, work.state)
         for i in range(n):
             place[i] = work.state[i]
-    for i in range(n):  # noqa: SIM110 (no generators in kernels)
-        if not abs(place[i] - work.settled[i]) <= ROUGH * work.trial[i]:
+    for i in range(n):
+        moves = not abs(place[i] - work.settled[i]) <= ROUGH * work.trial[i]
+        if moves and run.trail[ENDLESS, i] == 0.0:
             return False
     return True
 
@@ -219,17 +282,20 @@ def limit_of_rounds(model, method, run, work):
     lasted = time_before(model, run, 0, seen) + left
     size_of_visits(model, run, seen, work.trial, work)
     latest, end = time_before(model, run, 0, turn), run.phase + left
-    if latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase):
+    nearly = left <= NOTHING_LEFT * lasted
+    agreed = abs(left + latest - earlier) <= method.rtol * lasted
+    if latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase) and (agreed or nearly):
         extrapolate(model, run, turn, 0, left, work.settled)
+        hold_endless(model, run, turn, end, left, work)
         extrapolate(model, run, turn, turn, earlier, work.error)
-        agreed = abs(left + latest - earlier) <= method.rtol * lasted
-        agreed = agreed and agree(model, method, work.settled, work.error, work.trial)
-        if (agreed or left <= NOTHING_LEFT * lasted) and is_limit(model, run, turn, end, work):
+        agreed = agreed and agree(model, method, run, work.settled, work.error, work.trial)
+        if (agreed or nearly) and is_limit(model, run, turn, end, work):
             return left, turn
-    if left <= NOTHING_LEFT * lasted:
+    if nearly:
         extrapolate_by_rounds(model, run, turn, 0, work.settled)
+        hold_endless(model, run, turn, end, left, work)
         extrapolate_by_rounds(model, run, turn, turn, work.error)
-        agreed = agree(model, method, work.settled, work.error, work.trial)
+        agreed = agree(model, method, run, work.settled, work.error, work.trial)
         if agreed and is_limit(model, run, turn, end, work):
             return left, turn
     return 0.0, 0

@@ -15,7 +15,8 @@ from hybrid.kernels.events.guards import (
     size_of_time,
 )
 from hybrid.kernels.events.sampled import NOWHERE
-from hybrid.kernels.jumps.rounds import fired_before
+from hybrid.kernels.jumps.rounds import fired_before, mark_endless
+from hybrid.kernels.types.codes import ENDLESS
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
@@ -39,7 +40,8 @@ def way_is_free(model, method, run, turn, span, work):
     """Whether no other guard is crossed on the straight way from the state to ``work.settled (n,)``.
 
     The last ``turn`` jumps are those that accumulate, ``span`` is the time that the way takes. If another
-    guard is crossed before the limit, the jumps do not reach that limit.
+    guard is crossed before the limit, the jumps do not reach that limit. Nor do they if the last reset has
+    crossed another guard, whose transition is due.
     """
     t, path = run.phase, work.path
     for i in range(model.dimension):
@@ -53,6 +55,9 @@ def way_is_free(model, method, run, turn, span, work):
         if abs(value) <= rounding_band(model, run, other, t, run.y, work):
             continue
         side = 1 if value > 0.0 else -1
+        turned = run.mode == run.previous_mode and run.side[other] == -side
+        if run.due[other] == 1 or (turned and crosses_towards(model.direction[other], side)):
+            return False
         if has_program(model, other):
             place, _, _ = first_change(
                 model, method, run, other, path, 1, -1, t, span, 1.0, side, 0, 0.0, True, work
@@ -72,13 +77,15 @@ def has_come_to_rest(model, run, turn, x, rounds, work):
 
     So ends a chatter whose flights shorten without a steady ratio, such as that of two balls on a floor that
     take turns in varying order: its last jumps happen within the rounding of time. Speeds may have the
-    rounding errors of so many ``rounds`` of jumps.
+    rounding errors of so many ``rounds`` of jumps. Counters, which each round moves, are marked.
     """
     n, mode, t = model.dimension, run.mode, run.phase
     share, clock, moved = AT_REST * ROUNDING_OF_STATE * EPSILON, size_of_time(model, t), work.trial
     model.field(mode, t, x, model.parameters, work.field)
     for i in range(n):
         moved[i] = share * (run.scale[i] + clock * abs(work.field[i]))
+        work.rounding[0, i] = 2.0 * rounds * moved[i]
+    mark_endless(model, run, turn, t, x, work.rounding[0], work)
     for back in range(turn):
         transition = fired_before(run, back)
         value = guard_value(model, transition, t, x, work.scalar)
@@ -92,7 +99,8 @@ def has_come_to_rest(model, run, turn, x, rounds, work):
             return False
         model.reset(transition, t, x, model.parameters, work.state)
         for i in range(n):
-            if not abs(work.state[i] - x[i]) <= 2.0 * rounds * moved[i]:
+            moves = not abs(work.state[i] - x[i]) <= 2.0 * rounds * moved[i]
+            if moves and run.trail[ENDLESS, i] == 0.0:
                 return False
     return True
 

@@ -30,6 +30,11 @@ TRANSVERSE = 0
 GRAZING = 1
 LIMIT_OF_CHATTER = 2
 
+# Rows of Run.trail that mark the components which jumps move for ever: at the limit in question, and at any
+# limit that was taken.
+ENDLESS = 3
+HELD = 4
+
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 

@@ -246,7 +246,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
       vectors.
-    - ``trail (3, n + 1)``: follows the jumps of one transition to their limit.
+    - ``trail (5, n + 1)``: follows the jumps of one transition to their limit; the last two rows mark the
+      components that jumps move for ever, at the limit in question and at any limit that was taken.
     - ``before (n k,)``, ``growth_before (k,)``: the tangent vectors and their growth before a jump that sets
       off others at the same instant.
     - ``instant (n (1 + n),)``: the derivative of that instant, then the columns of the tangent map of its

@@ -88,7 +88,7 @@ def test_a_run(shapes):
         **dict.fromkeys(("first_step", "stay"), (4,)),
         "scale": (N,),
         **dict.fromkeys(("growth", "growth_before"), (K,)),
-        "trail": (3, N + 1),
+        "trail": (5, N + 1),
         "before": (N * K,),
         "instant": (N * (1 + N),),
     }

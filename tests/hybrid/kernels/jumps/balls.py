@@ -88,7 +88,7 @@ def new_run(y=(0.0, 1.0, 0.0), **values):
         "recent": np.full(32, 1),
         "visits": np.zeros(32, dtype=int),
         "since_entry": 0.0,
-        "trail": np.zeros((3, 4)),
+        "trail": np.zeros((5, 4)),
         "instant": np.full(3, 1e9),
         "last_fired": 1,
     }

@@ -89,6 +89,7 @@ class TestAccumulation:
             rounding_band=lambda *given: band,
             guard_acceleration=lambda *given: side * PULL,
             guard_value=lambda *given: 0.0,
+            slower_are_alike=lambda *given: True,
         ).accumulation
         model, run = Ball(direction=side), new_run()
         flight = 0.0
@@ -142,6 +143,7 @@ class TestAccumulation:
             rounding_band=lambda *given: band,
             guard_acceleration=lambda *given: -PULL,
             guard_value=lambda *given: value,
+            slower_are_alike=lambda *given: True,
         ).accumulation
         run = new_run((0.0, speed, 0.0), chattering=5, chatter_jumps=8, jumps=9, restitution=ratio)
         run.trail[BEFORE] = 1.0, 0.0, 0.0, 2.0
@@ -191,9 +193,10 @@ class TestAccumulation:
             guard_acceleration=lambda *given: -PULL,
             guard_value=lambda *given: 0.0,
             change_of_limit=lambda model, method, run, gain, misfit, work: misfit,
+            slower_are_alike=lambda *given: True,
         ).accumulation
         run = new_run((0.0, 1.0, 0.0), chattering=16, chatter_jumps=8, jumps=9, phase=0.0)
-        run.trail[:, 3] = 2.0, 2.0, before
+        run.trail[:3, 3] = 2.0, 2.0, before
         span = tested(Ball(), METHOD, run, 1, 1.0 + 1e-6, memory())
         assert run.trail[IMPULSE, 3] == pytest.approx(1e-6 / 3.0 / METHOD.rtol, rel=1e-6)
         assert (span > 0.0) == found
@@ -213,7 +216,7 @@ class TestAccumulation:
         for jumps, before, left in ((9, 1, 6), (9, 0, 1), (10, 1, 1)):
             run = new_run(chattering=5, chatter_jumps=8, jumps=jumps)
             run.recent[:] = before
-            run.trail[:, 3] = 0.5, 1.0, math.inf
+            run.trail[:3, 3] = 0.5, 1.0, math.inf
             run.trail[LIMIT, :3] = math.inf
             tested(Model(), METHOD, run, 1, 0.5, memory())
             assert (run.chattering, run.chatter_jumps) == (left, jumps)

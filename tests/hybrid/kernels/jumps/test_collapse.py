@@ -229,7 +229,7 @@ class TestDoubling:
             out[:] = matrix
 
         kernels = plain(module, fires_in_turn=fires_in_turn, round_jacobian=round_jacobian)
-        names = ("trial", "new", "error", "settled", "state")
+        names = ("trial", "new", "error", "settled", "state", "field_after")
         work = SimpleNamespace(
             **{name: np.zeros(2) for name in names}, saltation=np.zeros((2, 2)), sizes=np.zeros((2, 2))
         )
@@ -252,9 +252,15 @@ class TestDoubling:
         assert self.followed(stops=stops)[0] == 0.0
 
     def test_no_limit_if_all_goes_on(self):
-        rounds, asked, _ = self.followed(np.diag([1.0, -0.5]))
+        rounds, asked, _ = self.followed(np.array([[1.0, 0.0], [0.25, -0.5]]))
         assert rounds == 0.0
         assert len(asked) == module.MOST_DOUBLINGS + 1
+
+    def test_a_counter_keeps_its_value(self):
+        """Nothing depends on the first component, to which each round adds the same."""
+        rounds, _, limit = self.followed(np.diag([1.0, -0.5]))
+        assert rounds > 0.0
+        np.testing.assert_allclose(limit, [1e3, self.SHIFT[1] / 1.5], rtol=1e-12)
 
 
 @pytest.mark.parametrize(

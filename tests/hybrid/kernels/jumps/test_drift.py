@@ -51,7 +51,7 @@ def run():
         phase=2.0,
         y=np.array([1.0, -1.0]),
         scale=np.array([2.0, 100.0]),
-        trail=np.zeros((3, 3)),
+        trail=np.zeros((5, 3)),
         restitution=0.6,
         mode=4,
     )

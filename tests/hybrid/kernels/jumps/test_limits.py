@@ -77,7 +77,7 @@ class Scene:
             tangents=tangents,
             orthonormal=orthonormal,
         )
-        answers = {"way_is_free": True} | (answers or {})
+        answers = {"way_is_free": True, "may_be_held": True} | (answers or {})
         doers = (
             *(
                 "chatter_matrix",
@@ -136,6 +136,7 @@ class TestImpacts:
                 ("way_is_free", 1, 0.25),
                 ("chatter_matrix", TRANSITION),
                 ("add_change_of_duration", target, 0.25),
+                ("may_be_held", 1, 0.25),
                 ("remember_flight", 2, 0.25),
                 ("begin_instant", 2, 0),
                 ("forward", 6.5, 0.25),
@@ -157,6 +158,7 @@ class TestImpacts:
                 ("way_is_free", 1, 0.25),
                 ("chatter_matrix", TRANSITION),
                 ("add_change_of_duration", target, 0.25),
+                ("may_be_held", 1, 0.25),
                 ("remember_flight", 2, 0.25),
                 ("begin_instant", 2, tangents),
                 ("forward", 6.5, 0.25),
@@ -211,10 +213,14 @@ class TestImpacts:
             assert scene.run.chattering == 5
 
     def test_nothing_is_done_where_something_is_in_the_way_or_unknown(self):
-        for others in ({"answers": {"way_is_free": False}}, {"known": False, "tangents": 1}):
+        for others in (
+            {"answers": {"way_is_free": False}},
+            {"answers": {"may_be_held": False}},
+            {"known": False, "tangents": 1},
+        ):
             scene, found = self.follow(**others)
             assert not found
-            assert scene.names()[-1] in ("way_is_free", "drift_is_known")
+            assert scene.names()[-1] in ("way_is_free", "may_be_held", "drift_is_known")
 
 
 class TestOthers:
@@ -236,18 +242,29 @@ class TestOthers:
         assert not scene.kernels.follow_rounds(scene.task, 1.0)
 
     def test_rest(self):
-        for here, rests, goes, found in (
-            (MANY_AT_ONCE, True, True, True),
-            (MANY_AT_ONCE + 1, True, True, True),
-            (MANY_AT_ONCE - 1, True, True, False),
-            (MANY_AT_ONCE, False, True, False),
-            (MANY_AT_ONCE, True, False, False),
+        for here, rests, free, goes, calls in (
+            (MANY_AT_ONCE, True, True, True, 4),
+            (MANY_AT_ONCE + 1, True, True, True, 4),
+            (MANY_AT_ONCE - 1, True, True, True, 0),
+            (MANY_AT_ONCE, False, True, True, 2),
+            (MANY_AT_ONCE, True, False, True, 3),
+            (MANY_AT_ONCE, True, True, False, 4),
         ):
-            answers = {"jumps_in_turn": 4, "has_come_to_rest": rests, "go_to_limit": goes}
+            answers = {
+                "jumps_in_turn": 4,
+                "has_come_to_rest": rests,
+                "way_is_free": free,
+                "go_to_limit": goes,
+            }
             scene = Scene(answers=answers, jumps_here=here)
-            assert bool(scene.kernels.follow_to_rest(scene.task)) == found
-            expected = [("jumps_in_turn",), ("has_come_to_rest", 4, 1.0), ("go_to_limit", 4, 0.0)]
-            assert scene.calls == expected[: 0 if here < MANY_AT_ONCE else 3 if rests else 2]
+            assert bool(scene.kernels.follow_to_rest(scene.task)) == (calls == 4 and goes)
+            expected = [
+                ("jumps_in_turn",),
+                ("has_come_to_rest", 4, 1.0),
+                ("way_is_free", 4, 0.0),
+                ("go_to_limit", 4, 0.0),
+            ]
+            assert scene.calls == expected[:calls]
             settled = [10.0, 11.0] if scene.calls else [1.0, 2.0]
             assert scene.work.settled.tolist() == settled
 
@@ -291,6 +308,7 @@ class TestGoing:
             assert scene.kernels.go_to_limit(scene.task, 3, left)
             assert scene.calls == [
                 ("next_in_turn", 3),
+                ("may_be_held", 3, left),
                 *([("remember_flight", 2, left)] if left > 0.0 else []),
                 ("forward", 6.5, left),
                 ("remember_jump", TRANSITION, 0.0, LIMIT_OF_CHATTER, True),
@@ -311,6 +329,11 @@ class TestGoing:
         assert not scene.kernels.go_to_limit(scene.task, 3, 0.5)
         assert scene.calls == [("next_in_turn", 3)]
         assert np.all(scene.work.saltation == 6.0)
+
+    def test_a_counter_that_something_depends_on(self):
+        scene = Scene(answers={"next_in_turn": TRANSITION, "may_be_held": False})
+        assert not scene.kernels.go_to_limit(scene.task, 3, 0.5)
+        assert scene.calls == [("next_in_turn", 3), ("may_be_held", 3, 0.5)]
 
 
 @pytest.mark.parametrize("finds", range(5))
