@@ -195,6 +195,9 @@ NEAREST = {
         "solvers/test_gaps.py",
     ),
     "hybrid/kernels/steps/runge_kutta_guards.py": (
+        "kernels/steps/test_runge_kutta_guard_rules.py",
+        "kernels/steps/test_runge_kutta_landings.py",
+        "kernels/steps/test_runge_kutta.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_onset.py",
         "kernels/events/test_forms.py",
