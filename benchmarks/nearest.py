@@ -3,7 +3,10 @@
 # Relative to tests/hybrid. The tests of the same name, in the same place of the tree, come first in any case.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
-    "hybrid/compiler/bounds/forcing.py": ("compiler/bounds/test_forcing.py",),
+    "hybrid/compiler/bounds/forcing.py": (
+        "compiler/bounds/test_forcing_rules.py",
+        "compiler/bounds/test_pulses_in_state.py",
+    ),
     "hybrid/compiler/bounds/program.py": (
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_crossings.py",
@@ -195,6 +198,9 @@ NEAREST = {
         "solvers/test_gaps.py",
     ),
     "hybrid/kernels/steps/runge_kutta_guards.py": (
+        "kernels/steps/test_runge_kutta_guard_rules.py",
+        "kernels/steps/test_runge_kutta_landings.py",
+        "kernels/steps/test_runge_kutta.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_onset.py",
         "kernels/events/test_forms.py",

@@ -127,6 +127,34 @@ def test_which_field_counts_beside_each_transition(untraced):
     assert emitted.crossing == ((0, 2), (3, 0), (1, 4), (1, NO_MODE))
 
 
+@pytest.mark.parametrize("untraced", ["guard", "reset"])
+def test_beside_what_is_not_traced_the_field_is_that_of_the_mode(untraced):
+    def height(t, x, p):
+        return 2.0 * x.q if t > 1e9 else x.q
+
+    def impact(t, x, p):
+        return (x.q, x.v) if t > 1e9 else (x.q, -x.v)
+
+    guard, reset = Guard(lambda t, x, p: x.q, -1), Reset(lambda t, x, p: (x.q, -x.v))
+    if untraced == "guard":
+        guard = Guard(height, -1, gradient=lambda t, x, p: (1.0, 0.0, 0.0))
+    else:
+        reset = Reset(impact, jacobian=lambda t, x, p: ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0)))
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[
+            Mode("free", lambda t, x, p: (x.v, -1.0)),
+            Mode("contact", lambda t, x, p: (x.v, np.sqrt(np.abs(x.q)))),
+        ],
+        transitions=[
+            Transition("free", "contact", guard, reset),
+            Transition("contact", "free", Guard(lambda t, x, p: x.q, +1)),
+        ],
+    )
+    # The contact has a field of its own where it is left through a traced guard.
+    assert compile_system(system).emitted.crossing == ((0, 1), (2, 0))
+
+
 @pytest.mark.parametrize("n", [0.25, -0.5])
 def test_on_the_guard_steep_powers_are_zero(n):
     """With a negative exponent the power is infinite there: it is taken as it is."""

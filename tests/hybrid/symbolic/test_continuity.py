@@ -292,6 +292,11 @@ def test_values_below_and_above_a_jump_are_those_of_numpy(function, step, jump, 
         ("v", "q", False),
         ("q + v", "q - v", False),
         ("q - 2*c", "q - c", False),
+        # What is left of 3e8 is rounding, beside 1e-6 as well; what has no value does not vanish.
+        ("3e8*v*(q + 0.1) - 3e7*v - 3e8*q*v + 1e-6*k*(q + 1) - 1e-6*k - 1e-6*k*q", "c", True),
+        ("3e8*v*(q + 0.1) - 3e7*v - 3e8*q*v + 1e-3*k", "c", False),
+        ("zoo", "q", False),
+        ("oo", "q", False),
     ],
 )
 def test_what_vanishes_on_a_surface(expression, surface, vanishes):

@@ -181,6 +181,9 @@ def test_conditions_for_sliding_where_jumps_add_up():
     [
         (lambda t, x, p: (-np.sign(x.x), -np.sign(x.y)), True),
         (lambda t, x, p: (-np.abs(x.x), -np.sign(x.y)), False),
+        # Each surface attracts alone; along one of them, the speed through the other is zero on both sides.
+        (lambda t, x, p: (-np.sign(x.x) - np.sign(x.y), -np.sign(x.x) - np.sign(x.y)), False),
+        (lambda t, x, p: (-np.sign(x.x) - np.sign(x.y), -np.sign(x.x) - 2.0 * np.sign(x.y)), True),
     ],
 )
 def test_surfaces_without_a_jump_hold_no_orbit(field, along_both):

@@ -133,3 +133,24 @@ def test_rows_of_forcings_that_may_hide_a_pulse_are_checked():
     codes = [row[0] for row in found.rows[found.first[1] : found.first[2]]]
     checked = [code for code, mark in zip(codes, marks[1], strict=True) if mark]
     assert checked == [op.EXP, op.SUM]
+
+
+@pytest.mark.parametrize(
+    ("exponent", "code"),
+    [
+        (3.0, op.WHOLE_POWER),
+        (-7.0, op.WHOLE_POWER),
+        (2.0**31 - 1.0, op.WHOLE_POWER),
+        (1.0 - 2.0**31, op.WHOLE_POWER),
+        (2.5, op.FIXED_POWER),
+        # Whole numbers in rows have 32 bits.
+        (2.0**31, op.FIXED_POWER),
+        (-(2.0**31), op.FIXED_POWER),
+        (1e12, op.FIXED_POWER),
+    ],
+)
+def test_powers_with_whole_numbers_that_a_row_can_hold(exponent, code):
+    found = programs([sympy.Pow(SYMBOLS.x[0], sympy.Float(exponent))], [], [], SYMBOLS)
+    (*_, (own, _, power, _)) = found.rows
+    assert own == code
+    assert (power if code == op.WHOLE_POWER else found.numbers[power]) == exponent
