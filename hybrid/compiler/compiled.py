@@ -290,6 +290,12 @@ class CompiledSystem:
             period=0.0,
         )
 
+    @property
+    def is_timed(self) -> bool:
+        """Whether a field, a guard or a reset may depend on time."""
+        emitted = self.emitted
+        return not all(emitted.autonomous) or any(emitted.timed_guard) or any(emitted.timed_reset)
+
     def _is_timed(self, mode: int) -> bool:
         """Whether the field of a mode, or one of the guards in it, may depend on time."""
         emitted, name = self.emitted, self.system.mode_names[mode]

@@ -11,7 +11,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.jumps.limits import may_accumulate
 from hybrid.kernels.steps.disguised_jumps import leave
-from hybrid.kernels.steps.late import is_late, late_jump, late_step
+from hybrid.kernels.steps.late import is_late
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
@@ -65,7 +65,7 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
     fired = run.pending
     run.pending = NO_TRANSITION
     if model.timed_jump[fired] == 1 and run.since_entry > 0.0 and is_late(task.method, run):
-        late_jump(model, task.method, run, fired, task.work)
+        parts.late_jump(model, task.method, run, fired, task.work)
     parts.jump(task, fired)
     if model.target[fired] == NO_MODE:
         return TERMINAL
@@ -219,7 +219,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         run.since_entry += span
         run.longest_step = max(run.longest_step, span)
         if model.timed[mode] == 1 and is_late(task.method, run):
-            late_step(model, task.method, run, span, task.work)
+            parts.late_step(model, task.method, run, span, task.work)
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
             parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
         fired = run.pending

@@ -108,6 +108,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             beside_series=not all(emitted.guard_in_series),
             tangents=tangents > 0,
             abrupt=tangents > 0 and any(emitted.abrupt),
+            timed=compiled.is_timed,
         )
         model = compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64))
         columns, rows = compiled.series_columns(tangents), compiled.emitted.programs.longest
@@ -175,15 +176,20 @@ def driver_parts(
     beside_series: bool,
     tangents: bool,
     abrupt: bool,
+    timed: bool,
 ) -> tuple[Any, Any]:
     """The pieces that the driver is handed first; what the run does not need is not loaded.
 
     Whether some mode takes steps of the solver's method ``attempt``, some rate depends on time alone, some
-    guard is no series itself, the run has tangent vectors, and some field may change abruptly below them.
+    guard is no series itself, the run has tangent vectors, some field may change abruptly below them, and
+    something in the system depends on time.
     """
 
     def needed(asked: bool, load: Callable[[], Any]) -> Any:
         return load() if asked else Absent()
+
+    def late() -> Any:
+        return load_kernels("hybrid.kernels.steps.late")
 
     def forcing() -> Any:
         return load_kernels("hybrid.kernels.steps.forcing")
@@ -201,6 +207,8 @@ def driver_parts(
         arrived=corners.arrived,
         keep_apart=needed(tangents, lambda: load_kernels("hybrid.kernels.arithmetic.tangent").keep_apart),
         look_back=needed(abrupt, lambda: load_kernels("hybrid.kernels.steps.disguised_jumps").look_back),
+        late_step=needed(timed, lambda: late().late_step),
+        late_jump=needed(timed, lambda: late().late_jump),
         jump=jumps.jump,
         finish_chatter=Absent(),
         complete=0,

@@ -49,6 +49,7 @@ ALL_KERNELS = (
     "hybrid.kernels.steps.beside_series",
     "hybrid.kernels.arithmetic.tangent",
     "hybrid.kernels.steps.disguised_jumps",
+    "hybrid.kernels.steps.late",
     "hybrid.kernels.events.sections",
     "hybrid.kernels.events.many",
     "hybrid.kernels.steps.dense",

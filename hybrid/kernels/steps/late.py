@@ -9,8 +9,9 @@ from numba import njit
 
 from hybrid.kernels.events.guards import guard_speed, guard_value
 from hybrid.kernels.types.codes import NO_MODE
-from hybrid.kernels.types.layout import EPSILON
-from hybrid.kernels.types.options import INLINE, KERNEL
+from hybrid.kernels.types.kinds import INTEGER, REAL
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
+from hybrid.kernels.types.options import INLINE, exported
 
 
 @njit(**INLINE)
@@ -30,7 +31,7 @@ def keep_largest(method, run, i, change, other):
         run.lateness = abs(change) / tolerance
 
 
-@njit(**KERNEL)
+@exported(None, Model, Method, Run, REAL, Work)
 def late_step(model, method, run, span, work):
     """Keep in ``run.lateness`` what the rounding of the time makes of the field over a step."""
     t, later = run.phase, run.phase + EPSILON * abs(run.phase)
@@ -41,7 +42,7 @@ def late_step(model, method, run, span, work):
         keep_largest(method, run, i, change, span * work.field[i])
 
 
-@njit(**KERNEL)
+@exported(None, Model, Method, Run, INTEGER, Work)
 def late_jump(model, method, run, transition, work):
     """Keep in ``run.lateness`` what the rounding of the time makes of the state after the pending jump.
 

@@ -400,8 +400,9 @@ class Parts(Structure):
 
     What is linked into a kernel is optimised again with it; what comes as an argument is not. What a run
     never calls need not even be compiled: the step of a Runge-Kutta method where every mode has a series,
-    ``keep_apart`` without tangent vectors, ``look_back`` where no field changes abruptly. Whether
-    ``finish_chatter`` will be called is not known beforehand: with ``complete`` 0 it is absent.
+    ``keep_apart`` without tangent vectors, ``look_back`` where no field changes abruptly, ``late_step`` and
+    ``late_jump`` where nothing depends on time. Whether ``finish_chatter`` will be called is not known
+    beforehand: with ``complete`` 0 it is absent.
     """
 
     runge_kutta_step: function(Pair(REAL), Task, REAL)
@@ -410,6 +411,8 @@ class Parts(Structure):
     arrived: function(INTEGER, Task)
     keep_apart: function(None, Model, Run, INTEGER, INTEGER, MATRIX)
     look_back: function(None, Model, Method, Run, REAL, Work)
+    late_step: function(None, Model, Method, Run, REAL, Work)
+    late_jump: function(None, Model, Method, Run, INTEGER, Work)
     jump: function(None, Task, INTEGER)
     finish_chatter: function(TRUTH, Task, INTEGER, REAL)
     complete: INTEGER

@@ -207,13 +207,13 @@ class TestFire:
             jump=lambda task, fired: calls.append(("jump", fired)),
             finish_chatter=finish_chatter,
             complete=complete,
+            late_jump=lambda model, method, run, fired, work: calls.append(("late", fired)),
         )
         task = task_of(**values)
         tested = plain(
             drive,
             may_accumulate=lambda model, run, fired: accumulates,
             is_late=lambda method, run: late,
-            late_jump=lambda model, method, run, fired, work: calls.append(("late", fired)),
         ).fire
         code = tested(parts, task, 3, 1.0, max_jumps)
         return code, calls, task.run.pending
@@ -341,13 +341,13 @@ class TestAdvance:
             enter=enter,
             is_full=lambda record: full,
             is_late=lambda method, run: run.longest_step < late,
-            late_step=lambda model, method, run, span, work: calls.append(("late", run.phase)),
         ).advance
         task = task_of(**values)
         task.orthonormal = orthonormal
         parts = SimpleNamespace(
             arrived=arrived,
             keep_apart=lambda *given: calls.append("apart"),
+            late_step=lambda model, method, run, span, work: calls.append(("late", run.phase)),
             first_in_order=lambda task, fired: fired if fired < 2 else NO_TRANSITION,
         )
         code = tested(parts, task, 3, 1.0, most, 50)
