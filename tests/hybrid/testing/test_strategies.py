@@ -38,7 +38,8 @@ def test_states_are_drawn_from_their_ranges():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "step"), [(0.0, 2 * np.pi, 1e-5), (3.0, 11 / 3, 1e-6), (-7e5 / 3, 7e5 / 3, 1.0), (0.0, 2e-9 / 3, 1e-15)]
+    ("low", "high", "step"),
+    [(0.0, 2 * np.pi, 1e-5), (3.0, 11 / 3, 1e-6), (-7e5 / 3, 7e5 / 3, 1.0), (0.0, 2e-9 / 3, 1e-15)],
 )
 def test_numbers_have_five_digits_after_the_first_of_half_the_range(low, high, step):
     strategy = states(BALL_SYSTEM, {"q": (low, high)})
