@@ -17,6 +17,7 @@ import lyapunov
 import lyapunov.plot
 import lyapunov.study.regimes
 import models
+from hybrid.arguments import one_of
 from hybrid.errors import HybridError
 from models import contact
 from models.dry_friction_oscillator import den_hartog_amplitude
@@ -240,3 +241,13 @@ def test_no_oddity_raises_an_error_from_inside(made, oddity):
                 failures.append(f"{function.__qualname__}({argument}): {type(error).__name__}: {error}")
         plt.close("all")
     assert not failures, "\n" + "\n".join(failures)
+
+
+def test_one_of_a_few_values_is_the_same_object_or_an_equal_text():
+    allowed = (None, "inner", 1)
+    assert one_of("kind", None, allowed) is None
+    assert one_of("kind", "".join(["in", "ner"]), allowed) == "inner"
+    assert one_of("kind", 1, allowed) == 1
+    for other in (1.0, True, "outer", np.array(["inner"])):
+        with pytest.raises(HybridError, match='kind must be None, "inner" or 1; got'):
+            one_of("kind", other, allowed)

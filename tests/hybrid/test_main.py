@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -50,3 +51,19 @@ def test_what_was_not_compiled_is_named(empty_cache, monkeypatch, capsys):
 def test_what_is_no_command_is_refused(arguments):
     with pytest.raises(SystemExit):
         command.main(arguments)
+
+
+@pytest.mark.parametrize("processes", [0, 1, 3, 1000])
+def test_each_module_that_is_missing_is_the_share_of_one_process(processes, monkeypatch):
+    shares = []
+
+    def start(arguments, **options):
+        shares.append(arguments[3:])
+        return SimpleNamespace(poll=lambda: 0)
+
+    monkeypatch.setattr(command.subprocess, "Popen", start)
+    there = ALL_KERNELS[1]
+    missing = [module for module in ALL_KERNELS if module != there]
+    assert command._compile(processes, lambda module: module == there, ["program"], {}) == missing
+    assert sorted(module for share in shares for module in share) == sorted(missing)
+    assert len(shares) == min(max(processes, 1), len(missing))

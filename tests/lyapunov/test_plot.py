@@ -1,5 +1,6 @@
 """Charts of exponents show their data."""
 
+import attrs
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -307,3 +308,13 @@ def test_a_spectrum_has_bars_of_two_standard_errors_inside_of_its_limits():
     bottom, top = min(shown), max(shown)
     margin = 0.1 * (top - bottom)
     np.testing.assert_allclose(ax.get_ylim(), [bottom - margin, top + margin])
+
+
+@pytest.mark.parametrize("error", [50.0, 1000.0])
+def test_limits_hold_bars_that_reach_beyond_the_history(error):
+    spectrum = lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.3, 0.1), intervals=10)
+    wide = attrs.evolve(spectrum, standard_error=np.full(2, error))
+    values = spectrum.exponents
+    bottom, top = min(values) - 2 * error, max(values) + 2 * error
+    margin = 0.1 * (top - bottom)
+    np.testing.assert_allclose(plot_spectrum(wide).get_ylim(), [bottom - margin, top + margin])

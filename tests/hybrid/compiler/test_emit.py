@@ -325,6 +325,19 @@ def test_a_given_derivative_serves_where_nothing_else_can():
         np.testing.assert_array_equal(result, [[0.0, 1.0, 0.0], [slope, 0.0, 0.0]])
 
 
+def test_a_given_derivative_that_branches_may_have_a_column_of_time():
+    def field(t, x, p):
+        return x.v + 1.5 * t**2, (-x.q if x.q > 0 else -2.0 * x.q) + 5.0 * t
+
+    def jacobian(t, x, p):
+        return (0.0, 1.0, 3.0 * t), (-1.0 if x.q > 0 else -2.0, 0.0, 5.0)
+
+    functions = load(emit(mode_system(field, parameters={"k": 1.0}, jacobian=jacobian)), compiled=True)
+    for q, slope in ((1.0, -1.0), (-1.0, -2.0)):
+        result = run(functions["field_jacobian"], (2, 3), 0, 0.25, np.array([q, 0.5]), np.ones(1))
+        np.testing.assert_array_equal(result, [[0.0, 1.0, 0.75], [slope, 0.0, 5.0]])
+
+
 def test_opaque_functions_without_parameters_compile():
     system = mode_system(branching, jacobian=branching_jacobian)
     functions = load(emit(system), compiled=True)

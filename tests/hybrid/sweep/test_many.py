@@ -182,3 +182,16 @@ def test_ctrl_c_keeps_what_is_there(threads, monkeypatch):
 def test_starts_are_checked(x0, message):
     with pytest.raises(ArgumentError, match=message):
         simulate_many(systems.ball(), x0, (0.0, 1.0))
+
+
+@pytest.mark.parametrize("count", [1, 7, 37])
+def test_every_start_is_in_one_block(count, monkeypatch):
+    run, starts = many._Runs.run, []
+
+    def recorded(self, block):
+        starts.extend(block)
+        run(self, block)
+
+    monkeypatch.setattr(many._Runs, "run", recorded)
+    simulate_many(OSCILLATOR, STARTS[:count], (0.3, 0.5), executor=1)
+    assert starts == list(range(count))

@@ -113,6 +113,17 @@ def test_more_points_and_a_finer_grid_use_what_is_there(tmp_path):
     assert not CALLS.made
 
 
+def test_what_is_asked_last_is_laid_out_though_nothing_is_computed(tmp_path):
+    sweep(task, GRID, store=tmp_path / "s")
+    CALLS.made = []
+    fewer = sweep(task, {"a": [2.0, 1.0], "b": [0.2]}, store=tmp_path / "s")
+    assert same(fewer, hybrid.open(tmp_path / "s").load())
+    written = (tmp_path / "s" / store.GROUP).stat().st_mtime_ns
+    sweep(task, {"a": [2.0, 1.0], "b": [0.2]}, store=tmp_path / "s")
+    assert (tmp_path / "s" / store.GROUP).stat().st_mtime_ns == written
+    assert not CALLS.made
+
+
 def test_points_that_occur_twice(tmp_path):
     over = {"a": [1.0, 2.0, 1.0], "b": [0.1]}
     for _ in range(2):

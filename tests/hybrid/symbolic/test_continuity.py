@@ -33,6 +33,15 @@ CONTINUOUS = {
     "a truth value as a factor": lambda t, x, p: (x.q > 1) * (x.q - 1),
     "both of two": lambda t, x, p: np.where((x.q > 0) & (x.v > 0), x.q * x.v, 0.0),
     "either of two": lambda t, x, p: np.where((x.q > 0) | (x.v > 0), 0.0, x.q * x.v),
+    "either of two in two ways": lambda t, x, p: (
+        np.where((x.q > 0) | (x.v > 0), 1.0, 0.0) - np.where(x.q > 0, 1.0, np.where(x.v > 0, 1.0, 0.0))
+    ),
+    "both of two in two ways": lambda t, x, p: (
+        np.where((x.q > 0) & (x.v > 0), 1.0, 0.0) - np.where(x.q > 0, np.where(x.v > 0, 1.0, 0.0), 0.0)
+    ),
+    "what is not in two ways": lambda t, x, p: (
+        np.where(~((x.q > 0) & (x.v > 0)), 1.0, 0.0) + np.where((x.q > 0) & (x.v > 0), 1.0, 0.0)
+    ),
     "at one point only": lambda t, x, p: np.where(x.q == 0, 1.0, np.sin(x.q) / x.q),
     "a switch that moves": lambda t, x, p: np.where(x.q > np.sin(t), x.q - np.sin(t), 0.0),
     "a bent switch": lambda t, x, p: np.where(np.sin(x.q) > 0.5, np.sin(x.q), 0.5),

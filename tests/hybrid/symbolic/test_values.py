@@ -8,6 +8,7 @@ import pytest
 
 from hybrid.symbolic.printer import assignments
 from hybrid.symbolic.tracing import TraceError, trace
+from hybrid.symbolic.values import _content
 
 POINTS = [
     np.array([0.75, -0.5, 1.5, 0.25]),
@@ -196,3 +197,20 @@ def test_a_number_is_larger_and_smaller_than_nan(ufunc):
     for x in ((1.0, math.nan), (math.nan, 1.0), (3.0, 1.0), (math.nan, math.nan)):
         wanted = [ufunc(*x), ufunc(x[0], 2.0), ufunc(2.0, x[1])]
         np.testing.assert_array_equal(evaluate(expressions, np.array(x)), wanted)
+
+
+def test_an_array_without_axes_is_its_number():
+    def field(t, x, p):
+        boxed = np.empty((), dtype=object)
+        boxed[()] = x.q
+        assert _content(boxed) == _content(x.q)
+        assert _content(np.array(2.0)) == 2
+        return (x.q,)
+
+    trace(field, ("q",), ())
+
+
+@pytest.mark.parametrize("shape", [(1,), (2,), (1, 1)])
+def test_an_array_with_axes_is_no_number(shape):
+    with pytest.raises(TraceError, match="is not a number"):
+        trace(lambda t, x, p: (_content(np.zeros(shape)),), ("q",), ())

@@ -37,6 +37,22 @@ def test_states_are_drawn_from_their_ranges():
     assert find(chosen, lambda drawn: drawn[0] == 3.0, settings=FAST)[0] == 3.0
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "step"),
+    [(0.0, 2 * np.pi, 1e-5), (3.0, 11 / 3, 1e-6), (-7e5 / 3, 7e5 / 3, 1.0), (0.0, 2e-9 / 3, 1e-15)],
+)
+def test_numbers_have_five_digits_after_the_first_of_half_the_range(low, high, step):
+    strategy = states(BALL_SYSTEM, {"q": (low, high)})
+    middle = 0.5 * (low + high)
+
+    def is_longer(drawn):
+        return drawn[0] != middle and abs(drawn[0] / step - round(drawn[0] / step)) > 1e-3
+
+    with pytest.raises(NoSuchExample):
+        find(strategy, is_longer, settings=FAST)
+    assert find(strategy, lambda drawn: round(drawn[0] / step) % 10 in (3, 7), settings=FAST)
+
+
 def test_parameters_are_drawn_within_a_fifth_of_what_is_declared():
     strategy = parameters(BALL_SYSTEM)
     for name, value in BALL_SYSTEM.parameters.items():
