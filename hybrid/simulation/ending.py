@@ -19,6 +19,7 @@ from hybrid.status import (
     steep_status,
     stuck_status,
 )
+from hybrid.system.functions import guard_function
 from hybrid.system.growth import Unexplored
 
 # The rounding of the time may be worth so many tolerances in one step: it is measured between neighbouring
@@ -26,11 +27,18 @@ from hybrid.system.growth import Unexplored
 MOST_LATENESS = 10.0
 
 
+# What helps where a level runs dry.
+LOWER = (
+    "Lower atol, or write the exponents as 1/2, 1/3, 2/3 or 3/4: with Taylor, such powers have a series "
+    "without this error."
+)
+
+
 def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     _grow(trajectory, code)
     status = _status(trajectory, code)
-    notes = [*_start_beyond(trajectory), *_held(trajectory)]
+    notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory)]
     notes += [*_unproved(trajectory), *_unresolved(trajectory)]
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
@@ -69,6 +77,36 @@ def _held(trajectory: Trajectory) -> Iterator[str]:
             f"Each of the infinitely many jumps of a chatter changes {names}. Such a component has no limit: "
             "it keeps its value after the last jump that was made."
         )
+
+
+def _run_dry(trajectory: Trajectory) -> Iterator[str]:
+    """A note on a level that comes to rest at its guard, where the slope of its field is infinite.
+
+    Steps in time do not know the level below the absolute tolerance, and may take long to lead it to zero.
+    """
+    run, model, emitted = trajectory.run, trajectory.model, trajectory.compiled.emitted
+    atol, system = trajectory.method.atol, trajectory.system
+    if run.last_fired >= 0 and abs(run.last_transversality) <= atol:
+        transition = system.transitions[run.last_fired]
+        mode = system.mode_index(transition.source)
+        if emitted.steep[mode] and model.propagator[mode] == codes.RUNGE_KUTTA:
+            yield (
+                f"The time of transition {transition.name!r} is not known to the tolerances: its guard comes "
+                f"to rest where the slope of {emitted.steep[mode]} is infinite, and below atol its level is "
+                f"not controlled. {LOWER}"
+            )
+    if emitted.steep[run.mode] and model.propagator[run.mode] == codes.RUNGE_KUTTA:
+        for index, transition in enumerate(system.transitions):
+            if transition.source != trajectory.mode or run.on_guard[index] > 0:
+                continue
+            guard = guard_function(transition)
+            [value] = trajectory.compiled.value(guard, index, run.phase, trajectory.x, model.parameters)
+            if abs(value) <= atol:
+                yield (
+                    f"The guard of {transition.name!r} is below atol where the slope of "
+                    f"{emitted.steep[run.mode]} is infinite: whether and when it reached zero is not known "
+                    f"to the tolerances. {LOWER}"
+                )
 
 
 def _unproved(trajectory: Trajectory) -> Iterator[str]:

@@ -5,7 +5,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
+from hybrid import (
+    DOP853,
+    Guard,
+    HybridSystem,
+    Mode,
+    RadauIIA,
+    Reset,
+    StatusCode,
+    Taylor,
+    Transition,
+    Tsit5,
+    simulate,
+)
 from hybrid.kernels.types import codes
 from hybrid.simulation import ending
 
@@ -225,3 +237,53 @@ def test_bare_time_may_have_lost_its_digits(last, period, timed, bare, code, mon
     )
     ending._status(trajectory, code)
     assert asked == [((code, "at the place", "first" if last == 0 else None), {"bare_time": bare})]
+
+
+LAWS = {
+    "number": lambda t, x, p: (-(x.h**0.9),),
+    "parameter": lambda t, x, p: (-(x.h**p.a),),
+    "both sides": lambda t, x, p: (-np.sign(x.h) * np.abs(x.h) ** 0.9,),
+}
+
+
+def tank(law):
+    return HybridSystem(
+        state=("h",),
+        parameters={"a": 0.9},
+        modes=[Mode("drain", law)],
+        transitions=[Transition("drain", None, Guard(lambda t, x, p: x.h, -1), name="empty")],
+    )
+
+
+@pytest.mark.parametrize(
+    "solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=lambda solver: type(solver).__name__
+)
+@pytest.mark.parametrize("law", LAWS)
+def test_a_time_at_which_a_level_runs_dry_is_said_to_be_uncertain(law, solver):
+    """The level ``(1 - t / 10)**10`` is below ``atol`` from t = 9.4 on."""
+    arc = simulate(tank(LAWS[law]), (1.0,), (0.0, 20.0), solver=solver, mode="drain")
+    assert arc.status.code == StatusCode.TERMINAL
+    assert arc.t[-1] == pytest.approx(10.0, abs=0.2)
+    assert "The time of transition 'empty' is not known to the tolerances" in arc.status.message
+    early = simulate(tank(LAWS[law]), (1.0,), (0.0, 9.0), solver=solver, mode="drain")
+    assert early.status.message == "Reached the end."
+    assert early.x[-1, 0] == pytest.approx(1e-10, rel=0.1)
+
+
+def test_a_level_that_never_runs_dry_in_the_run_is_said_to_be_below_the_tolerance():
+    arc = simulate(tank(LAWS["parameter"]), (1.0,), (0.0, 40.0), parameters={"a": 0.95}, mode="drain")
+    assert arc.status.ok
+    assert len(arc.jumps) == 0
+    assert "The guard of 'empty' is below atol where the slope of h**a is infinite" in arc.status.message
+
+
+def test_a_contact_that_is_left_with_a_speed_has_a_certain_time():
+    """The damping has an infinite slope at the surface, which the mass crosses with a speed."""
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("contact", lambda t, x, p: (x.v, -x.q - 0.1 * np.abs(x.q) ** 0.43 * x.v))],
+        transitions=[Transition("contact", None, Guard(lambda t, x, p: x.q, +1))],
+    )
+    arc = simulate(system, (-1.0, 0.0), (0.0, 20.0), solver=DOP853(), mode="contact")
+    assert arc.status.code == StatusCode.TERMINAL
+    assert "not known" not in arc.status.message
