@@ -12,7 +12,7 @@ from hybrid.kernels.events.resolution import MARGIN
 from hybrid.kernels.steps import runge_kutta_guards
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
-from tests.hybrid.kernels.plain import plain
+from tests.hybrid.kernels.plain import plain, run_at_guards
 
 kernels = plain(runge_kutta_guards)
 
@@ -206,18 +206,7 @@ class TestEarliest:
             direction=np.array([9, *given.get("directions", [0] * count)]),
         )
         sides = sides or [1 if each > 0.0 else -1 for each in start]
-        run = SimpleNamespace(
-            mode=1,
-            y=start.copy(),
-            side=np.array([9, *sides]),
-            on_guard=np.array([9, *(on_guard or [0] * count)]),
-            rehearsal=np.full((4, 1 + count), 88),
-            passed=np.full(1 + count, 88.0),
-            last_fired=given.get("fired", -1),
-            since_entry=0.0,
-            grazing_place=0.5,
-            next_grazing=0.6,
-        )
+        run = run_at_guards(start.copy(), sides, on_guard, given.get("fired", -1))
         work = SimpleNamespace(
             path=None,
             new=np.array(given.get("new", coefficients[:, -1])),

@@ -13,7 +13,7 @@ from hybrid.kernels.steps import series_guards
 from hybrid.kernels.steps.series_guards import TAIL_OF_GUARD
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT, NO_TRANSITION, ROOTED, TAYLOR
 from hybrid.kernels.types.layout import EPSILON
-from tests.hybrid.kernels.plain import plain
+from tests.hybrid.kernels.plain import plain, run_at_guards
 
 kernels = plain(series_guards)
 
@@ -210,18 +210,7 @@ class TestEarliest:
             guard_gradient=lambda *given: None,
         )
         sides = sides or [1 if each[0] > 0.0 else -1 for each in guards]
-        run = SimpleNamespace(
-            mode=1,
-            y=np.zeros(1),
-            side=np.array([9, *sides]),
-            on_guard=np.array([9, *(on_guard or [0] * count)]),
-            rehearsal=np.full((4, 1 + count), 88),
-            passed=np.full(1 + count, 88.0),
-            last_fired=given.get("fired", -1),
-            since_entry=0.0,
-            grazing_place=0.5,
-            next_grazing=0.6,
-        )
+        run = run_at_guards(np.zeros(1), sides, on_guard, given.get("fired", -1))
         work = SimpleNamespace(
             series=series,
             gradient=np.zeros(2),
