@@ -56,10 +56,16 @@ def value_on_parallel(model, transition, t, x, s, i, shift, work):
 
 
 @njit(**KERNEL)
+def speed_on_path(model, transition, t, x, s, work):
+    """The speed of a guard at the time ``s`` on the path; its gradient there into ``work.gradient``."""
+    move_along_path(model, x, s, work)
+    return guard_speed(model, transition, t + s, work.state, work.field, work.gradient)
+
+
+@njit(**KERNEL)
 def direction_on_path(model, transition, t, x, s, out, work):
     """The gradient of a guard at the time ``s`` on the path, divided by its speed there, into ``out``."""
-    move_along_path(model, x, s, work)
-    speed = guard_speed(model, transition, t + s, work.state, work.field, work.gradient)
+    speed = speed_on_path(model, transition, t, x, s, work)
     for i in range(model.dimension):
         out[i] = work.gradient[i] / speed
 
@@ -133,13 +139,6 @@ def value_and_noise(model, transition, t, x, s, work):
     for i in range(model.dimension):
         work.state[i] *= 1.0 + (ROUNDING if i % 2 == 0 else -ROUNDING)
     return value, abs(guard_value(model, transition, t + s, work.state, work.scalar) - value)
-
-
-@njit(**KERNEL)
-def speed_on_path(model, transition, t, x, s, work):
-    """The speed of a guard at the time ``s`` on the path."""
-    move_along_path(model, x, s, work)
-    return guard_speed(model, transition, t + s, work.state, work.field, work.gradient)
 
 
 @njit(**KERNEL)
