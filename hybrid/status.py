@@ -63,8 +63,8 @@ NAME_THE_LIMIT = (
     "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
 )
 DECLARE_PERIOD = (
-    "This mode depends on time, and large times are rounded coarsely. If its forcing is periodic, declare "
-    "the period with HybridSystem(period=...): the phase of the forcing then keeps all its digits."
+    "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase of the forcing "
+    "then keeps all its digits."
 )
 SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
 
@@ -90,7 +90,11 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         StatusCode.STEP_TOO_SMALL: (
             f"No step was small enough for the tolerance {where}.",
             "Loosen rtol and atol; if the field is singular or discontinuous there, add a transition."
-            + (f" {DECLARE_PERIOD}" if bare_time else ""),
+            + (
+                f" This mode depends on time, and large times are rounded coarsely. {DECLARE_PERIOD}"
+                if bare_time
+                else ""
+            ),
         ),
         StatusCode.NON_FINITE: (
             f"The field or the state became infinite or nan {where}.",
@@ -166,17 +170,12 @@ def late_status(tolerances: float, *, declared: bool) -> Status:
 
     ``declared`` says that the system has a forcing period.
     """
-    remedy = (
-        "Shift the origin of time, or loosen rtol and atol to what the result needs."
-        if declared
-        else "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase keeps "
-        "all digits. Otherwise shift the origin of time, or loosen rtol and atol to what the result needs."
-    )
+    others = "shift the origin of time, or loosen rtol and atol to what the result needs."
     return Status(
         StatusCode.ROUNDED_TIME,
         "Reached the end, but the time is so large that its rounding changes the field, a guard or a reset: "
         f"up to {tolerances:.2g} times the tolerance in one step or jump.",
-        remedy,
+        others.capitalize() if declared else f"{DECLARE_PERIOD} Otherwise {others}",
     )
 
 

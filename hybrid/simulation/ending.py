@@ -84,29 +84,35 @@ def _run_dry(trajectory: Trajectory) -> Iterator[str]:
 
     Steps in time do not know the level below the absolute tolerance, and may take long to lead it to zero.
     """
-    run, model, emitted = trajectory.run, trajectory.model, trajectory.compiled.emitted
-    atol, system = trajectory.method.atol, trajectory.system
+    run, atol, system = trajectory.run, trajectory.method.atol, trajectory.system
     if run.last_fired >= 0 and abs(run.last_transversality) <= atol:
         transition = system.transitions[run.last_fired]
-        mode = system.mode_index(transition.source)
-        if emitted.steep[mode] and model.propagator[mode] == codes.RUNGE_KUTTA:
+        powers = _steep_in_time(trajectory, system.mode_index(transition.source))
+        if powers:
             yield (
                 f"The time of transition {transition.name!r} is not known to the tolerances: its guard comes "
-                f"to rest where the slope of {emitted.steep[mode]} is infinite, and below atol its level is "
-                f"not controlled. {LOWER}"
+                f"to rest where the slope of {powers} is infinite, and below atol its level is not "
+                f"controlled. {LOWER}"
             )
-    if emitted.steep[run.mode] and model.propagator[run.mode] == codes.RUNGE_KUTTA:
+    powers = _steep_in_time(trajectory, run.mode)
+    if powers:
         for index, transition in enumerate(system.transitions):
             if transition.source != trajectory.mode or run.on_guard[index] > 0:
                 continue
             guard = guard_function(transition)
-            [value] = trajectory.compiled.value(guard, index, run.phase, trajectory.x, model.parameters)
+            parameters = trajectory.model.parameters
+            [value] = trajectory.compiled.value(guard, index, run.phase, trajectory.x, parameters)
             if abs(value) <= atol:
                 yield (
-                    f"The guard of {transition.name!r} is below atol where the slope of "
-                    f"{emitted.steep[run.mode]} is infinite: whether and when it reached zero is not known "
-                    f"to the tolerances. {LOWER}"
+                    f"The guard of {transition.name!r} is below atol where the slope of {powers} is "
+                    f"infinite: whether and when it reached zero is not known to the tolerances. {LOWER}"
                 )
+
+
+def _steep_in_time(trajectory: Trajectory, mode: int) -> str:
+    """The powers with an infinite slope at a guard of a mode that steps in time follow; else nothing."""
+    in_time = trajectory.model.propagator[mode] == codes.RUNGE_KUTTA
+    return trajectory.compiled.emitted.steep[mode] if in_time else ""
 
 
 def _unproved(trajectory: Trajectory) -> Iterator[str]:
