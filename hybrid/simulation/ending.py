@@ -38,7 +38,7 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     _grow(trajectory, code)
     status = _status(trajectory, code)
-    notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory)]
+    notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory, code)]
     notes += [*_unproved(trajectory), *_unresolved(trajectory)]
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
@@ -79,21 +79,14 @@ def _held(trajectory: Trajectory) -> Iterator[str]:
         )
 
 
-def _run_dry(trajectory: Trajectory) -> Iterator[str]:
+def _run_dry(trajectory: Trajectory, code: int) -> Iterator[str]:
     """A note on a level that comes to rest at its guard, where the slope of its field is infinite.
 
     Steps in time do not know the level below the absolute tolerance, and may take long to lead it to zero.
     """
     run, atol, system = trajectory.run, trajectory.method.atol, trajectory.system
-    if run.last_fired >= 0 and abs(run.last_transversality) <= atol:
-        transition = system.transitions[run.last_fired]
-        powers = _steep_in_time(trajectory, system.mode_index(transition.source))
-        if powers:
-            yield (
-                f"The time of transition {transition.name!r} is not known to the tolerances: its guard comes "
-                f"to rest where the slope of {powers} is infinite, and below atol its level is not "
-                f"controlled. {LOWER}"
-            )
+    if run.unknown_time and code != codes.DONE:
+        yield f"{_uncertain(trajectory)} {LOWER}"
     powers = _steep_in_time(trajectory, run.mode)
     if powers:
         for index, transition in enumerate(system.transitions):
@@ -107,6 +100,18 @@ def _run_dry(trajectory: Trajectory) -> Iterator[str]:
                     f"The guard of {transition.name!r} is below atol where the slope of {powers} is "
                     f"infinite: whether and when it reached zero is not known to the tolerances. {LOWER}"
                 )
+
+
+def _uncertain(trajectory: Trajectory) -> str:
+    """What is not known of the time at which a level ran dry."""
+    run, system = trajectory.run, trajectory.system
+    transition = system.transitions[run.ran_dry]
+    powers = _steep_in_time(trajectory, system.mode_index(transition.source))
+    return (
+        f"The time of transition {transition.name!r} may be off by {run.unknown_time:.1g}: its guard comes "
+        f"to rest where the slope of {powers} is infinite, and steps in time do not control its level below "
+        "the tolerances."
+    )
 
 
 def _steep_in_time(trajectory: Trajectory, mode: int) -> str:
@@ -184,6 +189,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
+    if code == codes.DONE and run.unknown_time:
+        return Status(StatusCode.INFINITE_SLOPE, f"Reached the end. {_uncertain(trajectory)}", LOWER)
     if code == codes.DONE and run.lateness > MOST_LATENESS:
         return late_status(run.lateness, declared=trajectory.model.period > 0.0)
     if code == codes.DONE and ambiguous:

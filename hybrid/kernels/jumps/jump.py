@@ -33,7 +33,7 @@ from hybrid.kernels.jumps.locked import (
 )
 from hybrid.kernels.jumps.record import remember_jump
 from hybrid.kernels.jumps.rounds import remember_visit, slot_of
-from hybrid.kernels.jumps.steep import is_steep, is_steep_behind
+from hybrid.kernels.jumps.steep import is_steep, is_steep_behind, keep_unknown_time
 from hybrid.kernels.types.codes import (
     ENTERING,
     GRAZING,
@@ -263,6 +263,8 @@ def jump(task, transition):
     # A locked jump inherits the grazing flag of the jump that triggered it.
     kind = run.last_kind if locked else TRANSVERSE
     steep = tangents > 0 and not locked and is_steep(model, method, run, transition, tangents, work)
+    if not locked:
+        keep_unknown_time(model, method, run, transition, work)
     if locked:
         recall_map(model, run, tangents, work)
         target = model.target[transition]

@@ -10,7 +10,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import change_of_rate
-from hybrid.kernels.events.guards import displace, gradient_band, guard_speed
+from hybrid.kernels.events.guards import displace, error_band, gradient_band, guard_speed
 from hybrid.kernels.types.codes import RUNGE_KUTTA
 from hybrid.kernels.types.options import KERNEL
 
@@ -18,6 +18,10 @@ from hybrid.kernels.types.options import KERNEL
 FARTHER = 16.0
 # A slope that is larger at the guard by this factor grows without limit.
 GROWS = 1.02
+# A guard comes to rest if its speed is lower by this factor than where the tolerances cease to know it.
+SLOWS = 0.5
+# The time of a jump may be off by this many times ``rtol``, as a share of the time spent in the mode.
+MOST_UNKNOWN = 100.0
 
 
 @njit(**KERNEL)
@@ -76,3 +80,43 @@ def is_steep_behind(model, method, run, fired, tangents, work):
         ):
             return True
     return False
+
+
+@njit(**KERNEL)
+def time_to_run_dry(model, method, run, transition, side, speed, work):
+    """How long the guard needs from where the tolerances cease to know it; 0 if it is crossed at a speed.
+
+    A guard ``h`` that comes to rest as ``h' = -c h**q`` takes the time ``h / ((1 - q) c h**q)``. ``speed`` is
+    that at the guard, and ``work.gradient`` its gradient there.
+    """
+    t, level = run.phase, error_band(method, run, work.gradient, model.dimension)
+    displace(model, run.y, side * level, work.gradient, work.state)
+    model.field(run.mode, t, work.state, model.parameters, work.field)
+    near = abs(guard_speed(model, transition, t, work.state, work.field, work.trial))
+    if not abs(speed) < SLOWS * near:
+        return 0.0
+    displace(model, run.y, side * FARTHER * level, work.gradient, work.state)
+    model.field(run.mode, t, work.state, model.parameters, work.field)
+    far = abs(guard_speed(model, transition, t, work.state, work.field, work.trial))
+    exponent = math.log(far / near) / math.log(FARTHER)
+    return level / near / (1.0 - exponent) if exponent < 1.0 else math.inf
+
+
+@njit(**KERNEL)
+def keep_unknown_time(model, method, run, transition, work):
+    """Keep how far the time of the pending jump may be off if its guard comes to rest in steps in time.
+
+    Such steps do not control the level below the tolerances, and it may take long to run out.
+    """
+    mode, t, direction = run.mode, run.phase, model.direction[transition]
+    if model.steep[mode] == 0 or model.propagator[mode] != RUNGE_KUTTA:
+        return
+    for side in (-1, 1):
+        if side == direction:
+            continue
+        model.field(mode, t, run.y, model.parameters, work.field)
+        speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+        unknown = time_to_run_dry(model, method, run, transition, float(side), speed, work)
+        if unknown > max(run.unknown_time, MOST_UNKNOWN * method.rtol * run.since_entry):
+            run.unknown_time = unknown
+            run.ran_dry = transition

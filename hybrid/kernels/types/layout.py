@@ -194,6 +194,7 @@ COUNTERS = (
     "calm_cycle",
     "calm_wait",
     "steep_jumps",
+    "ran_dry",
     "field_jumps",
     "jumped_in",
 )
@@ -222,6 +223,7 @@ NUMBERS = (
     "horizon",
     "lateness",
     "longest_step",
+    "unknown_time",
 )
 
 
@@ -242,6 +244,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
       the time made in a step or jump, in tolerances.
+    - ``unknown_time``: the largest error that the time of a jump may have where a guard came to rest, and the
+      transition ``ran_dry`` there; 0 if the tolerances cover it.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent

@@ -1,5 +1,6 @@
 """The status reports the effect of a grazing on tangent vectors."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -174,7 +175,7 @@ def finished(tangents=2, period=0.0, **changes):
     return SimpleNamespace(
         tangents=tangents,
         jumps=9,
-        run=SimpleNamespace(**(counted | {"lateness": 0.0} | changes)),
+        run=SimpleNamespace(**(counted | {"lateness": 0.0, "unknown_time": 0.0} | changes)),
         model=SimpleNamespace(period=period),
         compiled=SimpleNamespace(emitted=emitted),
         system=SimpleNamespace(mode_names=("a", "b")),
@@ -244,37 +245,71 @@ LAWS = {
     "parameter": lambda t, x, p: (-(x.h**p.a),),
     "both sides": lambda t, x, p: (-np.sign(x.h) * np.abs(x.h) ** 0.9,),
 }
+SOLVERS = [Taylor(), DOP853(), Tsit5(), RadauIIA()]
 
 
-def tank(law):
+def tank(law, after=None):
+    """A tank that runs dry; then the run ends, or goes on in the mode ``after``."""
     return HybridSystem(
         state=("h",),
         parameters={"a": 0.9},
-        modes=[Mode("drain", law)],
-        transitions=[Transition("drain", None, Guard(lambda t, x, p: x.h, -1), name="empty")],
+        modes=[Mode("drain", law), *([Mode(after, lambda t, x, p: (0.0,))] if after else [])],
+        transitions=[Transition("drain", after, Guard(lambda t, x, p: x.h, -1), name="dry")],
     )
 
 
-@pytest.mark.parametrize(
-    "solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=lambda solver: type(solver).__name__
-)
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
 @pytest.mark.parametrize("law", LAWS)
 def test_a_time_at_which_a_level_runs_dry_is_said_to_be_uncertain(law, solver):
-    """The level ``(1 - t / 10)**10`` is below ``atol`` from t = 9.4 on."""
-    arc = simulate(tank(LAWS[law]), (1.0,), (0.0, 20.0), solver=solver, mode="drain")
-    assert arc.status.code == StatusCode.TERMINAL
-    assert arc.t[-1] == pytest.approx(10.0, abs=0.2)
-    assert "The time of transition 'empty' is not known to the tolerances" in arc.status.message
+    """The level ``(1 - t / 10)**10`` is below ``atol = 1e-12`` for the last 10 * 10**-1.2 = 0.63."""
+    ended = simulate(tank(LAWS[law]), (1.0,), (0.0, 20.0), solver=solver, mode="drain")
+    assert ended.status.code == StatusCode.TERMINAL
+    assert ended.t[-1] == pytest.approx(10.0, abs=0.2)
+    assert "The time of transition 'dry' may be off by 0.6" in ended.status.message
+    went_on = simulate(tank(LAWS[law], "empty"), (1.0,), (0.0, 20.0), solver=solver, mode="drain")
+    assert went_on.status.code == StatusCode.INFINITE_SLOPE
+    assert "may be off by 0.6" in went_on.status.message
     early = simulate(tank(LAWS[law]), (1.0,), (0.0, 9.0), solver=solver, mode="drain")
     assert early.status.message == "Reached the end."
     assert early.x[-1, 0] == pytest.approx(1e-10, rel=0.1)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)
+@pytest.mark.parametrize("power", [0.25, 1 / 3, 0.45, 0.5, 0.6, 0.7, 0.8])
+def test_no_level_runs_dry_at_another_time_with_success(power, solver):
+    """The level is empty at ``1 / (1 - power)``; two units later it is filled and runs dry once more."""
+    system = HybridSystem(
+        state=("h", "since"),
+        parameters={"a": power},
+        modes=[
+            Mode("drain", lambda t, x, p: (-(x.h**p.a), 0.0)),
+            Mode("empty", lambda t, x, p: (0.0, 1.0)),
+        ],
+        transitions=[
+            Transition("drain", "empty", Guard(lambda t, x, p: x.h, -1), Reset(lambda t, x, p: (0.0, 0.0))),
+            Transition(
+                "empty", "drain", Guard(lambda t, x, p: x.since - 2.0, +1), Reset(lambda t, x, p: (1.0, 0.0))
+            ),
+        ],
+    )
+    arc = simulate(system, (1.0, 0.0), (0.0, 20.0), solver=solver, mode="drain")
+    needed = 1.0 / (1.0 - power)
+    true = np.cumsum([needed, 2.0] * 8)[: len(arc.jumps)]
+    error = np.max(np.abs(arc.jumps.t - true))
+    assert len(arc.jumps) >= 5
+    if arc.status.ok:
+        assert error < 1e-7
+    else:
+        assert arc.status.code == StatusCode.INFINITE_SLOPE
+        said = float(re.search(r"may be off by (\S+):", arc.status.message)[1])
+        assert error < 10.0 * said
 
 
 def test_a_level_that_never_runs_dry_in_the_run_is_said_to_be_below_the_tolerance():
     arc = simulate(tank(LAWS["parameter"]), (1.0,), (0.0, 40.0), parameters={"a": 0.95}, mode="drain")
     assert arc.status.ok
     assert len(arc.jumps) == 0
-    assert "The guard of 'empty' is below atol where the slope of h**a is infinite" in arc.status.message
+    assert "The guard of 'dry' is below atol where the slope of h**a is infinite" in arc.status.message
 
 
 def test_a_contact_that_is_left_with_a_speed_has_a_certain_time():

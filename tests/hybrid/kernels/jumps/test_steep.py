@@ -125,3 +125,74 @@ def test_the_way_from_a_guard_is_that_of_the_transition_on_it():
     assert not world.kernels.is_steep_behind(world.model, world.method, world.run, 1, 1, world.work)
     world = World(lambda z: 1e20)
     assert not world.kernels.is_steep_behind(world.model, world.method, world.run, 1, 1, world.work)
+
+
+class Draining:
+    """A level that is emptied at the rate ``wide * abs(level)**power``; its guard is twice the level."""
+
+    LEVEL = 1e-12
+
+    def __init__(self, power, *, direction=-1, steep_mode=1, propagator=RUNGE_KUTTA, at=0.0, since=1.0):
+        def field(mode, t, x, parameters, out):
+            assert mode == 1
+            out[0] = -3.0 * abs(x[0]) ** power
+
+        def guard_speed(model, transition, t, x, field, gradient):
+            assert transition == 2
+            gradient[0] = 2.0
+            return 2.0 * field[0]
+
+        def displace(model, x, distance, gradient, out):
+            assert gradient[0] == 2.0
+            out[0] = x[0] + distance / 2.0
+
+        kernels = plain(
+            steep,
+            guard_speed=guard_speed,
+            displace=displace,
+            error_band=lambda method, run, gradient, n: gradient[0] * self.LEVEL,
+        )
+        model = SimpleNamespace(
+            dimension=1,
+            parameters=None,
+            steep=np.array([0, steep_mode]),
+            propagator=np.array([RUNGE_KUTTA, propagator]),
+            field=field,
+            direction=np.array([1, 1, direction]),
+        )
+        self.run = SimpleNamespace(
+            phase=0.0, mode=1, y=np.array([at]), since_entry=since, unknown_time=0.0, ran_dry=0
+        )
+        work = SimpleNamespace(**{name: np.zeros(1) for name in ("field", "gradient", "state", "trial")})
+        self.ask = lambda: kernels.keep_unknown_time(model, SimpleNamespace(rtol=1e-10), self.run, 2, work)
+        self.ask()
+
+
+@pytest.mark.parametrize("power", [0.4, 0.5, 0.9])
+@pytest.mark.parametrize("direction", [-1, 0])
+def test_a_level_takes_its_time_to_run_dry(power, direction):
+    """From the level ``z`` on it takes ``z**(1 - power) / (3 (1 - power))``."""
+    run = Draining(power, direction=direction).run
+    assert run.unknown_time == pytest.approx(1e-12 ** (1.0 - power) / 3.0 / (1.0 - power), rel=1e-9)
+    assert run.ran_dry == 2
+
+
+def test_a_level_that_does_not_run_dry_would_take_for_ever():
+    assert Draining(1.5).run.unknown_time == np.inf
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"steep_mode": 0}, {"propagator": EXACT}, {"since": 1e4}, {"at": 1e-9}, {"power": 0.0}],
+    ids=str,
+)
+def test_other_arrivals_are_known(other):
+    """No slope that is infinite, a series, a time that is known well enough, or a guard with a speed."""
+    assert Draining(**({"power": 0.5} | other)).run.unknown_time == 0.0
+
+
+def test_the_largest_uncertainty_is_kept():
+    tank = Draining(0.5)
+    tank.run.unknown_time, tank.run.ran_dry = 1.0, 1
+    tank.ask()
+    assert (tank.run.unknown_time, tank.run.ran_dry) == (1.0, 1)
