@@ -44,19 +44,24 @@ def keep_change(run, transition, side):
     """Note a guard's ``side`` at the end of a step on which it has no crossing that fires.
 
     An event of another guard may end the step before. Where rounding hides the guard there, its side is that
-    from the start of the step.
+    from the start of the step if the event is closer to the change of sides than to the end of the step.
     """
-    run.side[transition], run.passed[transition] = side, NO_ROOT
+    run.side[transition] = side
     before = run.rehearsal[0, transition]
+    if side != before and before != 0 and run.passed[transition] < NO_ROOT:
+        run.rehearsal[3, transition] = side
+        run.passed[transition] = 0.5 * (run.passed[transition] + 1.0)
+        return
+    run.passed[transition] = NO_ROOT
     if side != before:
         run.rehearsal[3, transition] = before if before != 0 else NOT_KNOWN
 
 
 @njit(**KERNEL)
 def keep_passage(run, transition, direction, coefficients, degree, side, hidden, stack):
-    """Note where a polynomial that crosses in its ``direction`` on a step has changed sides before that.
+    """Note where a polynomial on a step has changed sides before it crosses in its ``direction``, if it does.
 
-    It has if it starts on the ``side`` to which it crosses; zero if that is not known. Its Bernstein
+    It may have if it starts on the ``side`` to which it crosses; zero if that is not known. Its Bernstein
     coefficients are those on the step beyond the share ``hidden``.
     """
     if direction == 0 or side == -direction:

@@ -168,7 +168,7 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
                 continue
             direction, before = model.direction[transition], side
             theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
-            if theta != NO_ROOT:
+            if theta != NO_ROOT or side != before:
                 keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
             if on_guard == BY_STEP:
                 theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0

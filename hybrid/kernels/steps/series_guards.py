@@ -368,7 +368,7 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
             ):
                 blurred = transition
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, known, h, start * h, end * h, *ends) / h
+            theta = root_between(series, column, order, known, h, start * h, end * h, *ends, side) / h
             run.rehearsal[3, transition] = side
             if theta < earliest:
                 earliest, fired = theta, transition
@@ -381,8 +381,8 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
         theta, end, row, side = bracket_crossing(work.polynomial, degree, side, direction, work.stack)
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, known, h, theta * h, end * h, *ends) / h
-        if theta != NO_ROOT:
+            theta = root_between(series, column, order, known, h, theta * h, end * h, *ends, -side) / h
+        if theta != NO_ROOT or side != before:
             keep_passage(run, transition, direction, work.polynomial, degree, before, 0.0, work.stack)
         note_touches(run, transition, degree, known, 0.0, theta, band, work)
         if underflows_on_series(series, column, order):

@@ -69,14 +69,15 @@ def time_of(series, clock, order, h, span):
 
 
 @njit(**KERNEL)
-def root_between(series, column, order, known_roots, h, low, high, left, right):
-    """The one root of a series in an open interval of the step ``h``.
+def root_between(series, column, order, known_roots, h, low, high, left, right, side):
+    """The one root of a series in an open interval of the step ``h``; the sign before it is ``side``.
 
-    ``left`` and ``right`` are the values at its ends, up to a positive factor. The series is divided by its
-    variable for each known root at 0; in the end it is taken as it is, which at 0 is zero up to rounding
-    only; but not to a root at 0, where the step begins.
+    ``left`` and ``right`` are the values at its ends, up to a positive factor. Another root may be at an end:
+    then they are zero, or have any sign. The series is divided by its variable for each known root at 0; in
+    the end it is taken as it is, which at 0 is zero up to rounding only; but not to a root at 0, where the
+    step begins.
     """
-    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right)
+    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right, side)
     for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
         value, slope, _ = expanded_at(series, column, 0, order, s)
         shift = -value / slope if slope != 0.0 else 0.0
@@ -89,7 +90,7 @@ def root_between(series, column, order, known_roots, h, low, high, left, right):
 
 
 @njit(**INLINE)
-def simple_root_of(series, column, order, known_roots, h, low, high, left, right):
+def simple_root_of(series, column, order, known_roots, h, low, high, left, right, side):
     """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
 
     The error after a step of Halley's is about the cube of the step, over the square of the length on which
@@ -101,7 +102,7 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
         s = 0.5 * (low + high)
     for _ in range(100):
         value, slope, bend = expanded_at(series, column, known_roots, order, s)
-        turned = slope * left > 0.0
+        turned = slope * side > 0.0
         if turned:
             # Another root, at an end of the bracket up to rounding, attracts from here.
             slope = 0.0
@@ -110,7 +111,7 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
         if turned and not first < s < final:
             # So close to that root, rounding may have made the sign of the value.
             pass
-        elif (value > 0.0) == (left > 0.0):
+        elif (value > 0.0) == (side > 0):
             low = s
         else:
             high = s

@@ -63,21 +63,64 @@ def crossings(factor, roots, direction):
     return sum(direction in (0, side) for side in after)
 
 
+def check_counts(directions, modes, solver, guards):
+    """Each guard, given by its factor and roots, fires as often as it crosses in its direction."""
+    values = np.zeros((GUARDS, DEGREE + 1))
+    for row, (factor, roots) in zip(values, guards, strict=True):
+        coefficients = factor * Polynomial.fromroots(roots).coef
+        row[: len(coefficients)] = coefficients
+    system = counters(directions, modes)
+    parameters = dict(zip(system.parameters, values.ravel(), strict=True))
+    start = np.zeros(DEGREE + GUARDS)
+    arc = simulate(system, start, (0.0, END), mode="mode 0", parameters=parameters, solver=solver)
+    expected = [crossings(*guard, direction) for guard, direction in zip(guards, directions, strict=True)]
+    assert list(arc.x[-1, DEGREE:]) == expected, (guards, arc.jumps.t)
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", SOLVERS)
 @pytest.mark.parametrize("modes", [1, 2])
 @pytest.mark.parametrize("directions", [(1, -1, 0), (-1, 1, 1)])
 def test_each_crossing_in_its_direction_fires_once(directions, modes, name, seed):
     """No event of another guard loses or invents one, wherever on the step the guard changes sides."""
-    rng, system = np.random.default_rng([seed, modes]), counters(directions, modes)
+    rng = np.random.default_rng([seed, modes])
     for _ in range(20):
-        guards = list(polynomials(rng))
-        values = np.zeros((GUARDS, DEGREE + 1))
-        for row, (factor, roots) in zip(values, guards, strict=True):
-            coefficients = factor * Polynomial.fromroots(roots).coef
-            row[: len(coefficients)] = coefficients
-        parameters = dict(zip(system.parameters, values.ravel(), strict=True))
-        start = np.zeros(DEGREE + GUARDS)
-        arc = simulate(system, start, (0.0, END), mode="mode 0", parameters=parameters, solver=SOLVERS[name])
-        expected = [crossings(*guard, direction) for guard, direction in zip(guards, directions, strict=True)]
-        assert list(arc.x[-1, DEGREE:]) == expected, (guards, arc.jumps.t)
+        check_counts(directions, modes, SOLVERS[name], list(polynomials(rng)))
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize(
+    ("directions", "guards"),
+    [
+        (
+            (1, -1, 0),
+            [
+                (49.498732476807355, [0.1249999999999991, 0.5, 0.5717452656337997, 1.125]),
+                (-0.5590232390316666, [0.5000000000000001, 1.125, 1.374999999997059, 1.422284663525155]),
+                (0.4170181533173318, [0.4999999999999988, 1.3750000000028224, 1.452592799881338]),
+            ],
+        ),
+        (
+            (-1, 0, 1),
+            [
+                (0.019641672213876672, [0.12500000001516956, 0.3749999999993476, 0.4140642716352075]),
+                (0.0281664, [0.12499999999999935, 0.3749999999999961, 0.875, 1.5, 1.5398546975898608]),
+                (1.0781525512178856, [0.8749999999999986, 0.9353674177717171, 1.4999999999999998]),
+            ],
+        ),
+    ],
+)
+def test_a_guard_that_has_passed_unheard_on_a_step_crosses_at_its_end(directions, guards, name):
+    """The first guard falls on the step, which does not fire, and rises where another ends the step."""
+    check_counts(directions, 2, SOLVERS[name], guards)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+@pytest.mark.parametrize("factor", [0.013, 9.53, 10.2, 43.7])
+@pytest.mark.parametrize("place", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("apart", [0.028, 0.0494, 0.0623, 0.091])
+def test_a_crossing_behind_one_where_the_step_is_halved(place, apart, factor, name):
+    """Both guards pass at the place; the one whose direction that is not fires at its later root."""
+    near, far = (place, place + apart), (place - apart, place)
+    guards = [(factor, near), (-factor, near), (factor, far)]
+    check_counts((1, -1, 0), 1, SOLVERS[name], guards)

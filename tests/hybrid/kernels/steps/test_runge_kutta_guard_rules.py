@@ -248,11 +248,12 @@ class TestEarliest:
                 found = self.earliest(guard, directions=[way * direction])
                 if direction == 1:
                     assert found == self.NONE
-                    assert self.run.side[1] == -way
+                    # An event on the last half of the rest of the step finds it on the other side.
+                    assert self.run.side[1] == self.run.rehearsal[3, 1] == -way
+                    assert self.run.passed[1] == pytest.approx(0.5 + 0.5 * root, rel=1e-13)
                 else:
                     assert found == (pytest.approx(root, rel=1e-13), 1, 1.0, NO_TRANSITION)
-                    assert self.run.side[1] == way
-                assert self.run.rehearsal[3, 1] == way
+                    assert self.run.side[1] == self.run.rehearsal[3, 1] == way
                 assert self.run.rehearsal[0, 1] == way
                 assert self.run.rehearsal[1, 1] == 0
 

@@ -243,8 +243,9 @@ class TestEarliest:
                 )
                 if direction == 1:
                     assert found == self.NONE
-                    assert self.run.side[1] == -way
-                    assert self.run.rehearsal[3, 1] == way
+                    # An event on the last half of the rest of the step finds it on the other side.
+                    assert self.run.side[1] == self.run.rehearsal[3, 1] == -way
+                    assert self.run.passed[1] == pytest.approx(0.5 + root / 4.0, rel=1e-14)
                 else:
                     assert found == (pytest.approx(root / 2.0, rel=1e-14), 1, 1.0, NO_TRANSITION)
                     assert self.run.side[1] == way
