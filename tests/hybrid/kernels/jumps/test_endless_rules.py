@@ -29,7 +29,7 @@ def system(guard=None, condition=None, reset=None, field=None, *, outgoing=(1,),
         out[:] = reset(transition, x) if reset else (x[0], -x[1], x[2] + 1.0)
 
     def write_field(mode, t, x, parameters, out):
-        assert t == T
+        assert (mode in (4, 5), t) == (True, T)
         out[:] = field(mode, x) if field else (x[1], -x[0], 0.0)
 
     model = SimpleNamespace(
@@ -113,6 +113,10 @@ class TestIsRead:
         assert self.read(at_once, condition=lambda x: x[2] < beyond)
         assert self.read(at_once, condition=lambda x: x[2] > beyond)
 
+    @pytest.mark.parametrize("count", [11.0, 12.0, 18.0, 26.0, LAST])
+    def test_by_a_condition_on_a_single_count(self, count):
+        assert self.read(condition=lambda x: x[2] != count)
+
     def test_by_nothing_that_it_does_not_reach(self):
         assert not self.read(guard=lambda transition, x: x[0] + (x[2] > self.LAST))
         assert not self.read(condition=lambda x: x[2] <= self.LAST)
@@ -153,6 +157,10 @@ class TestCountsToGuard:
         assert not self.crosses(lambda count: way * (count - 9.0))
         # One that is zero already has its side from elsewhere.
         assert not self.crosses(lambda count: way * (count - 10.0))
+
+    @pytest.mark.parametrize("count", [11.0, 12.0, 18.0, 26.0])
+    def test_a_guard_that_is_crossed_at_a_single_count(self, count):
+        assert self.crosses(lambda found: -1.0 if found == count else 1.0)
 
     def test_a_guard_that_is_no_number_counts_as_crossed(self):
         assert self.crosses(lambda count: 1.0 if count < 12.0 else np.nan)
