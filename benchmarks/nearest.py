@@ -190,6 +190,7 @@ NEAREST = {
         "kernels/jumps/test_chatter_tangents.py",
     ),
     "hybrid/kernels/jumps/skipped.py": ("kernels/jumps/test_chatter.py",),
+    "hybrid/kernels/jumps/slower.py": ("kernels/jumps/test_slower_rules.py",),
     "hybrid/kernels/jumps/steep.py": ("simulation/test_infinite_slopes.py",),
     "hybrid/kernels/steps/dense.py": (
         "simulation/test_arc.py",

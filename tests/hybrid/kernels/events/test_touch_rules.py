@@ -164,15 +164,17 @@ class TestNoteTouches:
         assert self.touches(bernstein(1.0, 1.0, 1.0, factor=way)) == []
 
     @BOTH
-    def test_a_turn_at_the_end_may_lie_beyond_zero_by_rounding(self, way):
-        """The largest coefficient is 1: rounding is 16 units in its last place."""
-        for units, touches_it in ((-15.0, True), (-17.0, False)):
-            ended = bernstein(1.0, 1.0, factor=way, rest=units * EPSILON)
-            ended[0], ended[-2:] = way, [units * EPSILON * way] * 2
-            found = self.touches(ended)
-            assert bool(found) == touches_it
-            if touches_it:
-                assert found[-1] == (1.0, units * EPSILON * way)
+    @pytest.mark.parametrize("size", [2.0**-20, 1.0, 2.0**20])
+    def test_a_turn_at_the_end_may_lie_beyond_zero_by_rounding(self, size, way):
+        """That is 16 units in the last place of the largest coefficient."""
+        for units, expected in ((-15.0, True), (-17.0, False)):
+            last = units * EPSILON * size * way
+            ended = bernstein(1.0, 1.0, factor=way * size)
+            ended[0], ended[-2:] = way * size, [last, last]
+            found = self.touches(ended, band=1e-5 * size)
+            assert bool(found) == expected
+            if expected:
+                assert found[-1] == (1.0, last)
 
 
 class TestRemember:
