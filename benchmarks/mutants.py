@@ -117,11 +117,14 @@ def _changes(node: ast.AST) -> list[Callable[[ast.AST], None]]:
 
 
 def nearest_tests(path: Path) -> list[str]:
-    """Test files with the name of the module, or that import it, or of modules that import it."""
+    """Test files with the name of the module, or that import it, or of modules that import it.
+
+    The fastest come first, so that slow ones do not use up the limit of time before those are run.
+    """
     if str(path) in NEAREST:
         own = [str(p.relative_to(ROOT)) for p in _of_the_same_name(path)]
         others = [(Path("tests/hybrid") / name).as_posix() for name in NEAREST[str(path)]]
-        return list(dict.fromkeys([*own, *map(os.path.normpath, others)]))
+        return sorted(dict.fromkeys([*own, *map(os.path.normpath, others)]), key=_compiled)
     tests = _own_tests(path)
     if not tests:
         module = re.compile(rf"\b{re.escape('.'.join(path.with_suffix('').parts))}\b")
@@ -129,7 +132,15 @@ def nearest_tests(path: Path) -> list[str]:
             for other in sorted((ROOT / folder).rglob("*.py")):
                 if module.search(other.read_text(encoding="utf-8")):
                     tests += _own_tests(other.relative_to(ROOT))
-    return list(dict.fromkeys(tests))[:MOST_TESTS]
+    return sorted(list(dict.fromkeys(tests))[:MOST_TESTS], key=_compiled)
+
+
+def _compiled(test: str) -> int:
+    """How much machine code a test file needs: 0 if it runs kernels as Python, 1 if it also runs models."""
+    text = (ROOT / test).read_text(encoding="utf-8")
+    if "tests.hybrid.kernels.plain" not in text:
+        return 2
+    return 1 if re.search(r"^(from|import) hybrid\b(?!\.)", text, re.MULTILINE) else 0
 
 
 def _of_the_same_name(path: Path) -> list[Path]:

@@ -94,6 +94,7 @@ NEAREST = {
         "kernels/events/test_refused.py",
     ),
     "hybrid/kernels/events/derivatives.py": (
+        "kernels/events/test_derivative_rules.py",
         "kernels/events/test_guards.py",
         "kernels/events/test_curvature.py",
         "kernels/events/test_rounding_of_slopes.py",
@@ -115,6 +116,7 @@ NEAREST = {
         "kernels/jumps/test_instant_rules.py",
     ),
     "hybrid/kernels/events/onset.py": (
+        "kernels/events/test_onset_rules.py",
         "kernels/events/test_onset.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
@@ -125,7 +127,10 @@ NEAREST = {
         "kernels/events/test_sampled.py",
         "kernels/steps/test_series.py",
     ),
-    "hybrid/kernels/events/resolution.py": ("kernels/events/test_touches.py",),
+    "hybrid/kernels/events/resolution.py": (
+        "kernels/events/test_resolution_rules.py",
+        "kernels/events/test_touches.py",
+    ),
     "hybrid/kernels/events/sampled.py": (
         "kernels/events/test_forms.py",
         "kernels/events/test_jumps_and_gaps.py",
@@ -140,7 +145,11 @@ NEAREST = {
         "kernels/events/test_condition.py",
         "kernels/events/test_curvature.py",
     ),
-    "hybrid/kernels/events/touches.py": ("kernels/events/test_grazing.py",),
+    "hybrid/kernels/events/sections.py": ("orbits/test_sections.py",),
+    "hybrid/kernels/events/touches.py": (
+        "kernels/events/test_touch_rules.py",
+        "kernels/events/test_grazing.py",
+    ),
     "hybrid/kernels/jumps/chatter.py": (
         "kernels/jumps/test_chatter_rules.py",
         "kernels/jumps/test_chatter_matrix.py",
@@ -160,6 +169,7 @@ NEAREST = {
         "kernels/jumps/test_rounds.py",
         "kernels/jumps/test_skipped.py",
     ),
+    "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless_rules.py",),
     "hybrid/kernels/jumps/jump.py": (
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
@@ -175,10 +185,12 @@ NEAREST = {
     ),
     "hybrid/kernels/jumps/record.py": ("simulation/test_saltation.py", "kernels/jumps/test_locked.py"),
     "hybrid/kernels/jumps/rounds.py": (
+        "kernels/jumps/test_round_rules.py",
         "kernels/jumps/test_chatter.py",
         "kernels/jumps/test_chatter_tangents.py",
     ),
     "hybrid/kernels/jumps/skipped.py": ("kernels/jumps/test_chatter.py",),
+    "hybrid/kernels/jumps/slower.py": ("kernels/jumps/test_slower_rules.py",),
     "hybrid/kernels/jumps/steep.py": ("simulation/test_infinite_slopes.py",),
     "hybrid/kernels/steps/dense.py": (
         "simulation/test_arc.py",
@@ -233,7 +245,11 @@ NEAREST = {
         "kernels/events/test_crossings.py",
         "simulation/test_infinite_slopes.py",
     ),
-    "hybrid/kernels/steps/step.py": ("accuracy/test_order.py", "simulation/test_simulate.py"),
+    "hybrid/kernels/steps/step.py": (
+        "kernels/steps/test_step_rules.py",
+        "accuracy/test_order.py",
+        "simulation/test_simulate.py",
+    ),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
     "hybrid/orbits/periodic_orbit.py": ("orbits/test_objections.py", "orbits/test_newton.py"),

@@ -9,11 +9,15 @@ from hybrid.kernels.events import many
 from hybrid.kernels.types.codes import (
     BEYOND,
     DESINGULARISED,
+    DONE,
     EXACT,
+    GO_ON,
     LEAVES,
+    MAX_STEPS,
     NO_MODE,
     NO_OBJECTION,
     NO_TRANSITION,
+    REFUSED,
     ROOTED,
     RUNGE_KUTTA,
     TAYLOR,
@@ -94,3 +98,118 @@ def test_what_there_is_to_tell(note):
     kernels = plain(many)
     assert bool(kernels.is_plain(run, np.array([NO_OBJECTION, LEAVES]))) is (note is None)
     assert not kernels.is_plain(run, np.array([BEYOND, LEAVES]))
+
+
+class TestManyRuns:
+    """Clocks that count up from their origin, one step per unit; their jumps are their whole tens."""
+
+    TIMES = (2, 3, 7)
+
+    def begin(self, *origins, refused=(), told=()):
+        """Memory for runs from ``origins``; those ``refused`` cannot start, those ``told`` have a note."""
+        count = len(origins)
+        self.origins = np.array([[each, -each] for each in origins], dtype=float)
+        self.refused, self.told = refused, told
+        notes = dict.fromkeys(("unproved", "unresolved", "coarse", "order_mattered"), 0)
+        self.run = SimpleNamespace(y=np.zeros(2), scale=np.zeros(2), mode=-1, jumps=0, steps=0, **notes)
+        self.run_words, self.work_words = np.array([7, 7]), np.array([7, 7, 7])
+        self.states = np.full((count, len(self.TIMES), 2), np.nan)
+        self.places = np.full((count, 3), 99)
+        self.reached, self.steps = np.array([99]), 0
+        return self
+
+    def set_words(self, words, fresh):
+        words[:] = fresh
+        self.run.steps = self.run.unproved = 0
+
+    def advance(self, parts, task, cycle, phase, most, max_jumps):
+        run = task.run
+        assert (parts, max_jumps, phase) == ("parts", 50, 0.5 * cycle)
+        # The memory is fresh where a run starts.
+        assert (self.run_words.tolist(), self.work_words.tolist()) == ([1, 2], [3, 4, 5])
+        while run.steps < cycle:
+            if run.steps == most:
+                return MAX_STEPS
+            run.steps += 1
+            run.y += 1.0
+            self.steps += 1
+        run.jumps = int(run.y[0]) // 10
+        run.unproved = int(int(run.y[0]) - cycle in self.told)
+        return DONE
+
+    def call(self, begin=0, resumed=0, max_steps=100, budget=1000):
+        def mode_of_start(parts, task, named, verdicts):
+            assert task.run.scale.tolist() == [abs(each) for each in task.run.y]
+            return NO_MODE if task.run.y[0] in self.refused else named
+
+        tested = plain(many, mode_of_start=mode_of_start, set_words=self.set_words)
+        task = SimpleNamespace(run=self.run, model=SimpleNamespace(dimension=2))
+        cycles = np.array(self.TIMES)
+        self.steps = 0
+        return tested.many_runs(
+            *(self.advance, "parts", task),
+            *(self.run_words, np.array([1, 2]), self.work_words, np.array([3, 4, 5])),
+            *(self.origins, cycles, 0.5 * cycles, 4, begin, resumed, max_steps, budget, 50),
+            *(self.states, self.places, np.array([NO_OBJECTION]), self.reached),
+        )
+
+    def assert_complete(self, rows, origins):
+        for row, origin in zip(rows, origins, strict=True):
+            expected = [[origin + time, time - origin] for time in self.TIMES]
+            assert self.states[row].tolist() == expected
+            assert self.places[row].tolist() == [4, (origin + 7) // 10, 3]
+
+    def test_every_run_starts_anew(self):
+        assert self.begin(10, 15, 33).call() == DONE
+        assert self.reached[0] == 3
+        self.assert_complete(range(3), (10, 15, 33))
+
+    def test_runs_before_the_first_one_are_left_alone(self):
+        assert self.begin(10, 15, 33).call(begin=1) == DONE
+        self.assert_complete((1, 2), (15, 33))
+        assert np.all(np.isnan(self.states[0]))
+        assert self.places[0].tolist() == [99] * 3
+
+    @pytest.mark.parametrize("budget", [1, 2, 3, 5, 8, 20])
+    def test_a_call_makes_no_more_steps_than_its_budget_and_the_next_one_resumes(self, budget):
+        self.begin(10, 15, 33)
+        made, calls = 0, 0
+        code = self.call(budget=budget)
+        while code == GO_ON:
+            assert self.steps == budget
+            made, calls = made + self.steps, calls + 1
+            assert self.reached[0] == made // 7
+            code = self.call(begin=self.reached[0], resumed=1, budget=budget)
+        assert (code, self.reached[0]) == (DONE, 3)
+        assert made + self.steps == 21
+        assert calls == 20 // budget
+        self.assert_complete(range(3), (10, 15, 33))
+
+    def test_a_run_that_needs_too_many_steps(self):
+        """Its limit is its own, however many steps the budget has left; what it has reached is kept."""
+        for budget in (4, 1000):
+            assert self.begin(10, 15).call(max_steps=4, budget=budget) == MAX_STEPS
+            assert self.reached[0] == 0
+            assert self.states[0, :2].tolist() == [[12.0, -8.0], [13.0, -7.0]]
+            assert np.all(np.isnan(self.states[0, 2]))
+            assert self.places[0, 2] == 2
+        assert self.begin(10, 15).call(max_steps=7, budget=14) == DONE
+
+    def test_a_run_that_cannot_start(self):
+        assert self.begin(10, 15, 33, refused=(15,)).call() == REFUSED
+        assert self.reached[0] == 1
+        self.assert_complete((0,), (10,))
+        assert self.places[1, 2] == 0
+
+    def test_a_run_of_which_there_is_something_to_tell(self):
+        """It is complete, and the call ends with it."""
+        assert self.begin(10, 15, 33, told=(15,)).call() == DONE
+        assert self.reached[0] == 1
+        self.assert_complete((0, 1), (10, 15))
+        assert np.all(np.isnan(self.states[2]))
+
+
+def test_memory_is_set_to_what_is_fresh():
+    words = np.array([7, 8, 9])
+    plain(many).set_words(words, np.array([1, 2, 3]))
+    assert words.tolist() == [1, 2, 3]

@@ -214,8 +214,9 @@ class TestEarliest:
             speeds=np.zeros(self.DEGREE + 1),
             gradient=np.zeros(count + 1),
             scalar=np.zeros(1),
-            polynomial=np.zeros(40),
-            stack=np.zeros((80, 40)),
+            # Behind the coefficients is what an earlier guard has left.
+            polynomial=np.full(40, 88.0),
+            stack=np.full((80, 40), 88.0),
         )
         method = SimpleNamespace(
             interpolant=interpolant,
