@@ -253,7 +253,7 @@ def test_one_of_a_few_values_is_the_same_object_or_an_equal_text():
             one_of("kind", other, allowed)
 
 
-@pytest.mark.parametrize(("value", "told"), [(10**400, "inf"), (-(10**400), "-inf")])
+@pytest.mark.parametrize(("value", "told"), [(10**400, "inf"), (-(10**400), "-inf")], ids=["inf", "-inf"])
 def test_a_number_too_large_for_a_float_is_an_infinity_of_its_sign(value, told):
     with pytest.raises(hybrid.ArgumentError, match=f"must be finite; got {told}"):
         number("x", value)
