@@ -19,6 +19,7 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
+    "hybrid/compiler/emit.py": ("compiler/test_emitted.py", "symbolic/test_continuity.py"),
     "hybrid/compiler/emitted.py": (
         "compiler/bounds/test_forcing.py",
         "kernels/events/test_proved_crossings.py",

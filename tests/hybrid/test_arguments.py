@@ -17,7 +17,7 @@ import lyapunov
 import lyapunov.plot
 import lyapunov.study.regimes
 import models
-from hybrid.arguments import one_of
+from hybrid.arguments import floats, number, one_of
 from hybrid.errors import HybridError
 from models import contact
 from models.dry_friction_oscillator import den_hartog_amplitude
@@ -251,3 +251,10 @@ def test_one_of_a_few_values_is_the_same_object_or_an_equal_text():
     for other in (1.0, True, "outer", np.array(["inner"])):
         with pytest.raises(HybridError, match='kind must be None, "inner" or 1; got'):
             one_of("kind", other, allowed)
+
+
+@pytest.mark.parametrize(("value", "told"), [(10**400, "inf"), (-(10**400), "-inf")], ids=["inf", "-inf"])
+def test_a_number_too_large_for_a_float_is_an_infinity_of_its_sign(value, told):
+    with pytest.raises(hybrid.ArgumentError, match=f"must be finite; got {told}"):
+        number("x", value)
+    assert floats([1, value]).tolist() == [1.0, float(told)]

@@ -168,3 +168,22 @@ def test_what_was_stored_is_read(monkeypatch):
     monkeypatch.setattr(compiling, "operations_of", lambda system: "ops")
     monkeypatch.setattr(compiling.store, "read", lambda key: f"found {key}")
     assert compiling.emitted_of("system") == "found ops"
+
+
+@pytest.mark.parametrize(("frequency", "fault"), [(2.0, False), (3.0, True)])
+def test_a_period_that_is_not_proved_is_examined_at_each_value_once(frequency, fault, monkeypatch):
+    """The field has the period ``pi`` where the frequency is even."""
+    field = lambda t, x, p: (np.cos(p.w * t),)  # noqa: E731
+    system = HybridSystem(state=("q",), parameters={"w": 2.0}, modes=[Mode("m", field)])
+    found = SimpleNamespace(periodic_at=set(), system=system)
+    values = np.array([frequency])
+    check = lambda: compiling.CompiledSystem._check_period(found, values, np.pi)  # noqa: E731
+    if fault:
+        with pytest.raises(hybrid.ArgumentError):
+            check()
+        assert not found.periodic_at
+    else:
+        check()
+        monkeypatch.setattr(compiling, "period_fault", None)
+        check()
+        assert found.periodic_at == {values.tobytes()}

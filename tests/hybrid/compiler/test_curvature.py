@@ -37,6 +37,16 @@ def test_curvature(name):
         assert out[0] == pytest.approx((along(h) - 2.0 * along(0.0) + along(-h)) / h**2, rel=1e-5, abs=1e-5)
 
 
+def test_a_difference_is_taken_before_its_multiple():
+    """``3 (a - b)`` is exact where ``a = b + u`` and ``u`` is the last bit of 1; ``3 a - 3 b`` is ``4 u``."""
+    symbols = model_symbols(2, 0)
+    [guard] = trace(lambda t, x, p: 1.5 * (x.a - x.b) * t**2, ("a", "b"), ())
+    u = np.finfo(float).eps
+    out = np.zeros(2)
+    exec("\n".join(curvature(guard, False, symbols)), {"t": 0.7, "x": [1.0 + u, 1.0], "out": out})
+    assert out[0] == 3.0 * u
+
+
 def test_affine_guards_have_none_and_opaque_ones_an_unknown_one():
     symbols = model_symbols(2, 0)
     assert curvature(symbols.x[0], True, symbols) == ["out[0] = 0.0"]

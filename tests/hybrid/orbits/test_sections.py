@@ -1,6 +1,7 @@
 """Sections compared with simulate at the same times, and with the jumps."""
 
 import math
+from types import SimpleNamespace
 
 import attrs
 import numpy as np
@@ -125,6 +126,15 @@ class TestPoincare:
         section = poincare_section(BALL, (1.0, 0.0), Guard(lambda t, x, p: x.v, -1), points=4, solver=TIGHT)
         np.testing.assert_allclose(section.x[:, 0], 0.64 ** np.arange(1, 5), rtol=1e-11)
         np.testing.assert_array_equal(section.jumps, [1, 1, 1, 1])
+
+    def test_a_bar_is_told_of_every_point_and_may_be_left_out(self):
+        impacts = np.array([True])
+        states, told = [], []
+        for bar in (None, SimpleNamespace(update=told.append)):
+            run = trajectory.start(OSCILLATOR, (0.0, 0.0), 0.0, solver=TIGHT)
+            states.append(sections.crossings(run, impacts, 7, bar)[1])
+        assert sum(told) == len(states[1]) == 7
+        np.testing.assert_array_equal(*states)
 
     def test_a_surface_that_moves(self):
         """The surface ``cos t`` moves; ``x = sin t`` crosses it at ``pi / 4 + k pi``."""

@@ -220,6 +220,21 @@ def test_an_order_that_mattered_is_said_with_what_grazed():
     assert "grazed" not in alone.message
 
 
+@pytest.mark.parametrize(
+    ("flags", "told"), [((0, 0, 0), None), ((1, 0, 0), "'a'."), ((0, 1, 1), "'b', 'c'.")]
+)
+def test_components_without_a_limit_are_named(flags, told):
+    """The last number of a row of the trail belongs to no component."""
+    trail = np.zeros((codes.HELD + 1, 4))
+    trail[codes.HELD] = [*flags, 1.0]
+    found = SimpleNamespace(
+        run=SimpleNamespace(trail=trail), system=SimpleNamespace(state_names=("a", "b", "c"))
+    )
+    notes = [*ending._held(found)]
+    assert len(notes) == (told is not None)
+    assert told is None or f"jumps of a chatter changes {told} Such" in notes[0]
+
+
 @pytest.mark.parametrize("code", [codes.STEP_TOO_SMALL, codes.MAX_STEPS])
 @pytest.mark.parametrize(("period", "timed", "bare"), [(0.0, 1, True), (0.0, 0, False), (2.0, 1, False)])
 @pytest.mark.parametrize("last", [-1, 0])

@@ -10,6 +10,7 @@ import sympy
 import hybrid
 import models
 from hybrid.compiler.compiled import emitted_of
+from hybrid.compiler.emit import emit
 from hybrid.symbolic.continuity import _sides, jumps_of, may_jump, vanishes_on
 from hybrid.symbolic.tracing import model_symbols, trace
 
@@ -41,6 +42,11 @@ CONTINUOUS = {
     ),
     "what is not in two ways": lambda t, x, p: (
         np.where(~((x.q > 0) & (x.v > 0)), 1.0, 0.0) + np.where((x.q > 0) & (x.v > 0), 1.0, 0.0)
+    ),
+    "either of two, in another way on either side of a third": lambda t, x, p: (
+        np.where(x.q + x.v > 1, np.where((x.q > 0) | (x.v > 0), 1.0, 0.0), 0.0)
+        + np.where(x.q + x.v > 1, 0.0, np.where(x.q > 0, 1.0, np.where(x.v > 0, 1.0, 0.0)))
+        - np.where((x.q > 0) | (x.v > 0), 1.0, 0.0)
     ),
     "at one point only": lambda t, x, p: np.where(x.q == 0, 1.0, np.sin(x.q) / x.q),
     "a switch that moves": lambda t, x, p: np.where(x.q > np.sin(t), x.q - np.sin(t), 0.0),
@@ -214,6 +220,28 @@ def test_what_could_not_be_traced_is_judged_by_its_code(function, jumping):
 def test_complex_numbers_have_no_order():
     assert not may_jump(lambda t, x, p: x * t if p.e > 1 else x, differentiable=True)
     assert may_jump(lambda t, x, p: x * t if x[0].real > 1 else x, differentiable=True)
+
+
+def by_parameter(t, x, p):
+    return (x.v, -x.q) if p.k > 1 else (x.v, x.q)
+
+
+def of_real_numbers(t, x, p):
+    return float(x.v), -float(x.q) if x.q < 0 else -x.q
+
+
+@pytest.mark.parametrize(
+    ("field", "jacobian", "where"),
+    [
+        (by_parameter, None, ""),
+        (by_parameter, lambda t, x, p: ((0.0, 1.0), (-1.0, 0.0)), ""),
+        (of_real_numbers, lambda t, x, p: ((0.0, 1.0), (-1.0, 0.0)), "it branches"),
+    ],
+)
+def test_a_field_that_runs_on_complex_numbers_does_not_branch_on_the_state(field, jacobian, where):
+    modes = [hybrid.Mode("only", field, jacobian=jacobian)]
+    system = hybrid.HybridSystem(state=STATES, parameters={"k": 2.0}, modes=modes)
+    assert emit(system).discontinuities == (where,)
 
 
 def friction(field=lambda t, x, p: (x.v, p.A * np.cos(t) - 0.1 * x.v - x.q**3 - 2 * np.sign(x.q))):

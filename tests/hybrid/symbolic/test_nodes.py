@@ -69,6 +69,24 @@ def test_a_degree_is_no_less_than_that_of_the_polynomial(expression):
         assert degree >= sympy.Poly(expression, X, Y).total_degree()
 
 
+@pytest.mark.parametrize(
+    ("expression", "degree"),
+    [
+        (Z**2, 0),
+        (X, 1),
+        (X + Y * Z, 1),
+        (3 * X * Y**2 + Y, 3),
+        ((X * Y + 1) ** 4, 8),
+        (X * sympy.sin(Z), 1),
+        (sympy.sin(X) + Y, None),
+        (Y / X, None),
+        (X ** sympy.Rational(1, 2), None),
+    ],
+)
+def test_degrees(expression, degree):
+    assert degree_of(expression, frozenset((X, Y))) == degree
+
+
 def test_operations_are_counted_as_in_the_tree():
     expression = (X + Y) * (X + Y + Z) * sympy.sin(X)
     assert operations_of(expression) == 2 + 1 + 2 + 1

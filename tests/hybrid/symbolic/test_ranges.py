@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 
-from hybrid.symbolic.ranges import has_one_sign, range_of
+from hybrid.symbolic.ranges import End, Range, has_one_sign, range_of
 from hybrid.symbolic.tracing import trace
 
 STATES, PARAMETERS = ("q", "v"), ("k",)
@@ -91,3 +91,15 @@ def test_what_has_one_sign(function):
 )
 def test_what_may_be_zero(function):
     assert not has_one_sign(trace(function, STATES, PARAMETERS)[0])
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda t, x, p: (1 + np.minimum(np.abs(x.q), 1e200)) ** 2,
+        lambda t, x, p: (1 + np.abs(x.q)) ** 2,
+        lambda t, x, p: np.exp(np.abs(x.q)),
+    ],
+)
+def test_an_end_beyond_all_numbers_is_only_approached(function):
+    assert range_of(trace(function, STATES, PARAMETERS)[0]) == Range(End(1.0, True), End(math.inf, False))

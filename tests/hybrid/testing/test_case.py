@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hybrid.testing.case import _before_trouble
+from hybrid.testing.case import Case, _before_trouble
 
 
 @pytest.mark.parametrize(
@@ -28,3 +28,10 @@ def test_time_before_trouble_is_midway_between_two_jumps(kinds, touches, expecte
     grazings = [SimpleNamespace(t=t) for t in touches]
     arc = SimpleNamespace(t=np.array([0.0, 10.0]), jumps=jumps, grazings=grazings)
     assert _before_trouble(arc) == expected
+
+
+@pytest.mark.parametrize(("fraction", "number"), [(0.0, 0), (0.2, 0), (0.25, 1), (0.6, 2), (0.99, 3)])
+def test_the_fraction_selects_one_of_the_jumps(fraction, number):
+    jumps = ["first", "second", "third", "fourth"]
+    run = SimpleNamespace(arc=SimpleNamespace(jumps=jumps))
+    assert Case.the_jump(SimpleNamespace(run=run, fraction=fraction)) == jumps[number]

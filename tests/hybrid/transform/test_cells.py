@@ -83,6 +83,26 @@ def test_cells_join_across_a_surface_that_changes_nothing_there():
     assert sorted((len(sides), field) for sides, field in fields.items()) == [(1, 5.0), (2, -1.0), (2, 1.0)]
 
 
+@pytest.mark.parametrize(("last", "rate"), [("y", 0.03), ("z", 0.15)])
+def test_of_three_surfaces_the_last_one_blends_the_fields_on_the_intersection_of_the_others(last, rate):
+    """With shares ``a, b, c`` of the sides of ``x, y, z``, the fourth state has the rate ``a b c``.
+
+    Heights rest where ``a = (1 + c) / 2``, ``b = 1/4`` and ``c = 1/5``. On both sides of ``y`` the rate is
+    ``+-0.6 * 0.2``, on those of ``z`` it is ``1 * 0.25`` and ``0``.
+    """
+
+    def field(t, x, p):
+        a, b, c = np.sign(x.x), np.sign(x.y), np.sign(x.z)
+        return 0.5 * (1 + c) - a, 0.25 - b, 0.2 - c, a * b * c
+
+    pieces, _ = pieces_of(field, state=("x", "y", "z", "w"))
+    heights = [known.height for known in pieces.surfaces.known]
+    number = dict(zip("xyz", map(heights.index, pieces.surfaces.symbols.x[:3]), strict=True))
+    on = sorted("xyz", key=lambda name: (name == last, name))
+    flow = pieces.flow({number[name]: 0 for name in on})
+    assert value(pieces, flow, np.zeros(4)) == pytest.approx([0.0, 0.0, 0.0, rate], abs=1e-15)
+
+
 def solutions(corners):
     """Shares ``a, b`` and the determinant of the derivatives, where both rates vanish."""
     mm, mp, pm, pp = corners

@@ -32,6 +32,8 @@ RESETS = {
     "lands on the side it came from": lambda u: 0.5 * u + 0.75 * np.sign(u),
     "lands on the other side": lambda u: -0.9 * u - 0.5 * np.sign(u),
     "is chosen": lambda u: np.where(np.abs(u) > 0.3, -u, 2.0 * u),
+    "is one of three, told from above": lambda u: np.where(u > 0.3, 0.3, np.where(u > 0.15, 0.2, 0.5)),
+    "is one of three, told from below": lambda u: np.where(u < 0.15, 0.5, np.where(u < 0.3, 0.2, 0.3)),
     "lands above": lambda u: 1.0 + 0.0 * u,
     "lands below": lambda u: -0.25 + 0.0 * u,
     "lands on the surface": lambda u: 0.0 * u,
