@@ -32,12 +32,18 @@ class TestKept:
 
     @BOTH
     def test_a_change_of_side_is_kept_with_the_side_before(self, way):
-        for before, kept in ((-way, -way), (way, 0), (0, 2)):
+        """With that after it if its place is known: an event on the last half of the rest comes after it."""
+        for before, place, kept, passed in (
+            (-way, NO_ROOT, -way, NO_ROOT),
+            (-way, 0.5, way, 0.75),
+            (way, 0.5, 0, NO_ROOT),
+            (0, 0.5, 2, NO_ROOT),
+        ):
             run = run_at_guards(None, [before])
             kernels.keep_side(run, 1)
-            run.passed[1] = 0.5
+            run.passed[1] = place
             kernels.keep_change(run, 1, way)
-            assert (run.side[1], run.rehearsal[3, 1], run.passed[1]) == (way, kept, NO_ROOT)
+            assert (run.side[1], run.rehearsal[3, 1], run.passed[1]) == (way, kept, passed)
 
     @BOTH
     def test_a_crossing_is_kept_with_the_middle_of_the_time_since_the_last_change(self, way):
