@@ -27,6 +27,7 @@ from hybrid.kernels.events.guards import (
     has_program,
     may_jump,
     rounding_band,
+    was_left_behind,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
@@ -209,6 +210,11 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
         was_on = known and zero[transition] > 0
         own = came == LANDED and left == mode and transition == fired
         now, order = side_of(model, run, mode, transition, t, x, before, was_on, work)
+        if known and not own and order == 0 and before == -now:
+            speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+            if was_left_behind(model, run, transition, t, x, speed, before, work):
+                # It has fired within a coarser rounding of this place, and only now reaches its guard.
+                now = before
         # A root of third order, crossed without speed: the next step shows the side.
         flat = (
             own
@@ -230,7 +236,9 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
             _, beside, moment = signs_beside(model, run, transition, t, x, moments, work)
             held = False
             if beside != 0:
-                now, order, flat = beside, JUMPING, False
+                # Off the guard, where it has left the state, it has not been reached again.
+                if order > 0 or beside != now:
+                    now, order, flat = beside, JUMPING, False
                 held = signs and turns_within(model, transition, mode, t, x, LONGER * moment, beside, work)
             elif signs and order > 0 and direction != 0:
                 held = is_held_beside(model, run, transition, mode, t, x, direction, work)
