@@ -162,7 +162,8 @@ def is_held(model, run, transition, mode, t, x, towards, work):
     speed = guard_speed(model, transition, end, later, work.field_after, work.gradient)
     model.field(mode, end, after, model.parameters, work.field_after)
     kept = guard_speed(model, transition, end, after, work.field_after, work.gradient)
-    return speed * towards > 0.0 and not kept * speed > KEPT * speed * speed
+    # Without products of speeds, which may be too small for a number.
+    return speed * towards > 0.0 and not kept * towards > KEPT * abs(speed)
 
 
 @njit(**KERNEL)
