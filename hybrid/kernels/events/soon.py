@@ -36,7 +36,7 @@ def move_for(model, mode, t, x, moment, work):
 
 @njit(**KERNEL)
 def acceleration_soon(model, run, transition, mode, t, x, work):
-    """Sign of a guard's acceleration soon after ``(t, x)``, where it is zero up to rounding; 0 if not certain.
+    """Sign of a guard's acceleration soon after ``(t, x)``, where rounding hides it; 0 if not certain.
 
     It is that of the shortest moments at which the acceleration is certain and grows like the time or its
     square. ``work.field`` and ``work.gradient`` are current, and are on return.
