@@ -30,6 +30,7 @@ from hybrid.kernels.events.guards import (
     was_left_behind,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
+from hybrid.kernels.events.soon import acceleration_soon
 from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
 from hybrid.kernels.types.options import KERNEL
 
@@ -69,7 +70,8 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
 
     The order is 0 off the guard, 1 if the guard's speed decides, and 2 if rounding may hide or reverse the
     speed and the acceleration decides. It is 3 if the same holds for the acceleration: then the side is
-    unchanged if the guard was zero before, and otherwise the guard counts as not yet crossed. It is
+    unchanged if the guard was zero before; otherwise the acceleration soon after decides, and if that does
+    not either, the guard counts as not yet crossed. It is
     ``JUMPING`` if the guard jumps across zero within the rounding of the state: then its derivatives are no
     guide. A guard without a value keeps its side, and may jump; an infinite one has the side of its sign.
     ``work.field`` is current.
@@ -98,11 +100,14 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 if trend == 0.0:
                     order = BY_STEP
     direction = model.direction[transition]
+    keeps = before != 0 and (was_on or direction == 0)
+    if order == BY_STEP and not keeps and not may_jump(model, run, transition, t, x, work):
+        trend = float(acceleration_soon(model, run, transition, mode, t, x, work))
     if trend > 0.0:
         return 1, order
     if trend < 0.0:
         return -1, order
-    return before if before != 0 and (was_on or direction == 0) else -direction, order
+    return before if keeps else -direction, order
 
 
 @njit(**KERNEL)
@@ -158,7 +163,8 @@ def is_held(model, run, transition, mode, t, x, towards, work):
     speed = guard_speed(model, transition, end, later, work.field_after, work.gradient)
     model.field(mode, end, after, model.parameters, work.field_after)
     kept = guard_speed(model, transition, end, after, work.field_after, work.gradient)
-    return speed * towards > 0.0 and not kept * speed > KEPT * speed * speed
+    # Without products of speeds, which may be too small for a number.
+    return speed * towards > 0.0 and not kept * towards > KEPT * abs(speed)
 
 
 @njit(**KERNEL)

@@ -15,12 +15,13 @@ from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
+    guard_acceleration,
     guard_speed,
     guard_value,
     rounding_band,
 )
 from hybrid.kernels.events.hidden import hidden_share
-from hybrid.kernels.events.onset import BY_STEP, has_just_fired
+from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, has_just_fired
 from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
@@ -96,6 +97,53 @@ def leave_guard(model, run, transition, t, work):
         run.on_guard[transition] = 0
 
 
+@njit(**INLINE)
+def error_of_step(model, run, h, work):
+    """The estimated error of the attempted step into ``work.field_after``, where it is more than rounding."""
+    for i in range(model.dimension):
+        # Where a step is too long, either estimate may be close to zero.
+        error = h * (abs(work.error[i]) + abs(work.second_error[i]))
+        size = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
+        work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
+
+
+@njit(**INLINE)
+def asks_error(run, on_guard):
+    """Whether a guard is left by a derivative that is known at the start of this step.
+
+    A guard that has stayed within rounding of zero on the steps before has other derivatives by now.
+    """
+    return on_guard in (BY_SPEED, BY_ACCELERATION) and run.since_entry == 0.0
+
+
+@njit(**KERNEL)
+def outweighs_error(model, run, growth, h, work):
+    """Whether a guard grows by more on the attempted step than its error; ``work.gradient`` is current.
+
+    ``growth`` is what the first derivative that is not zero, that of a guard which is zero at the start of
+    the step, adds to the guard over the step, counted towards the known side. A step on which the error may
+    outweigh it says nothing of the guard: the error may have made a crossing, or hide one. A shorter step has
+    less error.
+    """
+    error_of_step(model, run, h, work)
+    moved = 0.0
+    for i in range(model.dimension):
+        moved += abs(work.gradient[i]) * work.field_after[i]
+    return growth > MARGIN * moved
+
+
+@njit(**KERNEL)
+def leaves_as_known(model, run, transition, on_guard, t, h, work):
+    """``outweighs_error`` for a guard that is no polynomial on the step."""
+    for i in range(model.dimension):
+        work.field[i] = work.stages[0, i]
+    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
+    growth = h * speed
+    if on_guard == BY_ACCELERATION:
+        growth = 0.5 * h * h * guard_acceleration(model, run, transition, run.mode, t, run.y, work)
+    return math.isnan(growth) or outweighs_error(model, run, growth * run.side[transition], h, work)
+
+
 @njit(**KERNEL)
 def is_resolved(model, method, run, transition, t, h, work):
     """Whether the error of the attempted step leaves the sign of a guard at both ends of the step alone.
@@ -105,11 +153,7 @@ def is_resolved(model, method, run, transition, t, h, work):
     zero at the start: its derivatives tell its side. Nor is it asked where the guard moves on through zero,
     much farther than the error: this step or the next finds the crossing.
     """
-    for i in range(model.dimension):
-        # Where a step is too long, either estimate may be close to zero.
-        error = h * (abs(work.error[i]) + abs(work.second_error[i]))
-        size = max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i]))
-        work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
+    error_of_step(model, run, h, work)
     if keeps_sign(model, transition, t, run.y, work) and keeps_sign(model, transition, t + h, work.new, work):
         return True
     s, moved = method.b.shape[0], 0.0
@@ -166,6 +210,9 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
                 degree = divide_by_theta(work.polynomial, degree)
             if stays(work.polynomial, degree, side, error):
                 continue
+            unsure = asks_error(run, on_guard) and not outweighs_error(
+                model, run, side * work.polynomial[0], h, work
+            )
             direction, before = model.direction[transition], side
             theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
             if theta != NO_ROOT or side != before:
@@ -175,6 +222,9 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
                 degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
             note_touches(run, transition, degree, known_roots, hidden, theta, error, work)
         else:
+            unsure = asks_error(run, on_guard) and not leaves_as_known(
+                model, run, transition, on_guard, t, h, work
+            )
             theta, side, share = crossing_on_path(
                 model,
                 method,
@@ -193,7 +243,7 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
             proved = min(proved, share)
         if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
             continue
-        if on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work):
+        if unsure or (on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work)):
             blurred = transition
         if theta == NO_ROOT:
             keep_change(run, transition, side)

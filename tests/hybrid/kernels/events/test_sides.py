@@ -171,7 +171,9 @@ class TestHeld:
         assert self.held(0.0, 0.0, 1) is False
 
 
-def side_of(value, *, speed=0.0, acceleration=0.0, direction=1, before=0, was_on=False, band=1.0, jumps=0):
+def side_of(
+    value, *, speed=0.0, acceleration=0.0, soon=0, direction=1, before=0, was_on=False, band=1.0, jumps=0
+):
     stubbed = plain(
         sides,
         guard_value=lambda *arguments: value,
@@ -182,6 +184,7 @@ def side_of(value, *, speed=0.0, acceleration=0.0, direction=1, before=0, was_on
         speed_sign=lambda *arguments: float(np.sign(arguments[6])),
         may_jump=lambda *arguments: jumps > 1,
         acceleration_sign=lambda *arguments: float(np.sign(acceleration)),
+        acceleration_soon=lambda *arguments: soon,
     )
     model = SimpleNamespace(direction=integers(direction))
     work = SimpleNamespace(scalar=None, field=None, gradient=None)
@@ -199,6 +202,7 @@ def test_the_side_of_a_guard(sign):
     # If none does, the side is the near one unless it was known before.
     for direction in (-1, 1):
         assert side_of(0.9 * sign, direction=direction) == (-direction, BY_STEP)
+        assert side_of(0.9 * sign, direction=direction, soon=sign) == (sign, BY_STEP)
         assert side_of(0.9, direction=direction, before=sign) == (-direction, BY_STEP)
         assert side_of(0.9, direction=direction, before=sign, was_on=True) == (sign, BY_STEP)
     assert side_of(0.9, direction=0, before=sign) == (sign, BY_STEP)

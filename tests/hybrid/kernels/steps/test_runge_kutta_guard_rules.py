@@ -193,6 +193,7 @@ class TestEarliest:
             rounding_on_step=lambda model, run, transition, t, h, work: rounding,
             is_resolved=resolved,
             underflows=underflows,
+            leaves_as_known=lambda *arguments: True,
             leave_guard=leave_guard,
         )
         model = SimpleNamespace(
@@ -212,6 +213,9 @@ class TestEarliest:
             new=np.array(given.get("new", coefficients[:, -1])),
             stages=stages,
             speeds=np.zeros(self.DEGREE + 1),
+            error=np.full(count, given.get("error", 0.0)),
+            second_error=np.zeros(count),
+            field_after=np.zeros(count),
             gradient=np.zeros(count + 1),
             scalar=np.zeros(1),
             # Behind the coefficients is what an earlier guard has left.
@@ -312,6 +316,14 @@ class TestEarliest:
             assert self.run.on_guard[1] == 0
             assert self.run.rehearsal[1, 1] == on_guard
             assert self.asked == []
+
+    @pytest.mark.parametrize("way", [1.0, -1.0])
+    def test_a_start_that_the_error_outweighs_is_blurred(self, way):
+        """Its speed moves it by 0.5 over the step of 4, and so does an error of 1.25e-3 with its margin."""
+        guard = self.bernstein(0.0, 0.5, factor=-way)
+        for error, blurred in ((0.9e-3, NO_TRANSITION), (1.5e-3, 1)):
+            found = self.earliest(guard, sides=[way], on_guard=[BY_SPEED], error=error)
+            assert found == (pytest.approx(0.5, rel=1e-12), 1, 1.0, blurred)
 
     @pytest.mark.parametrize("way", [1.0, -1.0])
     def test_a_touch_after_a_known_root(self, way):
