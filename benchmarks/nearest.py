@@ -189,7 +189,10 @@ NEAREST = {
         "kernels/jumps/test_chatter.py",
         "kernels/jumps/test_chatter_tangents.py",
     ),
-    "hybrid/kernels/jumps/skipped.py": ("kernels/jumps/test_chatter.py",),
+    "hybrid/kernels/jumps/skipped.py": (
+        "kernels/jumps/test_skipped_rules.py",
+        "kernels/jumps/test_chatter.py",
+    ),
     "hybrid/kernels/jumps/slower.py": ("kernels/jumps/test_slower_rules.py",),
     "hybrid/kernels/jumps/steep.py": ("simulation/test_infinite_slopes.py",),
     "hybrid/kernels/steps/dense.py": (

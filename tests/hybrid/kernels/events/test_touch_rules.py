@@ -59,7 +59,8 @@ class TestTurnAtEnd:
     """Polynomials of degree two and three by their differences at the end of the step."""
 
     def kind(self, *coefficients, rounding=1e-9):
-        stack = np.full((4, 12), 88.0)
+        # Rows are no longer than they must be.
+        stack = np.full((4, len(coefficients) + 2), 88.0)
         given = np.array([*coefficients, 77.0])
         found = kernels.turn_at_end(given, len(coefficients) - 1, rounding, stack)
         assert given.tolist() == [*coefficients, 77.0]
@@ -72,6 +73,7 @@ class TestTurnAtEnd:
         assert self.kind(way, 0.0, 0.0, 0.0) == 0
         assert self.kind(way, 0.0, 0.0, 0.0, 0.0) == way
         assert self.kind(3.0, 3.0, 3.0) == 0
+        assert self.kind(3.0, 3.0, 3.0, 3.0) == 0
         assert self.kind(5.0) == 0
         # The second difference of the last three is 3 - 2 * 2 + 2.
         assert self.kind(9.0 * way, 3.0 * way, 2.0 * way, 2.0 * way) == way
@@ -106,6 +108,14 @@ class TestNoteTouches:
         assert self.touches(bottom, band=0.99e-6) == []
         # A dip through zero holds two crossings, whether they fire or not.
         assert self.touches(bernstein(0.4, 0.4, factor=way, rest=-1e-6)) == []
+
+    @BOTH
+    @pytest.mark.parametrize("place", [0.4, 0.6])
+    def test_a_turn_may_lie_beyond_zero_by_rounding(self, place, way):
+        """The largest coefficient, at one end or the other, is 0.36: rounding is 5.8 EPSILON."""
+        for units, count in ((-4.0, 1), (-8.0, 0)):
+            bottom = bernstein(place, place, factor=way, rest=units * EPSILON)
+            assert len(self.touches(bottom)) == count
 
     @BOTH
     def test_only_turns_between_the_start_and_the_crossing(self, way):
@@ -162,6 +172,13 @@ class TestNoteTouches:
         # A guard that ends near zero and moves on does not turn there, nor does one with a flat root.
         assert self.touches(bernstein(1.0, factor=way, rest=1e-6)) == []
         assert self.touches(bernstein(1.0, 1.0, 1.0, factor=way)) == []
+
+    @BOTH
+    def test_a_turn_that_the_end_follows_at_once(self, way):
+        """Up to the end the guard rises by less than rounding, but it does not cross."""
+        ((place, value),) = self.touches(bernstein(1.0 - 1e-9, 1.0 - 1e-9, factor=way, rest=1e-6))
+        assert place == pytest.approx(1.0 - 1e-9, abs=1e-12)
+        assert value == pytest.approx(way * 1e-6, rel=1e-9)
 
     @BOTH
     @pytest.mark.parametrize("size", [2.0**-20, 1.0, 2.0**20])
