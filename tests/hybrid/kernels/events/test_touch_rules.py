@@ -147,10 +147,11 @@ class TestNoteTouches:
 
     @BOTH
     def test_turns_that_only_rounding_parts_are_one(self, way):
-        flat = bernstein(0.4, 0.4, 0.4001, 0.4001, factor=way)
-        ((place, value),) = self.touches(flat)
-        assert place == pytest.approx(0.4, abs=1e-2)
-        assert abs(value) < 1e-15
+        for level in (0.0, 1e-6):
+            flat = bernstein(0.4, 0.4, 0.4002, 0.4002, factor=way, rest=level)
+            ((place, value),) = self.touches(flat)
+            assert place == pytest.approx(0.4, abs=1e-3)
+            assert value == pytest.approx(way * level, abs=1e-15)
 
     @BOTH
     def test_roots_at_the_start_are_put_back(self, way):
