@@ -171,6 +171,7 @@ NEAREST = {
     ),
     "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless_rules.py",),
     "hybrid/kernels/jumps/jump.py": (
+        "kernels/jumps/test_steep.py",
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
@@ -201,6 +202,7 @@ NEAREST = {
         "accuracy/test_work_precision.py",
     ),
     "hybrid/kernels/steps/forcing.py": (
+        "kernels/steps/test_forcing_field.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),
