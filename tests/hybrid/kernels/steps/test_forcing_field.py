@@ -14,37 +14,48 @@ ATOL, RTOL = 0.5, 0.25
 START, ALONG = np.array([3.0, -4.0, 6.0, -8.0]), np.array([1.0, -9.0, 2.0, 8.0])
 # The vector has no absolute size: its root mean square stands in.
 FLOORS = np.array([ATOL, ATOL, *[RTOL * np.sqrt(50.0)] * 2])
+FIELD = np.array([2.0, -3.0, 5.0, -7.0])
 ALLOWED = MARGIN * (FLOORS + (RTOL + ROUNDING) * np.array([3.0, 9.0, 6.0, 8.0]))
 
 
-def follows(
-    gaps, *, tangents=1, noise=(0.0,) * 4, noisy=False, nodes=(0.0, 0.25, 0.5), weights=(9.0, 1.0, 2.0)
-):
+def follows(gaps, *, tangents=1, noise=(0.0,) * 4, noisy=False, clock=-1, ends=False):
     """Whether a series follows its field on a step of 2, if both differ by a gap in each component.
 
     Rounding of the state changes the field by the noise. At the nodes 0.25 and 0.5 the weights are 1 and 2.
+    On a clock time runs at a tenth of the pace; the mode may end at the first node.
     """
-    times, length = [], 2 * (1 + tangents)
+    times, length, nodes = [], 2 * (1 + tangents), (0.0, 0.25, 0.5)
+    pace = 1.0 if clock < 0 else 0.1
 
     def along_series(model, mode, tangents, order, s, work):
-        work.trial[:length], work.new[:length] = ALONG[:length], np.array(gaps)[:length]
+        work.trial[:length], work.new[:length] = ALONG[:length], (pace * FIELD + gaps)[:length]
 
     def rates(model, mode, t, x, tangents, jacobian, out):
         times.append(t)
-        out[:length] = 0.0 if np.array_equal(x[:length], ALONG[:length]) else np.array(noise)[:length]
+        same = np.array_equal(x[:length], ALONG[:length])
+        out[:length] = (FIELD + (0.0 if same else np.array(noise)))[:length]
+
+    def value_and_slope(series, column, order, s):
+        assert (column, order) == (clock, 5)
+        return 0.1 * s, 0.1
 
     model = SimpleNamespace(dimension=2)
-    method = SimpleNamespace(
-        atol=ATOL, rtol=RTOL, series_nodes=np.array(nodes), series_weights=np.array(weights)
-    )
+    method = SimpleNamespace(atol=ATOL, rtol=RTOL)
+    method.series_nodes, method.series_weights = np.array(nodes), np.array([9.0, 1.0, 2.0])
     run = SimpleNamespace(mode=1, phase=7.0, y=START)
     work = SimpleNamespace(series=None, stages=np.zeros((2, 4)), jacobian=None)
     work.error, work.trial, work.new = np.full(4, 88.0), np.zeros(4), np.zeros(4)
-    tested = plain(forcing, _along_series=along_series, rates_by_jacobian=rates)
-    found = bool(tested._follows_field(model, method, run, tangents, 5, -1, 2.0, noisy, work))
+    tested = plain(
+        forcing,
+        _along_series=along_series,
+        rates_by_jacobian=rates,
+        _value_and_slope=value_and_slope,
+        _is_beyond_guard=lambda *given: ends,
+    )
+    found = bool(tested._follows_field(model, method, run, tangents, 5, clock, 2.0, noisy, work))
     # The first node is the start, where both are the same.
-    expected = [7.0 + 2.0 * node for node in nodes[1:]]
-    assert times == (expected if not noisy else [t for t in expected for _ in range(2)])
+    expected = [7.0 + pace * 2.0 * node for node in nodes[1:] if not ends]
+    assert times == pytest.approx(expected if not noisy else np.repeat(expected, 2), rel=1e-14)
     return found
 
 
@@ -76,3 +87,13 @@ def test_noise_of_the_state_explains_a_gap(component, way):
 
 def test_a_gap_that_is_no_number_is_one():
     assert not follows([np.nan, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("component", range(4))
+def test_a_series_on_a_clock_follows_the_field_at_its_pace(component):
+    """Up to a guard beyond which the mode has ended."""
+    for share, expected in ((0.99, True), (1.01, False)):
+        gaps = np.zeros(4)
+        gaps[component] = share * ALLOWED[component] / 6.0
+        assert follows(gaps, clock=3) == expected
+        assert follows(gaps, clock=3, ends=True)
