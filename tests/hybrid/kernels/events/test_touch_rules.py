@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.events import touches
+from hybrid.kernels.events import guards, touches
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.plain import plain
 
@@ -237,3 +237,23 @@ class TestRemember:
         assert self.remembered(place, before=(5, 5))
         assert self.remembered(place, before=(7, 5))
         assert self.remembered(place, before=(6, 4))
+
+
+@pytest.mark.parametrize(("used", "room"), [(0, 2), (1, 2), (2, 2), (0, 0)])
+def test_a_record_of_touches_that_is_full_only_counts_them(used, room):
+    tested = plain(guards, guard_speed=lambda *given: 0.0, guard_acceleration=lambda *given: -4.0)
+    names = ("phase", "cycle", "transition", "jumps", "value", "acceleration")
+    record = SimpleNamespace(
+        grazings=used,
+        grazing_state=np.zeros((room, 2)),
+        **{f"grazing_{name}": np.zeros(room) for name in names},
+    )
+    run = SimpleNamespace(grazings=7, mode=1, cycle=3, jumps=5)
+    model = SimpleNamespace(dimension=2, parameters=None, field=lambda *given: None)
+    work = SimpleNamespace(field=None, gradient=None)
+    tested.keep_grazing(model, run, record, 6, 0.5, np.array([1.0, 2.0]), 0.25, work)
+    assert run.grazings == 8
+    if used < room:
+        assert [getattr(record, f"grazing_{name}")[used] for name in names] == [0.5, 3, 6, 5, 0.25, -4.0]
+        assert record.grazing_state[used].tolist() == [1.0, 2.0]
+    assert record.grazings == used + (used < room)
