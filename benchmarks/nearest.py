@@ -103,6 +103,7 @@ NEAREST = {
         "kernels/jumps/test_instant_rules.py",
     ),
     "hybrid/kernels/events/guards.py": (
+        "kernels/events/test_touch_rules.py",
         "kernels/events/test_onset.py",
         "kernels/events/test_condition.py",
         "kernels/events/test_refused.py",
@@ -172,6 +173,7 @@ NEAREST = {
     ),
     "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless_rules.py",),
     "hybrid/kernels/jumps/jump.py": (
+        "kernels/jumps/test_steep.py",
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
@@ -190,7 +192,10 @@ NEAREST = {
         "kernels/jumps/test_chatter.py",
         "kernels/jumps/test_chatter_tangents.py",
     ),
-    "hybrid/kernels/jumps/skipped.py": ("kernels/jumps/test_chatter.py",),
+    "hybrid/kernels/jumps/skipped.py": (
+        "kernels/jumps/test_skipped_rules.py",
+        "kernels/jumps/test_chatter.py",
+    ),
     "hybrid/kernels/jumps/slower.py": ("kernels/jumps/test_slower_rules.py",),
     "hybrid/kernels/jumps/steep.py": ("simulation/test_infinite_slopes.py",),
     "hybrid/kernels/steps/dense.py": (
@@ -199,6 +204,7 @@ NEAREST = {
         "accuracy/test_work_precision.py",
     ),
     "hybrid/kernels/steps/forcing.py": (
+        "kernels/steps/test_forcing_field.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),

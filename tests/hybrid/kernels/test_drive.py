@@ -402,6 +402,10 @@ class TestAdvance:
         """Not after the last step: there the caller does it."""
         _, calls, _ = self.advanced(orthonormal=1)
         assert calls == [5.0, "apart", 3.5, "apart", 2.0, "apart", 0.5]
+        # However short a step is, but not where no time has passed.
+        spans = [0.0, 1e-9, 9.0]
+        _, calls, _ = self.advanced(orthonormal=1, step=lambda left: (GO_ON, min(spans.pop(0), left)))
+        assert calls == [5.0, 5.0, "apart", 5.0 - 1e-9]
 
 
 @cache

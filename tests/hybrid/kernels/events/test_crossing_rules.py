@@ -139,6 +139,34 @@ class TestFirstChange:
             assert found == (approx(root, 4.0), -way, 1.0)
 
     @pytest.mark.parametrize("way", [1, -1])
+    def test_of_a_guard_with_a_pole_in_the_middle(self, way):
+        """Beyond zero it has no bound on one side there, but it has values before and after."""
+        curve = polynomial(0.3, 0.7, factor=way)
+        plainly = curve.ranges
+
+        def ranges(low, high):
+            least, most, *_, near, far = plainly(low, high)
+            if not low <= 0.5 <= high:
+                return plainly(low, high)
+            central = low + high == 1.0
+            if way > 0:
+                return -math.inf, most, -math.inf, math.inf, -math.inf if central else near, far
+            return least, math.inf, -math.inf, math.inf, near, math.inf if central else far
+
+        curve.ranges = ranges
+        found, run = self.change(curve, way)
+        assert found == (approx(0.3, 4.0), -way, 1.0)
+        assert (run.unproved, run.grazing_place) == (0, NO_ROOT)
+
+    @pytest.mark.parametrize("way", [1, -1])
+    def test_a_piece_is_not_halved_where_rounding_hides_all_of_it(self, way):
+        """Its bounds are no wider than those in its middle."""
+        curve = Curve(lambda place: 0.2 * way, lambda place: 0.0, noise=1.0, tilts=1.0)
+        found, _ = self.change(curve, way)
+        assert found[0] == NOWHERE
+        assert sum(radius > 0.0 for _, radius in curve.asked) == 1
+
+    @pytest.mark.parametrize("way", [1, -1])
     @pytest.mark.parametrize("unit", UNITS)
     def test_a_cusp_that_reaches_zero_is_a_touch(self, way, unit):
         place = 0.4 * unit

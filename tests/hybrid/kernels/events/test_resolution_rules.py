@@ -280,8 +280,9 @@ class TestStays:
         assert self.stays(fired=2, draws=(2,))
 
     def test_not_without_a_jump(self):
-        assert not self.stays(left=NO_MODE)
-        assert not self.stays(fired=NO_TRANSITION)
+        # A transition that ends the run leads to no mode, as if it led back.
+        assert not self.stays(left=NO_MODE, target=(NO_MODE, 1))
+        assert not self.stays(left=0, fired=NO_TRANSITION, draws=(2,), target=(1, 0))
 
     @BOTH
     def test_not_if_its_speed_leads_away(self, way):

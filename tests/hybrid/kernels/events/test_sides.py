@@ -8,6 +8,7 @@ import pytest
 
 from hybrid.kernels.events import sides
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
+from hybrid.kernels.events.sides import FLOWED, LANDED
 from hybrid.kernels.types.codes import NO_TRANSITION
 from tests.hybrid.kernels.plain import plain
 
@@ -95,6 +96,62 @@ class TestLanding:
             expected = not own and before * now == -1
             assert crossed(0, before=before, now=now, own=own) == expected
             assert crossed(0, before=before, now=now, own=own, order=BY_SPEED) == expected
+
+
+class TestTakeSides:
+    """The second of three modes has the guards 1 and 2; the others have 0 and 3."""
+
+    def taken(self, found, came, *, directions=(1, 1), before=(-1, -1), fired=NO_TRANSITION):
+        """Side, due and order of the guards of the mode, which is entered from itself."""
+
+        def side_of(model, run, mode, transition, t, x, before, was_on, work):
+            assert (mode, t, x) == (1, 0.5, "x")
+            return found[transition - 1]
+
+        model = SimpleNamespace(
+            first_outgoing=integers(0, 1, 3, 4),
+            outgoing=integers(0, 1, 2, 3),
+            direction=integers(9, *directions, 9),
+            marker=integers(0, 0, 0, 0),
+            paired=integers(0, 0, 0, 0),
+            parameters=None,
+            field=lambda *given: None,
+        )
+        tested = plain(
+            sides,
+            side_of=side_of,
+            may_jump=lambda *given: False,
+            leaves_by_signs=lambda *given: False,
+            order_passed=lambda model, transition: BY_SPEED,
+            allowed=lambda model, transition, t, x, scalar: True,
+        )
+        side, due, zero = integers(7, *before, 7), integers(7, 0, 0, 7), integers(7, 0, 0, 7)
+        work, run = SimpleNamespace(field=None, scalar=None), SimpleNamespace(last_transversality=9.0)
+        chosen = tested.take_sides(model, run, 1, 0.5, "x", came, 1, fired, side, due, zero, work)
+        # The guards of other modes are left alone.
+        assert [array[[0, 3]].tolist() for array in (side, due, zero)] == [[7, 7]] * 3
+        return chosen, *(array[1:3].tolist() for array in (side, due, zero))
+
+    def test_of_the_guards_of_the_mode_alone(self):
+        found = self.taken(((-1, 0), (-1, 0)), FLOWED)
+        assert found == (NO_TRANSITION, [-1, -1], [0, 0], [0, 0])
+        # One that the flow has crossed is due, the first of several fires.
+        assert self.taken(((-1, 0), (1, 0)), FLOWED) == (2, [-1, 1], [0, 1], [0, BY_SPEED])
+        assert self.taken(((1, BY_SPEED), (1, 0)), FLOWED) == (1, [1, 1], [1, 1], [BY_SPEED] * 2)
+
+    @pytest.mark.parametrize("direction", [1, -1])
+    def test_a_reset_that_stops_the_state_on_its_guard(self, direction):
+        """If only the next step shows the side, the state counts as not across its own guard."""
+        stopped = ((direction, BY_STEP), (direction, BY_STEP))
+        given = {"directions": (direction, direction), "before": (direction, direction)}
+        assert self.taken(stopped, LANDED, fired=1, **given)[1] == [-direction, direction]
+        assert self.taken(stopped, LANDED, fired=2, **given)[1] == [direction, -direction]
+        assert self.taken(stopped, LANDED, fired=3, **given)[1] == [direction, direction]
+        # Neither if its speed tells, nor if it fires both ways.
+        moving = ((direction, BY_SPEED), (direction, BY_SPEED))
+        assert self.taken(moving, LANDED, fired=1, **given)[1] == [direction, direction]
+        both = {"directions": (0, 0), "before": (direction, direction)}
+        assert self.taken(stopped, LANDED, fired=1, **both)[1] == [direction, direction]
 
 
 def test_at_the_end_of_an_instant_nothing_is_due_in_its_mode():

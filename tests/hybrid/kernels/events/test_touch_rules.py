@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.events import touches
+from hybrid.kernels.events import guards, touches
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.plain import plain
 
@@ -59,7 +59,8 @@ class TestTurnAtEnd:
     """Polynomials of degree two and three by their differences at the end of the step."""
 
     def kind(self, *coefficients, rounding=1e-9):
-        stack = np.full((4, 12), 88.0)
+        # Rows are no longer than they must be.
+        stack = np.full((4, len(coefficients) + 2), 88.0)
         given = np.array([*coefficients, 77.0])
         found = kernels.turn_at_end(given, len(coefficients) - 1, rounding, stack)
         assert given.tolist() == [*coefficients, 77.0]
@@ -72,6 +73,7 @@ class TestTurnAtEnd:
         assert self.kind(way, 0.0, 0.0, 0.0) == 0
         assert self.kind(way, 0.0, 0.0, 0.0, 0.0) == way
         assert self.kind(3.0, 3.0, 3.0) == 0
+        assert self.kind(3.0, 3.0, 3.0, 3.0) == 0
         assert self.kind(5.0) == 0
         # The second difference of the last three is 3 - 2 * 2 + 2.
         assert self.kind(9.0 * way, 3.0 * way, 2.0 * way, 2.0 * way) == way
@@ -108,6 +110,14 @@ class TestNoteTouches:
         assert self.touches(bernstein(0.4, 0.4, factor=way, rest=-1e-6)) == []
 
     @BOTH
+    @pytest.mark.parametrize("place", [0.4, 0.6])
+    def test_a_turn_may_lie_beyond_zero_by_rounding(self, place, way):
+        """The largest coefficient, at one end or the other, is 0.36: rounding is 5.8 EPSILON."""
+        for units, count in ((-4.0, 1), (-8.0, 0)):
+            bottom = bernstein(place, place, factor=way, rest=units * EPSILON)
+            assert len(self.touches(bottom)) == count
+
+    @BOTH
     def test_only_turns_between_the_start_and_the_crossing(self, way):
         bottom = bernstein(0.4, 0.4, factor=way, rest=1e-6)
         assert self.touches(bottom, start=0.3) == [self.at(0.4, way * 1e-6)]
@@ -137,10 +147,11 @@ class TestNoteTouches:
 
     @BOTH
     def test_turns_that_only_rounding_parts_are_one(self, way):
-        flat = bernstein(0.4, 0.4, 0.4001, 0.4001, factor=way)
-        ((place, value),) = self.touches(flat)
-        assert place == pytest.approx(0.4, abs=1e-2)
-        assert abs(value) < 1e-15
+        for level in (0.0, 1e-6):
+            flat = bernstein(0.4, 0.4, 0.4002, 0.4002, factor=way, rest=level)
+            ((place, value),) = self.touches(flat)
+            assert place == pytest.approx(0.4, abs=1e-3)
+            assert value == pytest.approx(way * level, abs=1e-15)
 
     @BOTH
     def test_roots_at_the_start_are_put_back(self, way):
@@ -162,6 +173,13 @@ class TestNoteTouches:
         # A guard that ends near zero and moves on does not turn there, nor does one with a flat root.
         assert self.touches(bernstein(1.0, factor=way, rest=1e-6)) == []
         assert self.touches(bernstein(1.0, 1.0, 1.0, factor=way)) == []
+
+    @BOTH
+    def test_a_turn_that_the_end_follows_at_once(self, way):
+        """Up to the end the guard rises by less than rounding, but it does not cross."""
+        ((place, value),) = self.touches(bernstein(1.0 - 1e-9, 1.0 - 1e-9, factor=way, rest=1e-6))
+        assert place == pytest.approx(1.0 - 1e-9, abs=1e-12)
+        assert value == pytest.approx(way * 1e-6, rel=1e-9)
 
     @BOTH
     @pytest.mark.parametrize("size", [2.0**-20, 1.0, 2.0**20])
@@ -219,3 +237,23 @@ class TestRemember:
         assert self.remembered(place, before=(5, 5))
         assert self.remembered(place, before=(7, 5))
         assert self.remembered(place, before=(6, 4))
+
+
+@pytest.mark.parametrize(("used", "room"), [(0, 2), (1, 2), (2, 2), (0, 0)])
+def test_a_record_of_touches_that_is_full_only_counts_them(used, room):
+    tested = plain(guards, guard_speed=lambda *given: 0.0, guard_acceleration=lambda *given: -4.0)
+    names = ("phase", "cycle", "transition", "jumps", "value", "acceleration")
+    record = SimpleNamespace(
+        grazings=used,
+        grazing_state=np.zeros((room, 2)),
+        **{f"grazing_{name}": np.zeros(room) for name in names},
+    )
+    run = SimpleNamespace(grazings=7, mode=1, cycle=3, jumps=5)
+    model = SimpleNamespace(dimension=2, parameters=None, field=lambda *given: None)
+    work = SimpleNamespace(field=None, gradient=None)
+    tested.keep_grazing(model, run, record, 6, 0.5, np.array([1.0, 2.0]), 0.25, work)
+    assert run.grazings == 8
+    if used < room:
+        assert [getattr(record, f"grazing_{name}")[used] for name in names] == [0.5, 3, 6, 5, 0.25, -4.0]
+        assert record.grazing_state[used].tolist() == [1.0, 2.0]
+    assert record.grazings == used + (used < room)

@@ -253,3 +253,32 @@ def test_the_side_after_a_crossing(direction, before, affine, turned, permitted,
     assert touches == ([0] if touched else [])
     assert (run.side, run.due) == ([side], [0 if touched or not permitted else 1])
     assert (run.stage, run.last_step) == ((STALE, 0.0) if touched or not permitted else (0, 1.0))
+
+
+@pytest.mark.parametrize(("matters", "count"), [((), 0), ((1,), 1), ((2,), 1), ((1, 2), 1)])
+def test_an_instant_whose_order_matters_is_counted_once(matters, count):
+    """However many of the guards reached with the first one it matters for; a marker is none of them."""
+    asked = []
+
+    def order_matters(model, run, first, other, work):
+        asked.append((first, other))
+        return other in matters
+
+    tested = plain(
+        module,
+        task_of=lambda task: task,
+        take_sides=lambda *given: None,
+        turns_back=lambda *given: False,
+        allowed=lambda *given: True,
+        order_matters=order_matters,
+    ).first_in_order
+    model = SimpleNamespace(
+        first_outgoing=[0, 4], outgoing=[0, 1, 2, 3], direction=[1] * 4, affine_guard=[1] * 4
+    )
+    model.marker = [0, 0, 0, 1]
+    run = SimpleNamespace(mode=0, phase=0.0, y=None, side=[-1] * 4, due=[1] * 4, on_guard=[1] * 4)
+    run.rehearsal, run.order_mattered = np.zeros((4, 4)), 5
+    task = (None, model, None, run, None, SimpleNamespace(scalar=None))
+    assert tested(task, 0) == 0
+    assert run.order_mattered == 5 + count
+    assert asked == ([(0, 1)] if 1 in matters else [(0, 1), (0, 2)])

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hybrid.kernels.jumps import steep
+from hybrid.kernels.jumps import jump, steep
 from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA
 from tests.hybrid.kernels.plain import plain
 
@@ -196,3 +196,35 @@ def test_the_largest_uncertainty_is_kept():
     tank.run.unknown_time, tank.run.ran_dry = 1.0, 1
     tank.ask()
     assert (tank.run.unknown_time, tank.run.ran_dry) == (1.0, 1)
+
+
+@pytest.mark.parametrize("tangents", [0, 1])
+@pytest.mark.parametrize("locked", [0, 1])
+@pytest.mark.parametrize(("before", "behind"), [(False, False), (True, False), (False, True), (True, True)])
+def test_a_jump_of_tangent_vectors_counts_once_if_it_is_steep_on_either_side(
+    tangents, locked, before, behind
+):
+    """But not if it is locked to another one."""
+
+    def nothing(*given):
+        return 0.0
+
+    run = SimpleNamespace(
+        mode=1, locked=locked, last_kind=0, phase=0.0, y="y", due=[9, 9], steep_jumps=5, ill_conditioned=0
+    )
+    model = SimpleNamespace(dimension=2, target=[0, 1], marker=[1, 1])
+    task = SimpleNamespace(tangents=tangents, orthonormal=0)
+    record, work = SimpleNamespace(jump_phase=np.zeros(4)), SimpleNamespace(new=None, saltation=None)
+    names = ("recall_map", "cross", "follow", "cross_with_map", "cross_without_map", "remember_jump")
+    more = ("map_of_instant", "assume_sizes", "judge", "restore_tangents", "carry_tangents", "leave")
+    tested = plain(
+        jump,
+        task_of=lambda task: (None, model, None, run, record, work),
+        is_steep=lambda *given: before,
+        is_steep_behind=lambda *given: behind,
+        **dict.fromkeys((*names, *more), nothing),
+    )
+    tested.jump(task, 1)
+    counts = tangents > 0 and not locked and (before or behind)
+    assert run.steep_jumps == (6 if counts else 5)
+    assert (run.due, run.locked) == ([9, 0], 0)
