@@ -121,7 +121,9 @@ def nearest_tests(path: Path) -> list[str]:
     if str(path) in NEAREST:
         own = [str(p.relative_to(ROOT)) for p in _of_the_same_name(path)]
         others = [(Path("tests/hybrid") / name).as_posix() for name in NEAREST[str(path)]]
-        return list(dict.fromkeys([*own, *map(os.path.normpath, others)]))
+        found = dict.fromkeys([*own, *map(os.path.normpath, others)])
+        # Tests of single rules compile nothing.
+        return sorted(found, key=lambda name: not name.endswith("_rules.py"))
     tests = _own_tests(path)
     if not tests:
         module = re.compile(rf"\b{re.escape('.'.join(path.with_suffix('').parts))}\b")
