@@ -53,6 +53,8 @@ def choose(monkeypatch):
         # A named mode is entered wherever its guards are; those of other modes do not count.
         ({"ab": BEYOND, "ac": LEAVES, "bc": BEYOND}, "a", (0, ("ab",))),
         ({"ab": BEYOND, "ac": BEYOND}, "b", (1, ())),
+        ({"ab": LEAVES, "bc": BEYOND}, "b", (1, ("bc",))),
+        ({"ab": BEYOND, "bc": math.nan}, "a", (0, ("ab",))),
         ({"ca": BEYOND, "ab": math.nan}, "c", (2, ("ca",))),
         # Without a name, the only mode that no guard objects to.
         ({"ab": BEYOND, "bc": LEAVES}, None, (2, ())),
