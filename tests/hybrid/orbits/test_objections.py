@@ -1,5 +1,7 @@
 """Why the last shot of Newton's method is no periodic orbit: each reason alone, on shots in closed form."""
 
+from types import SimpleNamespace
+
 import attrs
 import numpy as np
 import pytest
@@ -129,3 +131,27 @@ def test_a_guess_without_a_return_stays():
     line = HybridSystem(state=("q",), modes=[Mode("run", lambda t, x, p: (1.0 + 0.0 * x.q,))])
     shooting = module._Shooting(line, None, None, SOLVER)
     assert shooting._time_of_return(Point(np.array([1.0]), 0.0, 3.0)) == 3.0
+
+
+def test_the_search_starts_at_a_later_point_of_the_guess():
+    """A quarter of a turn later a rotation has led ``(1, 0)`` to ``(0, -1)``."""
+    rotation = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -x.q))])
+    shooting = module._Shooting(rotation, None, None, SOLVER)
+    later, moved = shooting._moved(Point(np.array([1.0, 0.0]), 0.7, 2 * np.pi), np.pi / 2)
+    assert later.mode == "run"
+    np.testing.assert_allclose(moved.x, [0.0, -1.0], atol=1e-9)
+    assert (moved.t, moved.period) == pytest.approx((0.7 + np.pi / 2, 2 * np.pi))
+
+
+@pytest.mark.parametrize(("jumps", "quiet"), [([2.0, 12.0], 7.0), ([16.0], 9.95), ([4.0], 9.95)])
+def test_the_quietest_time_is_farthest_from_jumps_in_two_periods(jumps, quiet):
+    """Of a period of 10; the start of the guess counts as a jump too."""
+    asked = []
+
+    def follow(*given, **options):
+        asked.append(given[1])
+        return SimpleNamespace(jumps=SimpleNamespace(t=0.7 + np.array(jumps)))
+
+    found = SimpleNamespace(_follow=follow, mode="run")
+    assert module._Shooting._quiet_time(found, Point(np.zeros(1), 0.7, 10.0)) == pytest.approx(quiet)
+    assert asked == [20.0]
