@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from hybrid import HybridSystem, Mode, Taylor
+from hybrid import Guard, HybridSystem, Mode, Taylor, Transition
 from hybrid.orbits import periodic_orbit as module
 from hybrid.orbits.newton import EPSILON, Newton, Point
 from tests.hybrid.orbits.test_newton import shot
@@ -134,16 +134,24 @@ def test_a_guess_without_a_return_stays():
 
 
 def test_the_search_starts_at_a_later_point_of_the_guess():
-    """A quarter of a turn later a rotation has led ``(1, 0)`` to ``(0, -1)``."""
-    rotation = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -x.q))])
-    shooting = module._Shooting(rotation, None, None, SOLVER)
-    later, moved = shooting._moved(Point(np.array([1.0, 0.0]), 0.7, 2 * np.pi), np.pi / 2)
-    assert later.mode == "run"
-    np.testing.assert_allclose(moved.x, [0.0, -1.0], atol=1e-9)
-    assert (moved.t, moved.period) == pytest.approx((0.7 + np.pi / 2, 2 * np.pi))
+    """Half a turn later a rotation has led ``(1, 0)`` to ``(-1, 0)``, which is on the left."""
+    modes = [Mode(side, lambda t, x, p: (x.v, -x.q)) for side in ("right", "left")]
+    across = Guard(lambda t, x, p: x.q)
+    rotation = HybridSystem(
+        state=("q", "v"),
+        modes=modes,
+        transitions=[Transition("right", "left", across), Transition("left", "right", across)],
+    )
+    shooting = module._Shooting(rotation, "right", None, SOLVER)
+    later, moved = shooting._moved(Point(np.array([1.0, 0.0]), 0.7, 2 * np.pi), np.pi)
+    assert later.mode == "left"
+    np.testing.assert_allclose(moved.x, [-1.0, 0.0], atol=1e-9)
+    assert (moved.t, moved.period) == pytest.approx((0.7 + np.pi, 2 * np.pi))
 
 
-@pytest.mark.parametrize(("jumps", "quiet"), [([2.0, 12.0], 7.0), ([16.0], 9.95), ([4.0], 9.95)])
+@pytest.mark.parametrize(
+    ("jumps", "quiet"), [([2.0, 12.0], 7.0), ([16.0], 9.95), ([4.0], 9.95), ([9.0, 19.0], 4.5)]
+)
 def test_the_quietest_time_is_farthest_from_jumps_in_two_periods(jumps, quiet):
     """Of a period of 10; the start of the guess counts as a jump too."""
     asked = []
