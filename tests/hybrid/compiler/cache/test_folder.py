@@ -266,9 +266,10 @@ def test_a_full_disk_stops_nothing(new_process, monkeypatch, capsys):
 
 
 def test_a_folder_that_is_made_for_a_file_is_its_users_alone(tmp_path):
-    path = tmp_path / "new" / "a.txt"
-    assert keep(path, b"a")
-    assert kept(path) == b"a"
+    path = tmp_path / "new" / "deeper" / "a.txt"
+    for content in (b"a", b"b"):
+        assert keep(path, content)
+        assert kept(path) == content
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
 
 
