@@ -37,6 +37,7 @@ NEAREST = {
         "compiler/cache/test_folder.py",
         "compiler/test_cases.py",
     ),
+    "hybrid/compiler/llvm/lowering.py": ("compiler/llvm/test_lowering.py", "compiler/test_emit.py"),
     "hybrid/compiler/propagators/affine.py": (
         "compiler/taylor/test_linear.py",
         "compiler/taylor/test_series.py",

@@ -13,6 +13,7 @@ from hybrid.compiler import emit
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT
+from hybrid.system.functions import field_function, guard_function
 from hybrid.transform.markers import with_section
 from models import bouncing_ball, impact_oscillator, vibroimpact
 
@@ -187,3 +188,13 @@ def test_a_period_that_is_not_proved_is_examined_at_each_value_once(frequency, f
         monkeypatch.setattr(compiling, "period_fault", None)
         check()
         assert found.periodic_at == {values.tobytes()}
+
+
+def test_derivatives_have_one_column_per_state_and_one_for_time():
+    """The field ``(v, -g)`` and the guard ``q`` of a ball do not change with time."""
+    ball, values = compile_system(bouncing_ball()), bouncing_ball().parameter_values()
+    x = np.array([1.0, 2.0])
+    field = field_function(ball.system.modes[0], 2)
+    assert ball.derivative(field, 0, 0.0, x, values).tolist() == [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
+    guard = guard_function(ball.system.transitions[0])
+    assert ball.derivative(guard, 0, 0.0, x, values).tolist() == [[1.0, 0.0, 0.0]]

@@ -1,10 +1,12 @@
 """Why the last shot of Newton's method is no periodic orbit: each reason alone, on shots in closed form."""
 
+from types import SimpleNamespace
+
 import attrs
 import numpy as np
 import pytest
 
-from hybrid import HybridSystem, Mode, Taylor
+from hybrid import Guard, HybridSystem, Mode, Taylor, Transition
 from hybrid.orbits import periodic_orbit as module
 from hybrid.orbits.newton import EPSILON, Newton, Point
 from tests.hybrid.orbits.test_newton import shot
@@ -129,3 +131,51 @@ def test_a_guess_without_a_return_stays():
     line = HybridSystem(state=("q",), modes=[Mode("run", lambda t, x, p: (1.0 + 0.0 * x.q,))])
     shooting = module._Shooting(line, None, None, SOLVER)
     assert shooting._time_of_return(Point(np.array([1.0]), 0.0, 3.0)) == 3.0
+
+
+def test_the_search_starts_at_a_later_point_of_the_guess():
+    """Half a turn later a rotation has led ``(1, 0)`` to ``(-1, 0)``, which is on the left."""
+    modes = [Mode(side, lambda t, x, p: (x.v, -x.q)) for side in ("right", "left")]
+    across = Guard(lambda t, x, p: x.q)
+    rotation = HybridSystem(
+        state=("q", "v"),
+        modes=modes,
+        transitions=[Transition("right", "left", across), Transition("left", "right", across)],
+    )
+    shooting = module._Shooting(rotation, "right", None, SOLVER)
+    later, moved = shooting._moved(Point(np.array([1.0, 0.0]), 0.7, 2 * np.pi), np.pi)
+    assert later.mode == "left"
+    np.testing.assert_allclose(moved.x, [-1.0, 0.0], atol=1e-9)
+    assert (moved.t, moved.period) == pytest.approx((0.7 + np.pi, 2 * np.pi))
+
+
+@pytest.mark.parametrize(
+    ("jumps", "quiet"), [([2.0, 12.0], 7.0), ([16.0], 9.95), ([4.0], 9.95), ([9.0, 19.0], 4.5)]
+)
+def test_the_quietest_time_is_farthest_from_jumps_in_two_periods(jumps, quiet):
+    """Of a period of 10; the start of the guess counts as a jump too."""
+    asked = []
+
+    def follow(*given, **options):
+        asked.append(given[1])
+        return SimpleNamespace(jumps=SimpleNamespace(t=0.7 + np.array(jumps)))
+
+    found = SimpleNamespace(_follow=follow, mode="run")
+    assert module._Shooting._quiet_time(found, Point(np.zeros(1), 0.7, 10.0)) == pytest.approx(quiet)
+    assert asked == [20.0]
+
+
+@pytest.mark.parametrize(
+    ("times", "signature"),
+    [([0.7, 2.0, 3.7], ("a", "0", "1")), ([2.0, 3.7], ("a", "0", "1")), ([0.7, 2.0], ("a", "0", "1"))],
+)
+def test_a_jump_at_the_start_counts_once(times, signature):
+    """It may be met again at the end, one period of 3 later; a jump at the end alone counts too."""
+    jumps = [SimpleNamespace(t=t, target=str(i)) for i, t in enumerate(times)]
+    found = SimpleNamespace(
+        _follow=lambda *given: SimpleNamespace(jumps=jumps),
+        system=SimpleNamespace(forcing_period=lambda parameters: None),
+        parameters=None,
+    )
+    start = SimpleNamespace(point=Point(np.zeros(1), 0.7, 3.0), mode="a")
+    assert module._Shooting._signature(found, start) == signature

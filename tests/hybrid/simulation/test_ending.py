@@ -21,6 +21,8 @@ from hybrid import (
 )
 from hybrid.kernels.types import codes
 from hybrid.simulation import ending
+from hybrid.status import Status
+from hybrid.system.growth import Unexplored
 
 
 def parabola(depth):
@@ -218,6 +220,41 @@ def test_an_order_that_mattered_is_said_with_what_grazed():
         assert ("5 of 9 jumps grazed" in found.message) == (tangents > 0)
     alone = ending._status(finished(order_mattered=4), codes.DONE)
     assert "grazed" not in alone.message
+
+
+@pytest.mark.parametrize(
+    ("code", "last", "onward", "extended"),
+    [
+        (StatusCode.TERMINAL, 0, {"first"}, ["first"]),
+        (StatusCode.TERMINAL, 1, {"second"}, ["second"]),
+        (StatusCode.TERMINAL, 1, {"first"}, []),
+        (StatusCode.TERMINAL, -1, {"first", "second"}, []),
+        (StatusCode.MAX_STEPS, 0, {"first", "second"}, []),
+    ],
+)
+def test_a_run_that_ends_at_a_mode_not_made_yet_has_it_made(code, last, onward, extended):
+    made = []
+    growth = SimpleNamespace(leads_on=onward.__contains__, extend=made.append)
+    system = SimpleNamespace(growth=growth, transition_names=("first", "second"))
+    found = SimpleNamespace(system=system, run=SimpleNamespace(last_fired=last))
+    if extended:
+        with pytest.raises(Unexplored, match=extended[0]):
+            ending._grow(found, code)
+    else:
+        ending._grow(found, code)
+    assert made == extended
+
+
+@pytest.mark.parametrize("code", [StatusCode.SUCCESS, StatusCode.DISCONTINUOUS_FIELD])
+def test_kinks_are_not_told_beside_jumps(code, monkeypatch):
+    for name in ("_start_beyond", "_held", "_run_dry", "_unproved", "_unresolved"):
+        monkeypatch.setattr(ending, name, lambda trajectory: ())
+    monkeypatch.setattr(ending, "_kinks", lambda trajectory: ["Kinks."])
+    monkeypatch.setattr(ending, "_status", lambda trajectory, code: Status(code, "Done.", ""))
+    found = ending.status_of(
+        SimpleNamespace(system=SimpleNamespace(growth=None), run=SimpleNamespace(last_fired=-1)), code
+    )
+    assert found.message == ("Done. Kinks." if code == StatusCode.SUCCESS else "Done.")
 
 
 @pytest.mark.parametrize(

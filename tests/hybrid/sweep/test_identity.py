@@ -8,7 +8,7 @@ import pytest
 
 import hybrid
 import models
-from hybrid.sweep.identity import facts_of, model_of
+from hybrid.sweep.identity import attributes_of, facts_of, model_of
 
 FACTOR = 2.0
 
@@ -191,3 +191,23 @@ def test_a_task_may_give_its_facts():
     assert facts_of(Task(1))["n"] == "1"
     assert facts_of(Task(1))["3"] == "'three'"
     assert "code of the task" not in facts_of(Task(1))
+
+
+def test_a_dataset_says_the_facts_that_are_no_models():
+    """Numbers and texts as they are, other values as JSON."""
+
+    def task(p):
+        return {}
+
+    system = models.bouncing_ball()
+    task.system = system
+    task.facts = {"model": system, "steps": 3, "solver": "Taylor", "left out": None, "span": (0.0, 1.5)}
+    found = attributes_of(task)
+    assert {name: found.get(name) for name in task.facts} == {
+        "model": system.name,
+        "steps": 3,
+        "solver": "Taylor",
+        "left out": None,
+        "span": "[0.0, 1.5]",
+    }
+    assert found["model_parameters"] == '{"g": 9.81, "e": 0.8}'

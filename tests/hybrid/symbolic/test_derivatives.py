@@ -162,3 +162,10 @@ def test_a_switch_so_sharp_that_its_exponential_overflows(solver):
     assert arc.status.ok
     assert arc.x[-1, 1] == pytest.approx(2.5, rel=1e-6)
     assert arc.fundamental == pytest.approx(np.array([[1.0, 0.0], [1.0, 1.0]]), rel=1e-6)
+
+
+def test_a_multiple_of_a_difference_is_not_multiplied_out():
+    """``3 (a - b)`` is exact where ``a - b`` is one bit, and ``3 a - 3 b`` is a third larger."""
+    [[slope]] = jacobian_of([sympy.Mul(3, c, a - b, evaluate=False)], [c])
+    bit = np.finfo(float).eps
+    assert sympy.lambdify((a, b), slope)(1.0 + bit, 1.0) == 3.0 * bit

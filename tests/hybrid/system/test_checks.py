@@ -115,6 +115,8 @@ def test_shape_of_derivatives():
     fails("Mode 'flight': jacobian returned 1 rows of 2 values", jacobian=lambda t, x, p: ((0.0, 1.0),))
     fails("it must return 2 rows of 2 or 3 values", jacobian=lambda t, x, p: ((0.0,), (1.0,)))
     fails("Transition 'bounce': gradient returned 1 values", gradient=lambda t, x, p: (1.0,))
+    fails("gradient returned 4 values", gradient=lambda t, x, p: (1.0, 0.0, 0.0, 0.0))
+    assert system(gradient=lambda t, x, p: (1.0, 0.0, 0.0)).transitions[0].guard.gradient is not None
 
 
 def test_an_error_of_the_function_itself_is_told_and_chained():

@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import time
@@ -17,6 +18,7 @@ from hybrid.compiler.cache.folder import (
     cache_directory,
     cache_folder,
     keep,
+    kept,
     source_key,
 )
 from hybrid.compiler.cache.loader import kernels_key, load_kernels, sources_key
@@ -261,6 +263,14 @@ def test_a_full_disk_stops_nothing(new_process, monkeypatch, capsys):
     lines = [line for line in capsys.readouterr().err.splitlines() if "compiling" not in line]
     assert lines == ["hybrid: compiled code cannot be saved: No space left on device."]
     assert [path for path in store.models_folder().iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_folder_that_is_made_for_a_file_is_its_users_alone(tmp_path):
+    path = tmp_path / "new" / "deeper" / "a.txt"
+    for content in (b"a", b"b"):
+        assert keep(path, content)
+        assert kept(path) == content
+    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
 
 
 def test_a_draft_that_was_not_finished_is_removed(tmp_path, monkeypatch, capsys):
