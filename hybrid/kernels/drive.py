@@ -28,6 +28,7 @@ from hybrid.kernels.types.codes import (
     RESTING,
     RUNGE_KUTTA,
     STALE,
+    STEP_TOO_SMALL,
     STUCK,
     TERMINAL,
 )
@@ -38,6 +39,10 @@ from hybrid.kernels.types.options import KERNEL, exported
 # More jumps than this at one instant, in total or per transition, count as endless.
 MOST_JUMPS_AT_ONCE = 1000
 MOST_JUMPS_EACH = 100
+# So many steps in a row that are no longer than this share of what remains lead nowhere: beside a place where
+# the field is not defined, the state may be too close to that place to move by more than its rounding.
+CREEP = 1e-12
+MOST_CREEPING = 100_000
 # A landing may be this many times as far from its guard as the rounding of the state.
 MOST_ROUNDING = 64.0
 
@@ -215,6 +220,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         code, span = step(parts, task, remaining)
         if code != GO_ON:
             return int(code)
+        creeps = run.pending == NO_TRANSITION and span <= CREEP * remaining
+        run.creeping = run.creeping + 1 if creeps else 0
+        if run.creeping > MOST_CREEPING:
+            return STEP_TOO_SMALL
         forward(run, model.period, span)
         run.since_entry += span
         run.longest_step = max(run.longest_step, span)

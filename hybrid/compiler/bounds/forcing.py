@@ -18,8 +18,24 @@ from sympy.codegen.cfunctions import exp2, expm1
 
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
-from hybrid.symbolic.expressions import Absolute, Maximum, Together
-from hybrid.symbolic.nodes import degree_of, mentions, nodes_of, once
+from hybrid.symbolic.expressions import (
+    Absolute,
+    Ceiling,
+    Equal,
+    Floor,
+    Less,
+    LessEqual,
+    Maximum,
+    Minimum,
+    Remainder,
+    Sign,
+    Step,
+    Together,
+    Truncate,
+    TruncatedRemainder,
+    number,
+)
+from hybrid.symbolic.nodes import degree_of, mentions, nodes, nodes_of, once
 from hybrid.symbolic.signs import simplified
 from hybrid.symbolic.tracing import Symbols
 
@@ -33,6 +49,14 @@ NO_COMPONENT = -1
 EXPONENTIAL = (sympy.exp, sympy.tanh, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
 # Functions that switch once between two values.
 SWITCHES = (sympy.tanh, sympy.erf)
+# Beyond this argument they are constant to all digits.
+FLAT = 20.0
+# Functions that are constant but for jumps.
+JUMPS = (Sign, Step, Less, LessEqual, Equal, Floor, Ceiling, Truncate)
+# The difference of both sides of a kink or jump, in the place of the change of an argument.
+APART = 16
+# Terms that fall like this power of the distance from a pulse, or more slowly, are seen from afar.
+MOST_FALL = 2.0
 # Functions that may be flat to all digits and change a little further on.
 SATURATING = (*EXPONENTIAL, sympy.atan)
 # Functions with a branch point, beyond which their series goes on: that of ``arcsin(sin(q))`` is ``q``.
@@ -102,57 +126,106 @@ def forcings(
     )
     times = times_of(field, symbols)
     found = dict.fromkeys(each for i, entry in enumerate(field) for each in _parts(entry, i, times))
-    if any(_saturates(entry, symbols.variables, roots) for entry in field):
-        arguments, *terms = _in_state(field, symbols)
-        if terms or not found:
-            found.update(dict.fromkeys([arguments, *terms]))
+    arguments, *terms = _in_state(field, known, times, symbols)
+    saturates = any(_saturates(entry, symbols.variables, roots) for entry in field)
+    if terms or (saturates and not found):
+        found.update(dict.fromkeys([arguments, *terms]))
     return tuple(found)
 
 
-def _in_state(field: Sequence[sympy.Expr], symbols: Symbols) -> Iterator[Forcing]:
-    """The arguments of exponentials in the terms of a field that may be pulses, and these terms.
-
-    The tails of a quotient of polynomials, or of a root, are never flat to all digits.
-    """
-    terms = [
-        [
-            term
-            for term in sympy.Add.make_args(entry)
-            if exponents_of(term, symbols.x) and not is_harmless(term, symbols.variables)
-        ]
-        for entry in field
-    ]
-    terms = [[] if _is_switch(entry, symbols.variables) else entry for entry in terms]
-    exponents = dict.fromkeys(
-        each for entry in terms for term in entry for each in exponents_of(term, symbols.x)
-    )
-    yield Forcing(sympy.Tuple(*exponents) if exponents else None, NO_COMPONENT, ARGUMENTS)
+def _in_state(
+    field: Sequence[sympy.Expr], known: Sequence[sympy.Expr], times: Times, symbols: Symbols
+) -> Iterator[Forcing]:
+    """The terms of a field that may be pulses in the state, behind the arguments that tell where."""
+    terms: list[list[sympy.Expr]] = []
+    arguments = dict[sympy.Expr, None]()
+    for entry in field:
+        terms.append([])
+        for term in sympy.Add.make_args(simplified(entry, known)):
+            if not mentions(term, times.state) or is_harmless(term, symbols.variables):
+                continue
+            found = arguments_of(term, symbols.x)
+            arguments.update(dict.fromkeys(found))
+            terms[-1] += [term] if found else []
+    yield Forcing(sympy.Tuple(*arguments) if arguments else None, NO_COMPONENT, ARGUMENTS)
     for i, entry in enumerate(terms):
         if entry:
             yield Forcing(sympy.Add(*entry), i, TERMS)
 
 
-def _is_switch(terms: Sequence[sympy.Expr], variables: tuple[sympy.Symbol, ...]) -> bool:
-    """Whether terms are one smooth switch, as ``tanh(v/w)`` of friction: two are needed for a pulse."""
-    if len(terms) != 1:
-        return False
-    factors = sympy.Mul.make_args(terms[0])
-    switches = [each for each in factors if isinstance(each, SWITCHES)]
-    if len(switches) != 1:
-        return False
-    degree = degree_of(switches[0].args[0], frozenset(variables))
-    return degree == 1 and is_harmless(terms[0] / switches[0], variables)
+def arguments_of(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> list[sympy.Expr]:
+    """What changes by more than 8 on each step on which a part of an expression may be flat and then change.
 
-
-def exponents_of(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> list[sympy.Expr]:
-    """The arguments of the exponentials in an expression, and of functions that are made of them."""
-    found = [node.args[0] for node in nodes_of(EXPONENTIAL, expression)]
-    found += [
-        power.exp * sympy.log(power.base)
-        for power in nodes_of(sympy.Pow, expression)
-        if mentions(power.exp, variables) and not mentions(power.base, variables)
+    These are the arguments of exponentials, the logarithms of powers, and the sides of kinks and jumps.
+    """
+    found = [
+        argument
+        for node in nodes(expression)
+        if mentions(node, variables)
+        for argument in _own_arguments(node, variables)
     ]
-    return [each for each in found if mentions(each, variables)]
+    found += _logarithms(expression, variables)
+    return [each for each in dict.fromkeys(found) if mentions(each, variables)]
+
+
+def _own_arguments(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Iterator[sympy.Expr]:
+    """The arguments of one node, if it is an exponential, a kink or a jump."""
+    if isinstance(node, SWITCHES):
+        # Far from its switch it is a constant, however much its argument changes.
+        yield Maximum(Minimum(node.args[0], number(FLAT)), number(-FLAT))
+    elif isinstance(node, EXPONENTIAL):
+        yield node.args[0]
+    elif node.is_Pow and mentions(node.exp, variables):
+        yield node.exp * sympy.log(node.base)
+    elif isinstance(node, JUMPS):
+        yield APART * node
+    elif isinstance(node, Absolute):
+        yield APART * Sign(node.args[0])
+    elif isinstance(node, Maximum | Minimum):
+        yield APART * Sign(node.args[0] - node.args[1])
+    elif isinstance(node, Remainder):
+        yield APART * Floor(node.args[0] / node.args[1])
+    elif isinstance(node, TruncatedRemainder):
+        yield APART * Truncate(node.args[0] / node.args[1])
+
+
+def _logarithms(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Iterator[sympy.Expr]:
+    """Logarithms of powers that are high, or that fall so fast that no solver sees their tails from afar.
+
+    The tails of a term that falls like ``z**-2``, as gravity does, show wherever the pulse itself matters.
+    """
+    if not mentions(node, variables):
+        return
+    factors = sympy.Mul.make_args(node)
+    falls = sum(_growth(each, variables) for each in factors) < -MOST_FALL
+    for factor in factors:
+        if not factor.is_Pow or mentions(factor.exp, variables):
+            for part in factor.args:
+                yield from _logarithms(part, variables)
+            continue
+        high = not factor.exp.is_number or abs(factor.exp) > MOST_FACTORS
+        if mentions(factor.base, variables) and (high or (falls and factor.exp.is_negative)):
+            yield factor.exp * sympy.log(Absolute(factor.base))
+        yield from _logarithms(factor.base, variables)
+
+
+@once
+def _growth(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> float:
+    """The power of the distance with which an expression grows, or falls, near a place where it is large.
+
+    A sine is the distance from its zero there.
+    """
+    if not mentions(node, variables):
+        return 0.0
+    if node.is_Mul:
+        return sum(_growth(each, variables) for each in node.args)
+    if node.is_Add:
+        return max(_growth(each, variables) for each in node.args)
+    if node.is_Pow and node.exp.is_number:
+        return float(node.exp) * _growth(node.base, variables)
+    if isinstance(node, Absolute | Together | Maximum | Minimum):
+        return max(_growth(each, variables) for each in node.args)
+    return 1.0
 
 
 @once

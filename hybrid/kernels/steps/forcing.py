@@ -5,8 +5,9 @@ see a pulse between them. So each part of the field that depends on time alone i
 component of the state that grows at a constant rate tells the time as well. Where the forcing is monotone
 over many steps to come, it costs nothing.
 
-Parts that may be flat and have a pulse in the state, such as a narrow bump of a potential, are bounded over
-the series, or over a cubic through the ends of an attempted step.
+Parts that may be flat and have a pulse in the state, such as a narrow bump of a potential or a contact that
+the orbit meets for a moment, are bounded over the series, or over a cubic through the ends of an attempted
+step.
 """
 
 import math

@@ -186,6 +186,7 @@ COUNTERS = (
     "at_rest",
     "round",
     "crawling",
+    "creeping",
     "indistinct",
     "unchecked",
     "unresolved",
