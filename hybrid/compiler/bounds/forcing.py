@@ -189,24 +189,28 @@ def _own_arguments(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Ite
         yield APART * Truncate(node.args[0] / node.args[1])
 
 
-def _logarithms(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Iterator[sympy.Expr]:
+def _logarithms(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Iterator[sympy.Expr]:
     """Logarithms of powers that are high, or that fall so fast that no solver sees their tails from afar.
 
     The tails of a term that falls like ``z**-2``, as gravity does, show wherever the pulse itself matters.
     """
-    if not mentions(node, variables):
-        return
-    factors = sympy.Mul.make_args(node)
-    falls = sum(_growth(each, variables) for each in factors) < -MOST_FALL
-    for factor in factors:
-        if not factor.is_Pow or mentions(factor.exp, variables):
-            for part in factor.args:
-                yield from _logarithms(part, variables)
+    # Not by recursion: parts that are shared would be visited once for each way that leads to them.
+    seen, waiting = set[sympy.Expr](), [expression]
+    while waiting:
+        node = waiting.pop()
+        if node in seen or not mentions(node, variables):
             continue
-        high = not factor.exp.is_number or abs(factor.exp) > MOST_FACTORS
-        if mentions(factor.base, variables) and (high or (falls and factor.exp.is_negative)):
-            yield factor.exp * sympy.log(Absolute(factor.base))
-        yield from _logarithms(factor.base, variables)
+        seen.add(node)
+        factors = sympy.Mul.make_args(node)
+        falls = sum(_growth(each, variables) for each in factors) < -MOST_FALL
+        for factor in factors:
+            if not factor.is_Pow or mentions(factor.exp, variables):
+                waiting.extend(factor.args)
+                continue
+            high = not factor.exp.is_number or abs(factor.exp) > MOST_FACTORS
+            if mentions(factor.base, variables) and (high or (falls and factor.exp.is_negative)):
+                yield factor.exp * sympy.log(Absolute(factor.base))
+            waiting.append(factor.base)
 
 
 @once
