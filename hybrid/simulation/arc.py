@@ -231,33 +231,49 @@ class Pieces:
 
     Attributes
     ----------
+    blocks
+        The polynomials of successive steps, ``(steps of a block, d + 1, n + 1)`` each: coefficients of
+        ``1, theta, theta^2, ...`` of the state and, in the last column, of the time since the start of the
+        step. In a desingularised mode the time is not proportional to ``theta``.
     t, low, h
         Start of each step, the rounding error of that start, and the length of the step, ``(S,)``.
     mode, j
         Mode index and jump count of each, ``(S,)``.
-    coefficients
-        ``(S, d + 1, n + 1)``: coefficients of ``1, theta, theta^2, ...`` of the state and, in the last
-        column, of the time since the start of the step. In a desingularised mode the time is not
-        proportional to ``theta``.
     """
 
+    blocks: list[np.ndarray]
     t: np.ndarray
     low: np.ndarray
     h: np.ndarray
     mode: np.ndarray
     j: np.ndarray
-    coefficients: np.ndarray
+
+    @property
+    def starts(self) -> np.ndarray:
+        """States at the starts of the steps, ``(S, n)``."""
+        return np.concatenate([block[:, 0, :-1] for block in self.blocks])
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """The polynomials in one array, ``(S, d + 1, n + 1)``.
+
+        They are joined when somebody first asks: of a long run, that takes longer than the run.
+        """
+        if len(self.blocks) > 1:
+            self.blocks[:] = [np.concatenate(self.blocks)]
+        return self.blocks[0]
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(len(times), n)``, and the steps they are taken from; at a jump, the state after it."""
-        states = np.empty((len(times), self.coefficients.shape[2] - 1))
+        coefficients = self.coefficients
+        states = np.empty((len(times), coefficients.shape[2] - 1))
         index = np.empty(len(times), dtype=np.int64)
         kernel = load_kernels("hybrid.kernels.steps.dense").states_at
         times = np.ascontiguousarray(times)
         # Between two calls Ctrl-C is heard.
         for first in range(0, len(times), TIMES_AT_ONCE):
             part = slice(first, first + TIMES_AT_ONCE)
-            kernel(times[part], self.t, self.low, self.h, self.coefficients, states[part], index[part])
+            kernel(times[part], self.t, self.low, self.h, coefficients, states[part], index[part])
         return states, index
 
 
@@ -401,7 +417,7 @@ def hybrid_points(
     return (
         in_order(pieces.t, jumps.t, t_end),
         in_order(pieces.j, count, len(jumps)),
-        in_order(pieces.coefficients[:, 0, :-1], jumps.x_minus, x_end),
+        in_order(pieces.starts, jumps.x_minus, x_end),
         in_order(pieces.mode, sources[jumps.transition_index], mode_end),
     )
 

@@ -132,6 +132,7 @@ class _Recorder:
         n, degree = trajectory.model.dimension, trajectory.plan.degree
         self.layout = record_layout(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
         self.steps: list[tuple[np.ndarray, ...]] = []
+        self.blocks: list[np.ndarray] = []
         self.jumps: list[tuple[np.ndarray, ...]] = []
         self.grazings: list[Grazing] = []
         self.states = np.empty((0 if times is None else len(times), trajectory.model.dimension))
@@ -154,7 +155,7 @@ class _Recorder:
         end = (t_end, trajectory.x, run.mode)
         pieces = None
         if self.times is None:
-            pieces = Pieces(*join(self.steps))
+            pieces = Pieces(self.blocks, *join(self.steps))
             t, j, x, mode = hybrid_points(system, pieces, jumps, end)
         else:
             self._sample_end(*end)
@@ -193,15 +194,16 @@ class _Recorder:
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
-            places, polynomials = _places_of_steps(record, steps, period), record.step_coefficients[:steps]
+            self.steps.append(_places_of_steps(record, steps, period))
+            polynomials = record.step_coefficients[:steps]
             if 2 * steps > self.steps_at_once:
                 # The arc keeps the record: new memory costs more than what of this was not used.
-                self.steps.append((*places, polynomials))
+                self.blocks.append(polynomials)
                 return
-            self.steps.append((*places, polynomials.copy()))
+            self.blocks.append(polynomials.copy())
         elif steps:
             places = _places_of_steps(record, steps, period)
-            self._sample(Pieces(*places, record.step_coefficients[:steps]))
+            self._sample(Pieces([record.step_coefficients[:steps]], *places))
         self.layout.take_back(record)
 
     def _sample(self, pieces: Pieces) -> None:

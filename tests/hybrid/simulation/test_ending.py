@@ -248,7 +248,7 @@ def test_a_run_that_ends_at_a_mode_not_made_yet_has_it_made(code, last, onward, 
 @pytest.mark.parametrize("code", [StatusCode.SUCCESS, StatusCode.DISCONTINUOUS_FIELD])
 def test_kinks_are_not_told_beside_jumps(code, monkeypatch):
     for name in ("_start_beyond", "_held", "_run_dry", "_unproved", "_unresolved"):
-        monkeypatch.setattr(ending, name, lambda trajectory: ())
+        monkeypatch.setattr(ending, name, lambda *given: ())
     monkeypatch.setattr(ending, "_kinks", lambda trajectory: ["Kinks."])
     monkeypatch.setattr(ending, "_status", lambda trajectory, code: Status(code, "Done.", ""))
     found = ending.status_of(

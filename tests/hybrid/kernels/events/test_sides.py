@@ -101,7 +101,9 @@ class TestLanding:
 class TestTakeSides:
     """The second of three modes has the guards 1 and 2; the others have 0 and 3."""
 
-    def taken(self, found, came, *, directions=(1, 1), before=(-1, -1), fired=NO_TRANSITION):
+    def taken(
+        self, found, came, *, directions=(1, 1), before=(-1, -1), fired=NO_TRANSITION, left_behind=False
+    ):
         """Side, due and order of the guards of the mode, which is entered from itself."""
 
         def side_of(model, run, mode, transition, t, x, before, was_on, work):
@@ -122,11 +124,14 @@ class TestTakeSides:
             side_of=side_of,
             may_jump=lambda *given: False,
             leaves_by_signs=lambda *given: False,
+            guard_speed=lambda *given: 3.0,
+            was_left_behind=lambda model, run, transition, t, x, speed, side, work: left_behind,
             order_passed=lambda model, transition: BY_SPEED,
             allowed=lambda model, transition, t, x, scalar: True,
         )
         side, due, zero = integers(7, *before, 7), integers(7, 0, 0, 7), integers(7, 0, 0, 7)
-        work, run = SimpleNamespace(field=None, scalar=None), SimpleNamespace(last_transversality=9.0)
+        work = SimpleNamespace(field=None, gradient=None, scalar=None)
+        run = SimpleNamespace(last_transversality=9.0)
         chosen = tested.take_sides(model, run, 1, 0.5, "x", came, 1, fired, side, due, zero, work)
         # The guards of other modes are left alone.
         assert [array[[0, 3]].tolist() for array in (side, due, zero)] == [[7, 7]] * 3
@@ -138,6 +143,21 @@ class TestTakeSides:
         # One that the flow has crossed is due, the first of several fires.
         assert self.taken(((-1, 0), (1, 0)), FLOWED) == (2, [-1, 1], [0, 1], [0, BY_SPEED])
         assert self.taken(((1, BY_SPEED), (1, 0)), FLOWED) == (1, [1, 1], [1, 1], [BY_SPEED] * 2)
+
+    def test_a_guard_that_is_about_to_reach_where_it_has_fired(self):
+        """It lies before its guard by a finer rounding than that within which it has fired."""
+        for came in (FLOWED, LANDED):
+            found = self.taken(((-1, 0), (-1, 0)), came, directions=(0, -1), before=(1, 1), left_behind=True)
+            assert found == (NO_TRANSITION, [1, 1], [0, 0], [0, 0])
+        # Not a guard that is zero, nor one whose own reset has led here.
+        found = self.taken(
+            ((-1, BY_SPEED), (-1, 0)), FLOWED, directions=(0, 0), before=(1, 1), left_behind=True
+        )
+        assert found == (1, [-1, 1], [1, 0], [BY_SPEED, 0])
+        own = self.taken(
+            ((-1, 0), (1, 0)), LANDED, directions=(1, 1), before=(1, 1), fired=1, left_behind=True
+        )
+        assert own == (NO_TRANSITION, [-1, 1], [0, 0], [0, 0])
 
     @pytest.mark.parametrize("direction", [1, -1])
     def test_a_reset_that_stops_the_state_on_its_guard(self, direction):

@@ -222,6 +222,7 @@ def test_a_jump_of_tangent_vectors_counts_once_if_it_is_steep_on_either_side(
         task_of=lambda task: (None, model, None, run, record, work),
         is_steep=lambda *given: before,
         is_steep_behind=lambda *given: behind,
+        keep_unknown_time=nothing,
         **dict.fromkeys((*names, *more), nothing),
     )
     tested.jump(task, 1)
