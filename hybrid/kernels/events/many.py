@@ -8,12 +8,14 @@ from hybrid.kernels.types.codes import (
     DESINGULARISED,
     DONE,
     GO_ON,
+    HELD,
     MAX_STEPS,
     NO_MODE,
     NO_OBJECTION,
     NO_TRANSITION,
     REFUSED,
     ROOTED,
+    RUNGE_KUTTA,
 )
 from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, VECTOR
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
@@ -62,13 +64,20 @@ def mode_of_start(parts, task, named, verdicts):
 
 
 @njit(**KERNEL)
-def is_plain(run, verdicts):
-    """Whether there is nothing to tell of a run that has reached its end."""
+def is_plain(model, run, verdicts):
+    """Whether there is nothing to tell of a run that has reached its end.
+
+    In doubt there is: the status that is made then knows.
+    """
     notes = run.unproved + run.unresolved + run.coarse + run.order_mattered
     for i in range(verdicts.shape[0]):
         if verdicts[i] == BEYOND:
             notes += 1
-    return notes == 0
+    for i in range(model.dimension):
+        if run.trail[HELD, i] != 0.0:
+            notes += 1
+    steep = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA
+    return notes == 0 and not steep and run.lateness <= 1.0 and run.unknown_time == 0.0
 
 
 @exported(
@@ -151,7 +160,7 @@ def many_runs(
                 states[i, s, c] = run.y[c]
             places[i, 2] = s + 1
         places[i, 0], places[i, 1] = run.mode, run.jumps
-        if not is_plain(run, verdicts):
+        if not is_plain(task.model, run, verdicts):
             return DONE
     reached[0] = origins.shape[0]
     return DONE

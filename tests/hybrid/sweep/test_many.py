@@ -195,3 +195,54 @@ def test_every_start_is_in_one_block(count, monkeypatch):
     monkeypatch.setattr(many._Runs, "run", recorded)
     simulate_many(OSCILLATOR, STARTS[:count], (0.3, 0.5), executor=1)
     assert starts == list(range(count))
+
+
+def late():
+    """A force at a time so late that its rounding matters."""
+    mode = hybrid.Mode("swing", lambda t, x, p: (x.v, np.cos(t) - x.q))
+    return (
+        hybrid.HybridSystem(state=("q", "v"), modes=[mode], transitions=[]),
+        (1e12, 1e12 + 10.0),
+        (1.0, 0.0),
+    )
+
+
+def dry():
+    """A level that runs dry in steps in time, and waits."""
+    modes = [
+        hybrid.Mode("drain", lambda t, x, p: (-(x.h**0.9),)),
+        hybrid.Mode("empty", lambda t, x, p: (0.0,)),
+    ]
+    guard = hybrid.Guard(lambda t, x, p: x.h, -1)
+    transitions = [hybrid.Transition("drain", "empty", guard)]
+    return hybrid.HybridSystem(state=("h",), modes=modes, transitions=transitions), (0.0, 20.0), (1.0,)
+
+
+def counted():
+    """A ball that counts its impacts up to their limit, where it rests."""
+    modes = [
+        hybrid.Mode("flight", lambda t, x, p: (x.v, -1.0, 0.0)),
+        hybrid.Mode("rest", lambda t, x, p: (0.0, 0.0, 0.0)),
+    ]
+    impact = hybrid.Transition(
+        "flight",
+        "flight",
+        hybrid.Guard(lambda t, x, p: x.q, -1),
+        hybrid.Reset(lambda t, x, p: (x.q, -0.5 * x.v, x.n + 1.0)),
+        accumulates_to="rest",
+    )
+    system = hybrid.HybridSystem(state=("q", "v", "n"), modes=modes, transitions=[impact])
+    return system, (0.0, 20.0), (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("made", "ok", "told"),
+    [(late, False, "time is so large"), (dry, False, "may be off by"), (counted, True, "changes 'n'")],
+)
+def test_what_a_status_tells_is_told_of_many_runs_too(made, ok, told):
+    system, span, x0 = made()
+    mode = system.mode_names[0]
+    found = simulate_many(system, [x0, x0], span, mode=mode, executor=1)
+    assert (found.status.values == StatusCode.SUCCESS).tolist() == [ok, ok]
+    assert all(told in message for message in found.message.values)
+    assert_one_by_one(found, system, [x0, x0], span, mode=mode)

@@ -12,6 +12,7 @@ from hybrid.kernels.types.codes import (
     DONE,
     EXACT,
     GO_ON,
+    HELD,
     LEAVES,
     MAX_STEPS,
     NO_MODE,
@@ -90,14 +91,47 @@ def test_a_mode_that_is_named(kind):
         assert start({}, named=named, kinds=kinds, undefined=True) == NO_MODE
 
 
-@pytest.mark.parametrize("note", ["unproved", "unresolved", "coarse", "order_mattered", None])
+COUNTED = ("unproved", "unresolved", "coarse", "order_mattered")
+
+
+def plain_end():
+    """A model with a steep mode, and what a run counts of which there is nothing to tell."""
+    kinds = np.array([RUNGE_KUTTA, RUNGE_KUTTA, EXACT, RUNGE_KUTTA, RUNGE_KUTTA])
+    model = SimpleNamespace(dimension=2, steep=np.array([1, 0, 1, 0, 0]), propagator=kinds)
+    counted = dict.fromkeys(COUNTED, 0)
+    trail = np.zeros((HELD + 1, 3))
+    # The last number of a row belongs to no component.
+    trail[HELD, 2] = 1.0
+    return model, {"mode": 1, "lateness": 1.0, "unknown_time": 0.0, "trail": trail} | counted
+
+
+@pytest.mark.parametrize(
+    "note",
+    [
+        *((name, 1) for name in COUNTED),
+        ("lateness", 1.1),
+        ("unknown_time", 1e-9),
+        ("mode", 0),
+        ("trail", 1),
+        None,
+    ],
+)
 def test_what_there_is_to_tell(note):
-    run = SimpleNamespace(**dict.fromkeys(("unproved", "unresolved", "coarse", "order_mattered"), 0))
-    if note:
-        setattr(run, note, 1)
+    """Also that the mode is steep and followed in time, and that a chatter has left components."""
+    model, told = plain_end()
     kernels = plain(many)
-    assert bool(kernels.is_plain(run, np.array([NO_OBJECTION, LEAVES]))) is (note is None)
-    assert not kernels.is_plain(run, np.array([BEYOND, LEAVES]))
+    if note and note[0] == "trail":
+        told["trail"][HELD, note[1]] = 1.0
+    elif note:
+        told[note[0]] = note[1]
+    run = SimpleNamespace(**told)
+    assert bool(kernels.is_plain(model, run, np.array([NO_OBJECTION, LEAVES]))) is (note is None)
+    assert not kernels.is_plain(model, run, np.array([BEYOND, LEAVES]))
+
+
+def test_a_steep_mode_with_a_series_has_nothing_to_tell():
+    model, told = plain_end()
+    assert plain(many).is_plain(model, SimpleNamespace(**told | {"mode": 2}), np.array([NO_OBJECTION]))
 
 
 class TestManyRuns:
@@ -110,8 +144,9 @@ class TestManyRuns:
         count = len(origins)
         self.origins = np.array([[each, -each] for each in origins], dtype=float)
         self.refused, self.told = refused, told
-        notes = dict.fromkeys(("unproved", "unresolved", "coarse", "order_mattered"), 0)
-        self.run = SimpleNamespace(y=np.zeros(2), scale=np.zeros(2), mode=-1, jumps=0, steps=0, **notes)
+        self.model, told = plain_end()
+        told |= {"y": np.zeros(2), "scale": np.zeros(2), "mode": -1, "jumps": 0, "steps": 0}
+        self.run = SimpleNamespace(**told)
         self.run_words, self.work_words = np.array([7, 7]), np.array([7, 7, 7])
         self.states = np.full((count, len(self.TIMES), 2), np.nan)
         self.places = np.full((count, 3), 99)
@@ -143,7 +178,7 @@ class TestManyRuns:
             return NO_MODE if task.run.y[0] in self.refused else named
 
         tested = plain(many, mode_of_start=mode_of_start, set_words=self.set_words)
-        task = SimpleNamespace(run=self.run, model=SimpleNamespace(dimension=2))
+        task = SimpleNamespace(run=self.run, model=self.model)
         cycles = np.array(self.TIMES)
         self.steps = 0
         return tested.many_runs(
