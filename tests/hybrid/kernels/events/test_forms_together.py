@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, Tsit5, simulate
+from hybrid import DOP853, RadauIIA, Taylor, Tsit5, simulate
+from tests.hybrid.kernels.events.counting import counting
 
 FORMS = {
     "q": lambda q, v, t: q,
@@ -29,26 +30,14 @@ TIMES = np.linspace(0.0, END, 200_001)
 @cache
 def counters(forms, directions, modes):
     """Each crossing of ``a (form - level)`` is counted and, with two modes, leads to the other mode."""
-    number = len(forms)
 
-    def transition(mode, i):
+    def guard(i):
         form = FORMS[forms[i]]
+        return lambda t, x, p: p[2 * i] * (form(x[0], x[1], t) - p[2 * i + 1])
 
-        def guard(t, x, p):
-            return p[2 * i] * (form(x[0], x[1], t) - p[2 * i + 1])
-
-        def count(t, x, p):
-            return tuple(x[k] + (1.0 if k == 2 + i else 0.0) for k in range(2 + number))
-
-        source, target = f"mode {mode}", f"mode {(mode + 1) % modes}"
-        return Transition(source, target, Guard(guard, directions[i]), Reset(count), name=f"{i} in {mode}")
-
-    return HybridSystem(
-        state=2 + number,
-        parameters={f"{kind}{i}": 1.0 for i in range(number) for kind in ("a", "level")},
-        modes=[Mode(f"mode {mode}", lambda t, x, p: (x[1], -x[0], *[0.0] * number)) for mode in range(modes)],
-        transitions=[transition(mode, i) for mode in range(modes) for i in range(number)],
-    )
+    guards = [guard(i) for i in range(len(forms))]
+    parameters = {f"{kind}{i}": 1.0 for i in range(len(forms)) for kind in ("a", "level")}
+    return counting(("q", "v"), lambda t, x, p: (x.v, -x.q), guards, directions, modes, parameters)
 
 
 def crossings(form, factor, level, direction, motion):

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, simulate
+from hybrid import DOP853, RadauIIA, Taylor, simulate
+from tests.hybrid.kernels.events.counting import counting
 
 DEGREE, GUARDS, END = 5, 3, 2.0
 PLACES = np.arange(1, 16) / 8
@@ -24,25 +25,14 @@ def counters(directions, modes):
     width = DEGREE + 1
 
     def field(t, x, p):
-        return (1.0, *(k * x[k - 2] for k in range(2, width)), *(0.0 for _ in range(GUARDS)))
+        return (1.0, *(k * x[k - 2] for k in range(2, width)))
 
-    def transition(mode, i):
-        def polynomial(t, x, p):
-            return p[width * i] + sum(p[width * i + k] * x[k - 1] for k in range(1, width))
+    def guard(i):
+        return lambda t, x, p: p[width * i] + sum(p[width * i + k] * x[k - 1] for k in range(1, width))
 
-        def count(t, x, p):
-            return tuple(x[k] + (1.0 if k == DEGREE + i else 0.0) for k in range(DEGREE + GUARDS))
-
-        guard, target = Guard(polynomial, direction=directions[i]), f"mode {(mode + 1) % modes}"
-        return Transition(f"mode {mode}", target, guard, Reset(count), name=f"{i} in {mode}")
-
-    names = [f"x{k}" for k in range(1, width)] + [f"n{i}" for i in range(GUARDS)]
-    return HybridSystem(
-        state=tuple(names),
-        parameters={f"a{i}_{k}": 1.0 for i in range(GUARDS) for k in range(width)},
-        modes=[Mode(f"mode {mode}", field) for mode in range(modes)],
-        transitions=[transition(mode, i) for mode in range(modes) for i in range(GUARDS)],
-    )
+    names = [f"x{k}" for k in range(1, width)]
+    parameters = {f"a{i}_{k}": 1.0 for i in range(GUARDS) for k in range(width)}
+    return counting(names, field, [guard(i) for i in range(GUARDS)], directions, modes, parameters)
 
 
 def polynomials(rng):
