@@ -18,9 +18,9 @@ from sympy.codegen.cfunctions import exp2, expm1
 
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
+from hybrid.symbolic.continuity import ROUNDING
 from hybrid.symbolic.expressions import (
     Absolute,
-    Ceiling,
     Equal,
     Floor,
     Less,
@@ -52,7 +52,7 @@ SWITCHES = (sympy.tanh, sympy.erf)
 # Beyond this argument they are constant to all digits.
 FLAT = 20.0
 # Functions that are constant but for jumps.
-JUMPS = (Sign, Step, Less, LessEqual, Equal, Floor, Ceiling, Truncate)
+JUMPS = (Sign, Step, Less, LessEqual, Equal, *ROUNDING)
 # The difference of both sides of a kink or jump, in the place of the change of an argument.
 APART = 16
 # Terms that fall like this power of the distance from a pulse, or more slowly, are seen from afar.

@@ -71,9 +71,9 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     The order is 0 off the guard, 1 if the guard's speed decides, and 2 if rounding may hide or reverse the
     speed and the acceleration decides. It is 3 if the same holds for the acceleration: then the side is
     unchanged if the guard was zero before; otherwise the acceleration soon after decides, and if that does
-    not either, the guard counts as not yet crossed. It is
-    ``JUMPING`` if the guard jumps across zero within the rounding of the state: then its derivatives are no
-    guide. A guard without a value keeps its side, and may jump; an infinite one has the side of its sign.
+    not either, the guard counts as not yet crossed. It is ``JUMPING`` if the guard jumps across zero within
+    the rounding of the state: then its derivatives are no guide. A guard without a value keeps its side, and
+    may jump; an infinite one has the side of its sign.
     ``work.field`` is current.
     """
     value = guard_value(model, transition, t, x, work.scalar)
@@ -82,7 +82,8 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     if abs(value) == math.inf:
         return (1 if value > 0.0 else -1), 0
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-    trend, order = value, 0
+    trend, order, direction = value, 0, model.direction[transition]
+    keeps = before != 0 and (was_on or direction == 0)
     if abs(value) <= rounding_band(model, run, transition, t, x, work):
         if has_program(model, transition) and exceeds_slope(model, run, transition, t, x, value, work):
             if was_on and before != 0:
@@ -99,10 +100,8 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
                 trend, order = acceleration_sign(model, run, transition, mode, t, x, work), BY_ACCELERATION
                 if trend == 0.0:
                     order = BY_STEP
-    direction = model.direction[transition]
-    keeps = before != 0 and (was_on or direction == 0)
-    if order == BY_STEP and not keeps and not may_jump(model, run, transition, t, x, work):
-        trend = float(acceleration_soon(model, run, transition, mode, t, x, work))
+                    if not keeps:
+                        trend = float(acceleration_soon(model, run, transition, mode, t, x, work))
     if trend > 0.0:
         return 1, order
     if trend < 0.0:

@@ -11,6 +11,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import change_of_rate
 from hybrid.kernels.events.guards import displace, error_band, gradient_band, guard_speed
+from hybrid.kernels.events.resolution import speed_displaced
 from hybrid.kernels.types.codes import RUNGE_KUTTA
 from hybrid.kernels.types.options import KERNEL
 
@@ -90,14 +91,10 @@ def time_to_run_dry(model, method, run, transition, side, speed, work):
     that at the guard, and ``work.gradient`` its gradient there.
     """
     t, level = run.phase, error_band(method, run, work.gradient, model.dimension)
-    displace(model, run.y, side * level, work.gradient, work.state)
-    model.field(run.mode, t, work.state, model.parameters, work.field)
-    near = abs(guard_speed(model, transition, t, work.state, work.field, work.trial))
+    near = abs(speed_displaced(model, transition, run.mode, t, run.y, side * level, work))
     if not abs(speed) < SLOWS * near:
         return 0.0
-    displace(model, run.y, side * FARTHER * level, work.gradient, work.state)
-    model.field(run.mode, t, work.state, model.parameters, work.field)
-    far = abs(guard_speed(model, transition, t, work.state, work.field, work.trial))
+    far = abs(speed_displaced(model, transition, run.mode, t, run.y, side * FARTHER * level, work))
     exponent = math.log(far / near) / math.log(FARTHER)
     return level / near / (1.0 - exponent) if exponent < 1.0 else math.inf
 

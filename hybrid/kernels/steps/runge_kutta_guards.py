@@ -108,6 +108,15 @@ def error_of_step(model, run, h, work):
 
 
 @njit(**INLINE)
+def moved_by_error(model, work):
+    """How far the error in ``work.field_after`` may move a guard with the gradient ``work.gradient``."""
+    moved = 0.0
+    for i in range(model.dimension):
+        moved += abs(work.gradient[i]) * work.field_after[i]
+    return moved
+
+
+@njit(**INLINE)
 def asks_error(run, on_guard):
     """Whether a guard is left by a derivative that is known at the start of this step.
 
@@ -126,10 +135,7 @@ def outweighs_error(model, run, growth, h, work):
     less error.
     """
     error_of_step(model, run, h, work)
-    moved = 0.0
-    for i in range(model.dimension):
-        moved += abs(work.gradient[i]) * work.field_after[i]
-    return growth > MARGIN * moved
+    return growth > MARGIN * moved_by_error(model, work)
 
 
 @njit(**KERNEL)
@@ -156,12 +162,11 @@ def is_resolved(model, method, run, transition, t, h, work):
     error_of_step(model, run, h, work)
     if keeps_sign(model, transition, t, run.y, work) and keeps_sign(model, transition, t + h, work.new, work):
         return True
-    s, moved = method.b.shape[0], 0.0
+    s = method.b.shape[0]
     before = guard_speed(model, transition, t, run.y, work.stages[0], work.gradient)
     after = guard_speed(model, transition, t + h, work.new, work.stages[s], work.gradient)
-    for i in range(model.dimension):
-        moved += abs(work.gradient[i]) * work.field_after[i]
-    return before * after > 0.0 and min(abs(before), abs(after)) * h > MARGIN * moved
+    slower = min(abs(before), abs(after))
+    return before * after > 0.0 and slower * h > MARGIN * moved_by_error(model, work)
 
 
 @njit(**INLINE)

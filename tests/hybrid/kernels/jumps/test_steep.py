@@ -142,14 +142,15 @@ class Draining:
             gradient[0] = 2.0
             return 2.0 * field[0]
 
-        def displace(model, x, distance, gradient, out):
-            assert gradient[0] == 2.0
-            out[0] = x[0] + distance / 2.0
+        def speed_displaced(model, transition, mode, t, x, distance, work):
+            assert work.gradient[0] == 2.0
+            field(mode, t, x + distance / 2.0, None, work.field_after)
+            return guard_speed(model, transition, t, x, work.field_after, work.gradient)
 
         kernels = plain(
             steep,
             guard_speed=guard_speed,
-            displace=displace,
+            speed_displaced=speed_displaced,
             error_band=lambda method, run, gradient, n: gradient[0] * self.LEVEL,
         )
         model = SimpleNamespace(
@@ -163,7 +164,7 @@ class Draining:
         self.run = SimpleNamespace(
             phase=0.0, mode=1, y=np.array([at]), since_entry=since, unknown_time=0.0, ran_dry=0
         )
-        work = SimpleNamespace(**{name: np.zeros(1) for name in ("field", "gradient", "state", "trial")})
+        work = SimpleNamespace(**{name: np.zeros(1) for name in ("field", "field_after", "gradient")})
         self.ask = lambda: kernels.keep_unknown_time(model, SimpleNamespace(rtol=1e-10), self.run, 2, work)
         self.ask()
 
