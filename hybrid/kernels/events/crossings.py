@@ -168,8 +168,8 @@ def root_in_bracket(
         else:
             value = _value_at(model, transition, path, order, clock, start, pace, 0.0, row, base, tilt, work)
             begins = value * side > 0.0 or math.isnan(value)
-        if not begins and _rests_at_zero(value, row):
-            # At a flat root the slope is zero too, but not a little farther on.
+        if not begins and (_rests_at_zero(value, row) or row[MOST_SLOPE] - row[LEAST_SLOPE] == math.inf):
+            # A little farther on, a flat root has a slope, and a guard that only jumps has left its jump.
             beside = work.registers[
                 _row_at(model, transition, path, order, clock, start, pace, BESIDE * high, base, tilt, work)
             ]

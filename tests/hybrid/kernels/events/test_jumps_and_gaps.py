@@ -188,3 +188,33 @@ def test_an_infinite_guard_at_the_end_of_a_run_has_not_crossed(sign, solver):
         assert arc.status.ok
         np.testing.assert_allclose(arc.jumps.t, [0.5 + np.log(2.0) / 1e3], rtol=0, atol=1e-12)
         assert simulate(system, (0.3,), (0.0, 0.2), mode="rise", solver=solver).status.ok
+
+
+STAIRS = {
+    "floor": (lambda q: np.floor(q) - 1.0, +1, 1.0),
+    "ceiling": (lambda q: 1.0 + np.ceil(-q), -1, 1.0),
+    "half a stair": (lambda q: np.floor(2.0 * q) - 2.0, +1, 0.5),
+    "two stairs": (lambda q: np.floor(q) + np.floor(2.0 * q + 0.5) - 3.0, +1, 0.25),
+    "sign and stair": (lambda q: (np.floor(q) - 1.0) * np.sign(q), +1, 1.0),
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("stair", STAIRS)
+def test_a_start_at_the_edge_of_a_stair_at_zero_has_not_crossed(stair, solver):
+    """Rounding of the state shows the stair below as well; the guard leaves zero at the end of its own."""
+    guard, direction, width = STAIRS[stair]
+    for way in (+1.0, -1.0):
+
+        def stairs(t, x, p, way=way):
+            return guard(way * x.q)
+
+        count = Transition("go", "go", Guard(stairs, direction), Reset(lambda t, x, p: (x.q, x.n + 1)))
+        system = HybridSystem(
+            state=("q", "n"),
+            modes=[Mode("go", lambda t, x, p, way=way: (way, 0.0))],
+            transitions=[count],
+        )
+        arc = simulate(system, (way, 0.0), (0.0, 1.4), mode="go", solver=solver)
+        assert arc.status.ok
+        np.testing.assert_allclose(arc.jumps.t, [width], rtol=0, atol=1e-14)
