@@ -5,6 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import change_of_rate, jacobian_with_opposites, spread_of_rate
+from hybrid.kernels.types.codes import TERMS
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -58,6 +59,13 @@ def has_program(model, transition):
 def is_forced(model, mode):
     """Whether the vector field of a mode has terms in time alone that are bounded over each step."""
     return model.first_forcing[mode + 1] > model.first_forcing[mode]
+
+
+@njit(**INLINE)
+def has_terms_in_state(model, mode):
+    """Whether the vector field of a mode has parts that may be flat and have a pulse in the state."""
+    last = model.first_forcing[mode + 1] - 1
+    return last >= model.first_forcing[mode] and model.forcing_kind[last] == TERMS
 
 
 @njit(**KERNEL)

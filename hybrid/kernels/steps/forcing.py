@@ -6,8 +6,7 @@ component of the state that grows at a constant rate tells the time as well. Whe
 over many steps to come, it costs nothing.
 
 Parts that may be flat and have a pulse in the state, such as a narrow bump of a potential or a contact that
-the orbit meets for a moment, are bounded over the series, or over a cubic through the ends of an attempted
-step.
+the orbit meets for a moment, are bounded over the series, or over the interpolant of an attempted step.
 """
 
 import math
@@ -15,9 +14,9 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
-from hybrid.kernels.events.guards import has_program
+from hybrid.kernels.events.guards import has_program, has_terms_in_state
 from hybrid.kernels.steps.pulses import SHARE, first_hidden, is_steady
-from hybrid.kernels.steps.step import rates_by_jacobian
+from hybrid.kernels.steps.step import combine, interpolant_path, rates_by_jacobian
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, NARROW, TERMS
 from hybrid.kernels.types.kinds import INTEGER, REAL
 from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
@@ -41,9 +40,8 @@ MARGIN = 2.0
 ROUNDING = 8.0 * EPSILON
 # An exponential whose argument changes by no more than this is not small to all digits where it matters.
 MOST_CHANGE = 8.0
-# An attempted step is cut to this share of what is explained: the next attempt has another cubic.
+# An attempted step is cut to this share of what is explained: the next attempt has another interpolant.
 SAFELY = 0.9
-CUBIC = 3
 
 
 @njit(**INLINE)
@@ -76,19 +74,13 @@ def _is_calm(model, method, run, mode, path, order, h, work):
     return True
 
 
-@njit(**INLINE)
-def _has_terms_in_state(model, mode):
-    last = model.first_forcing[mode + 1] - 1
-    return last >= model.first_forcing[mode] and model.forcing_kind[last] == TERMS
-
-
 @njit(**KERNEL)
 def _arguments_change(model, mode, path, order, clock, start, h, work):
     """Whether an argument of the exponentials in the state changes so much that a step may hide a pulse.
 
     If not, the exponential is not so small anywhere on the step that its series does not show it.
     """
-    if not _has_terms_in_state(model, mode):
+    if not has_terms_in_state(model, mode):
         return False
     forcing = model.first_forcing[mode]
     while model.forcing_kind[forcing] != ARGUMENTS:
@@ -108,10 +100,11 @@ def _arguments_change(model, mode, path, order, clock, start, h, work):
 
 
 @njit(**KERNEL)
-def _longest_explained(model, method, run, path, order, clock, nodes, timed, swings, h, work):
+def _longest_explained(model, method, run, path, order, clock, nodes, timed, swings, seen, h, work):
     """The longest step up to ``h`` that is explained; one as short as rounding allows is taken as it is.
 
-    Asked of the parts of the field in time if ``timed``, and of those in the state if it ``swings``.
+    Asked of the parts of the field in time if ``timed``, and of those in the state if it ``swings``. If
+    ``seen``, ``work.places`` holds the states at which the method knows the field on the whole step.
 
     A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
     as its first place that is not explained has the length of the pulse.
@@ -145,6 +138,7 @@ def _longest_explained(model, method, run, path, order, clock, nodes, timed, swi
                 tolerance,
                 finest,
                 kind == TERMS,
+                seen and explained == longest,
                 work,
             )
             coarse = coarse or (rest > COARSE_PIECE * tolerance and kind == IN_TIME)
@@ -174,26 +168,49 @@ def explained_step(model, method, run, h, work):
     """
     for i in range(model.dimension):
         work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
-    return _longest_explained(model, method, run, work.path, 1, -1, method.nodes, True, False, h, work)
+    return _longest_explained(model, method, run, work.path, 1, -1, method.nodes, True, False, False, h, work)
+
+
+@njit(**KERNEL)
+def _keep_places(model, method, run, h, work):
+    """The states at which an explicit method has evaluated the field of the attempted step, by its nodes.
+
+    They are farther from the solution than the interpolant: what lies there may be hidden from the method.
+    The stages of the interpolant alone come last.
+    """
+    n, s, places, count = model.dimension, method.b.shape[0], work.places, len(method.nodes)
+    for j in range(count - 1):
+        for i in range(s):
+            if method.c[i] == method.nodes[j]:
+                combine(run.y, h, method.a[i], work.stages, i, n, places[j])
+    for i in range(n):
+        places[count - 1, i] = work.new[i]
+    for i in range(s + 1, method.a.shape[0]):
+        place = places[count + i - s - 1]
+        combine(run.y, h, method.a[i], work.stages, i, n, place)
+        place[n] = method.c[i]
 
 
 @exported(REAL, Model, Method, Run, REAL, Work)
 def explained_attempt(model, method, run, h, work):
     """The length up to ``h`` of a step on which no pulse in the state is hidden from the attempted one.
 
-    The cubic through both ends of the attempted step stands for the way between them.
+    The interpolant of the attempted step, whose stages are those of ``work``, is the way between its ends.
     """
-    if not _has_terms_in_state(model, run.mode):
-        return h
-    before, after, path = work.stages[0], work.stages[method.b.shape[0]], work.path
-    for i in range(model.dimension):
-        rate = (work.new[i] - run.y[i]) / h
-        path[0, i], path[1, i] = run.y[i], before[i]
-        path[2, i] = (3.0 * rate - 2.0 * before[i] - after[i]) / h
-        path[3, i] = (before[i] + after[i] - 2.0 * rate) / h / h
-        if not abs(path[3, i]) < math.inf:
-            return h
-    explained = _longest_explained(model, method, run, path, CUBIC, -1, method.nodes, False, True, h, work)
+    interpolant_path(method, h, run.y, model.dimension, work)
+    degree, path, unit = method.powers.shape[0] - 1, work.path, 1.0
+    for k in range(1, degree + 1):
+        unit /= h
+        for i in range(model.dimension):
+            path[k, i] *= unit
+            if not abs(path[k, i]) < math.inf:
+                return h
+    explicit = method.implicit == 0
+    if explicit:
+        _keep_places(model, method, run, h, work)
+    explained = _longest_explained(
+        model, method, run, path, degree, -1, method.nodes, False, True, explicit, h, work
+    )
     return h if explained == h else SAFELY * explained
 
 
@@ -301,7 +318,9 @@ def explained_series(model, method, run, tangents, order, clock, h, work):
     nodes, longest = method.series_nodes, h
     rounding = 0.0 if clock >= 0 else measured_time(model, run, run.mode)
     for _ in range(MOST_CUTS):
-        h = _longest_explained(model, method, run, work.series, order, clock, nodes, True, True, h, work)
+        h = _longest_explained(
+            model, method, run, work.series, order, clock, nodes, True, True, False, h, work
+        )
         for noisy in (False, True):
             if _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
                 return h

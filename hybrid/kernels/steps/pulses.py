@@ -78,22 +78,38 @@ def is_steady(model, program, path, order, clock, start, h, negligible, work):
 
 
 @njit(**KERNEL)
-def _take_samples(model, program, path, order, clock, start, nodes, h, work):
+def _take_samples(model, program, path, order, clock, start, nodes, h, seen, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
 
-    The last row takes the largest low end and the smallest high end of each.
+    The last row takes the largest low end and the smallest high end of each. The states at the nodes are
+    those of ``work.places`` if these are what the method has ``seen``, otherwise those of the path.
     """
     samples = work.samples
     common = samples[samples.shape[0] - 1]
     for j in range(len(nodes)):
-        last = model.bound(
-            model.programs, program, path, order, clock, start, 1.0, nodes[j] * h, 0.0, work.registers
-        )
-        for place in range(last + 1):
-            low, high = work.registers[place, LOW_MIDDLE], work.registers[place, HIGH_MIDDLE]
-            samples[j, 2 * place], samples[j, 2 * place + 1] = low, high
-            common[2 * place] = low if j == 0 else max(common[2 * place], low)
-            common[2 * place + 1] = high if j == 0 else min(common[2 * place + 1], high)
+        place = nodes[j] * h
+        if seen:
+            last = model.bound(
+                model.programs,
+                program,
+                work.places[j : j + 1],
+                0,
+                -1,
+                start + place,
+                1.0,
+                0.0,
+                0.0,
+                work.registers,
+            )
+        else:
+            last = model.bound(
+                model.programs, program, path, order, clock, start, 1.0, place, 0.0, work.registers
+            )
+        for row in range(last + 1):
+            low, high = work.registers[row, LOW_MIDDLE], work.registers[row, HIGH_MIDDLE]
+            samples[j, 2 * row], samples[j, 2 * row + 1] = low, high
+            common[2 * row] = low if j == 0 else max(common[2 * row], low)
+            common[2 * row + 1] = high if j == 0 else min(common[2 * row + 1], high)
 
 
 @njit(**INLINE)
@@ -162,7 +178,40 @@ def _unseen(row, noise, length, tolerance):
 
 
 @njit(**KERNEL)
-def first_hidden(model, program, path, order, clock, start, nodes, h, tolerance, finest, of_state, work):
+def _hidden_from_stages(model, program, start, nodes, h, negligible, tolerance, between, work):
+    """A pulse at a stage that only the interpolant has: the node before it and its place, or the step twice.
+
+    Such a pulse bends the interpolant, which then does not show it.
+    """
+    for k in range(len(nodes), work.places.shape[0]):
+        place = work.places[k, model.dimension] * h
+        last = model.bound(
+            model.programs,
+            program,
+            work.places[k : k + 1],
+            0,
+            -1,
+            start + place,
+            1.0,
+            0.0,
+            0.0,
+            work.registers,
+        )
+        j = 0
+        while nodes[j + 1] * h < place:
+            j += 1
+        first = model.programs.first[program]
+        share = SHARE_OF_PIECE * tolerance
+        verdict = _judged(model.programs, first, last, j, False, h, negligible, share, between, work)
+        if verdict == HIDDEN:
+            return nodes[j] * h, place
+    return h, h
+
+
+@njit(**KERNEL)
+def first_hidden(
+    model, program, path, order, clock, start, nodes, h, tolerance, finest, of_state, seen, work
+):
     """The length on which a forcing is explained, of a step ``h``, and the first unexplained place after it.
 
     Both are ``h`` if all of it is explained. ``tolerance`` is that of the forcing's integral. Returned third
@@ -170,7 +219,8 @@ def first_hidden(model, program, path, order, clock, start, nodes, h, tolerance,
     short as the rounding of time.
 
     An expression ``of_state`` varies with every step, and its bounds may be wide: it is unexplained only
-    where the middle of a piece is certain to be.
+    where the middle of a piece is certain to be. The method may have ``seen`` other states at the nodes than
+    those of the path: these are ``work.places``.
     """
     programs = model.programs
     between = BETWEEN_IN_STATE if of_state else BETWEEN
@@ -178,7 +228,13 @@ def first_hidden(model, program, path, order, clock, start, nodes, h, tolerance,
     steady, noise = is_steady(model, program, path, order, clock, start, h, negligible, work)
     if steady:
         return h, h, _unseen(work.registers[programs.first[program + 1] - 1 - first], noise, h, tolerance)
-    _take_samples(model, program, path, order, clock, start, nodes, h, work)
+    _take_samples(model, program, path, order, clock, start, nodes, h, seen, work)
+    if seen:
+        before, place = _hidden_from_stages(
+            model, program, start, nodes, h, negligible, tolerance, between, work
+        )
+        if place < h:
+            return before, place, 0.0
     stack, pieces, limit, coarse = work.intervals, 0, MOST_PIECES, 0.0
     for j in range(len(nodes) - 1):
         top, whole = 0, True

@@ -7,7 +7,13 @@ from numba import njit
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
-from hybrid.kernels.events.guards import guard_value, is_forced, rounding_band, sides_at
+from hybrid.kernels.events.guards import (
+    guard_value,
+    has_terms_in_state,
+    is_forced,
+    rounding_band,
+    sides_at,
+)
 from hybrid.kernels.events.path import state_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
@@ -118,8 +124,10 @@ def accept(model, method, run, tangents, h, correction, work):
 
 
 @njit(**INLINE)
-def find_event(task, h):
+def find_event(task, h, interpolated):
     """Shorten the attempted step to its first event, if there is one.
+
+    ``interpolated`` says that the step's stages for its interpolant are known.
 
     Returns its length, the Euler step that completes it, and the transition. A step whose guards
     are proved on a part only is cut to that. A crossing that the interpolant has and the solution has not is
@@ -132,8 +140,9 @@ def find_event(task, h):
     tangents = task.tangents
     mode, t = run.mode, run.phase
     ignored, touched = NO_TRANSITION, 0.0
-    for _ in range(2):
-        interpolation_stages(model, method, mode, t, h, run.y, work)
+    for trial in range(2):
+        if not (interpolated and trial == 0):
+            interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
         theta, fired, proved, blurred = earliest_crossing(model, method, run, t, h, ignored, touched, work)
@@ -275,7 +284,9 @@ def runge_kutta_step(task, remaining):
             accept(model, method, run, tangents, 0.0, correction, work)
             return GO_ON, correction
         return GO_ON, 0.0
-    if is_forced(model, mode):
+    interpolated = has_terms_in_state(model, mode)
+    if interpolated:
+        interpolation_stages(model, method, mode, t, h, run.y, work)
         explained = attempts.explained_attempt(model, method, run, h, work)
         if explained < h:
             run.rejected += 1
@@ -283,7 +294,7 @@ def runge_kutta_step(task, remaining):
             return GO_ON, 0.0
     fired, correction, whole = NO_TRANSITION, 0.0, h
     if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
-        h, correction, fired = find_event(task, h)
+        h, correction, fired = find_event(task, h, interpolated)
         if math.isnan(h):
             return STEP_TOO_SMALL, 0.0
         if h == 0.0 and fired == NO_TRANSITION:

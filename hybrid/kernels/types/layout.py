@@ -290,7 +290,8 @@ class Work(Structure):
     where a guard's derivatives are asked for; ``path (d + 1, n)``, the powers of the step's interpolant;
     ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
     what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
-    nodes of a step and what they have in common.
+    nodes of a step and what they have in common; ``places (nodes + m, n + 1)``,
+    the states and shares of the step at the nodes and at the m stages of the interpolant alone.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -324,6 +325,7 @@ class Work(Structure):
     intervals: MATRIX
     registers: MATRIX
     samples: MATRIX
+    places: MATRIX
     systems: MATRIX
     pivots: INDICES
     series: MATRIX

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import attrs
 import numpy as np
 import pytest
 import sympy
@@ -129,6 +130,45 @@ def test_a_mass_does_not_pass_the_core_of_a_steep_repulsion(size, solver):
     assert arc.x[-1, 1] > 0.9
     energy = [0.5 * v * v + 4 * ((size / q) ** 12 - (size / q) ** 6) for q, v in arc.x[[0, -1]]]
     assert np.isclose(*energy, rtol=0, atol=1e-8)
+
+
+@cache
+def bumper():
+    """A mass on a spring of stiffness one that just reaches another one, of stiffness ``k``, at ``wall``."""
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"k": 1e4, "wall": 1.0},
+        modes=[Mode("m", lambda t, x, p: (x.v, -x.q - p.k * np.maximum(x.q - p.wall, 0.0)))],
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("depth", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+def test_a_shallow_contact_is_not_stepped_over(depth, solver):
+    """In contact the mass swings, much faster, about another place, and leaves with the speed it came with.
+
+    Wherever the steps begin: a stage of a method may lie in the contact while the solution does not, or the
+    solution while no stage does.
+    """
+    tolerance = {"DOP853": (1e-6, 1e-9), "Tsit5": (1e-6,), "RadauIIA": (1e-6,)}.get(solver, (1e-9,))
+    wall, before = 1.0 - depth, np.arcsin(1.0 - depth)
+    for rtol in tolerance:
+        for start in np.linspace(-3.0, 0.5, 8):
+            for k in (1e4, 1e6):
+                fast, center = np.sqrt(1 + k), wall / (1 + k)
+                lasts = 2 * np.arctan(np.cos(before) / fast / center) / fast
+                end = np.pi - before + (2.5 - lasts - before)
+                arc = simulate(
+                    bumper(),
+                    (np.sin(start), np.cos(start)),
+                    (start, 2.5),
+                    parameters={"k": k, "wall": wall},
+                    solver=attrs.evolve(SOLVERS[solver], rtol=rtol, atol=1e-2 * rtol),
+                )
+                assert arc.status.ok
+                # The impulse is as sensitive to the depth as the square root of that.
+                error = 200 * rtol * max(1.0, 0.1 * fast * np.sqrt(depth), 0.01 / np.sqrt(depth))
+                np.testing.assert_allclose(arc.x[-1], [np.sin(end), np.cos(end)], rtol=0, atol=error)
 
 
 @pytest.mark.parametrize("bump", BUMPS)

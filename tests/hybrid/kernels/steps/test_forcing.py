@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Taylor, Transition, Tsit5, simulate
+from hybrid.kernels.events import guards
 from hybrid.kernels.steps import forcing
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
 from hybrid.kernels.types.layout import EPSILON
@@ -91,7 +92,7 @@ class TestCalm:
     [((), False), ((IN_TIME,), False), ((ARGUMENTS, TERMS), True), ((IN_TIME, ARGUMENTS), False)],
 )
 def test_modes_with_terms_in_the_state(kinds, has):
-    assert bool(plain(forcing)._has_terms_in_state(model_with(*kinds), 1)) == has
+    assert bool(plain(guards).has_terms_in_state(model_with(*kinds), 1)) == has
 
 
 @pytest.mark.parametrize(
@@ -128,21 +129,33 @@ def test_arguments_of_exponentials_that_change(change, checked, found):
 
 class TestLongest:
     def longest(
-        self, answer, *, kinds=(IN_TIME,), timed=True, swings=False, calm=False, clock=-1, change=True, **run
+        self,
+        answer,
+        *,
+        kinds=(IN_TIME,),
+        timed=True,
+        swings=False,
+        calm=False,
+        clock=-1,
+        change=True,
+        seen=False,
+        **run,
     ):
         """The step up to 1 for what ``first_hidden`` says of each program and length."""
         asked = []
 
         def first_hidden(model, program, path, order, *given):
-            told, start, nodes, h, tolerance, finest, of_state, _ = given
+            told, start, nodes, h, tolerance, finest, of_state, seen, _ = given
             assert (told, start, nodes) == (clock, 3.0, "nodes")
+            # A shorter step has other nodes.
+            assert bool(seen) == (self.seen and h == 1.0)
             asked.append((program, h, tolerance, bool(of_state)))
             assert finest == 2.0 * EPSILON * ((3.0 if clock < 0 else 0.0) + self.step)
             found = answer(program, h)
             self.step = self.next(found, h)
             return found
 
-        self.step = 1.0
+        self.step, self.seen = 1.0, seen
         tested = plain(
             forcing,
             first_hidden=first_hidden,
@@ -150,7 +163,7 @@ class TestLongest:
             _arguments_change=lambda *given: change,
         )._longest_explained
         made = new_run(**run)
-        given = (None, 1, clock, "nodes", timed, swings, 1.0, None)
+        given = (None, 1, clock, "nodes", timed, swings, seen, 1.0, None)
         return tested(model_with(*kinds), METHOD, made, *given), asked, made
 
     @staticmethod
@@ -164,8 +177,11 @@ class TestLongest:
 
     def test_a_step_is_cut_until_it_is_explained(self):
         """To where it is explained, or to the first place that is not, if that is hardly anything."""
-        step, asked, _ = self.longest(lambda program, h: (0.6, 0.7, 0.0) if h > 0.6 else (h, h, 0.0))
-        assert (step, [h for _, h, *_ in asked]) == (0.6, [1.0, 0.6])
+        for seen in (False, True):
+            step, asked, _ = self.longest(
+                lambda program, h: (0.6, 0.7, 0.0) if h > 0.6 else (h, h, 0.0), seen=seen
+            )
+            assert (step, [h for _, h, *_ in asked]) == (0.6, [1.0, 0.6])
         step, asked, _ = self.longest(lambda program, h: (0.1, 0.3, 0.0) if h > 0.3 else (h, h, 0.0))
         assert (step, [h for _, h, *_ in asked]) == (0.3, [1.0, 0.3])
 
@@ -199,39 +215,77 @@ class TestLongest:
             assert (found, run.unresolved) == (step, before + 1)
 
 
-@pytest.mark.parametrize(("share", "step"), [(1.0, 0.5), (0.75, 0.9 * 0.375)])
-def test_a_cubic_stands_for_an_attempted_step(share, step):
-    """``y = 1 + 2 s - s^2 + 3 s^3`` and ``-2 + s^3`` on a step of 1/2, of which a share is explained."""
-    asked = []
+class TestAttempt:
+    """An attempted step of 1/2 with two stages, one at its end and one of the interpolant."""
 
-    def longest(model, method, run, path, order, clock, nodes, timed, swings, h, work):
-        asked.append((path[:4].tolist(), order, clock, nodes, timed, swings))
-        return share * h
-
-    tested = plain(forcing, _longest_explained=longest).explained_attempt
-    work = SimpleNamespace(
-        stages=np.array([[2.0, 0.0], [9.0, 9.0], [2.0 - 1.0 + 2.25, 0.75]]),
-        new=np.array([1.0 + 1.0 - 0.25 + 0.375, -2.0 + 0.125]),
-        path=np.full((6, 2), 99.0),
+    H, Y = 0.5, np.array([1.0, -2.0])
+    # The third node is the end of the step.
+    METHOD = SimpleNamespace(
+        a=np.array([[0.0, 0.0, 0.0, 0.0], [0.25, 0.0, 0.0, 0.0], [0.0] * 4, [0.125, 0.5, 0.0, 0.0]]),
+        b=np.zeros(2),
+        c=np.array([0.0, 0.25, 1.0, 0.75]),
+        nodes=np.array([0.0, 0.25, 1.0]),
+        powers=np.zeros((4, 4)),
+        implicit=0,
     )
-    run = new_run(y=np.array([1.0, -2.0]))
-    assert tested(model_with(ARGUMENTS, TERMS), METHOD, run, 0.5, work) == step
-    assert asked == [([[1.0, -2.0], [2.0, 0.0], [-1.0, 0.0], [3.0, 1.0]], 3, -1, "nodes", False, True)]
-    assert tested(model_with(IN_TIME), METHOD, run, 0.5, work) == 0.5
-    work.new[1] = math.inf
-    assert tested(model_with(ARGUMENTS, TERMS), METHOD, run, 0.5, work) == 0.5
-    assert len(asked) == 1
+
+    def attempt(self, share, path, **changes):
+        """``path`` stands for the powers of the interpolant on [0, 1]; ``share`` of the step is explained."""
+        self.asked = []
+
+        def interpolant_path(method, h, y, dimension, work):
+            assert (method, h, dimension) == (tested_method, self.H, 2)
+            work.path[:] = path
+
+        def longest(model, method, run, path, order, clock, nodes, timed, swings, seen, h, work):
+            self.asked.append((path.tolist(), order, clock, nodes.tolist(), timed, swings, bool(seen)))
+            return share * h
+
+        tested_method = SimpleNamespace(**(vars(self.METHOD) | changes))
+        self.work = SimpleNamespace(
+            stages=np.array([[2.0, 0.0], [8.0, -4.0], [9.0, 9.0], [9.0, 9.0]]),
+            new=np.array([5.0, 6.0]),
+            path=np.full((4, 2), 99.0),
+            places=np.full((4, 3), 99.0),
+        )
+        tested = plain(forcing, _longest_explained=longest, interpolant_path=interpolant_path)
+        model = model_with(ARGUMENTS, TERMS)
+        return tested.explained_attempt(model, tested_method, new_run(y=self.Y), self.H, self.work)
+
+    PATH = ((1.0, -2.0), (1.0, 0.0), (-0.25, 0.5), (0.375, 0.125))
+
+    @pytest.mark.parametrize(("share", "step"), [(1.0, 0.5), (0.75, 0.9 * 0.375)])
+    def test_its_interpolant_stands_for_it(self, share, step):
+        """Powers of the time since the start."""
+        assert self.attempt(share, self.PATH) == step
+        powers = [[1.0, -2.0], [2.0, 0.0], [-1.0, 2.0], [3.0, 1.0]]
+        assert self.asked == [(powers, 3, -1, [0.0, 0.25, 1.0], False, True, True)]
+
+    def test_an_explicit_method_has_seen_its_stages(self):
+        """Those at the nodes, the end of the step, and that of the interpolant with its share of the step."""
+        self.attempt(1.0, self.PATH)
+        assert self.work.places[:3, :2].tolist() == [[1.0, -2.0], [1.25, -2.0], [5.0, 6.0]]
+        assert self.work.places[3].tolist() == [1.0 + 0.0625 * 2.0 + 0.25 * 8.0, -3.0, 0.75]
+
+    def test_an_implicit_method_has_seen_its_interpolant(self):
+        self.attempt(1.0, self.PATH, implicit=1)
+        assert not self.asked[0][-1]
+        assert self.work.places.tolist() == [[99.0] * 3] * 4
+
+    def test_an_infinite_one_is_taken_as_it_is(self):
+        assert self.attempt(0.75, (*self.PATH[:3], (0.375, math.inf))) == 0.5
+        assert self.asked == []
 
 
 def test_rates_at_the_start_stand_for_a_step():
     asked = []
     tested = plain(
         forcing,
-        _longest_explained=lambda *given: asked.append((given[3][:2].tolist(), *given[4:10])) or 0.125,
+        _longest_explained=lambda *given: asked.append((given[3][:2].tolist(), *given[4:11])) or 0.125,
     ).explained_step
     work = SimpleNamespace(stages=np.array([[2.0, 3.0]]), path=np.full((6, 2), 99.0))
     assert tested(model_with(IN_TIME), METHOD, new_run(), 0.5, work) == 0.125
-    assert asked == [([[7.0, -2.0], [2.0, 3.0]], 1, -1, "nodes", True, False, 0.5)]
+    assert asked == [([[7.0, -2.0], [2.0, 3.0]], 1, -1, "nodes", True, False, False, 0.5)]
 
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))

@@ -124,7 +124,7 @@ class TestFindEvent:
 
     H, T, EULER = 4.0, 7.0, 1e-3
 
-    def find(self, *crossings, affine=True, h=H, **answers):
+    def find(self, *crossings, affine=True, h=H, interpolated=False, **answers):
         """What is found for these crossings, one for each search, and what was asked for on the way."""
         calls, left = [], list(crossings)
         answers = {
@@ -176,7 +176,7 @@ class TestFindEvent:
         task = SimpleNamespace(
             attempts=None, model=model, method=None, run=run, record=None, work=None, tangents=6
         )
-        found = tested.find_event(task, h)
+        found = tested.find_event(task, h, interpolated)
         assert not left
         self.run = run
         return found, calls
@@ -189,6 +189,12 @@ class TestFindEvent:
         assert found == (4.0, 0.0, NO_TRANSITION)
         path = [] if affine else [("path", 4.0, 1)]
         assert calls == [("stages", 2, 7.0, 4.0), *path, ("search", 7.0, 4.0, NO_TRANSITION, 0.0)]
+
+    def test_stages_of_the_interpolant_that_are_known_are_not_evaluated_again(self):
+        assert self.find(self.NONE, interpolated=True)[1] == [("search", 7.0, 4.0, NO_TRANSITION, 0.0)]
+        # The step has been taken again since.
+        again = self.find((0.75, 1, 1.0, NO_TRANSITION), self.NONE, interpolated=True)[1]
+        assert again.count(("stages", 2, 7.0, 4.0)) == 1
 
     def test_a_step_with_two_touches_is_cut_between_them(self):
         found, calls = self.find(self.NONE, share=0.25)

@@ -38,6 +38,7 @@ class TestStep:
         names |= {"reach_any": given.pop("reaches", (NOT_THERE, NO_TRANSITION)), "accept": None}
         names |= {
             "remember_touch_on_step": None,
+            "interpolation_stages": None,
             "remember_step": None,
             "carry_rates": None,
             "sides_at": None,
@@ -45,10 +46,12 @@ class TestStep:
         tested = plain(
             runge_kutta,
             measured_time=lambda *given: clock,
-            is_forced=lambda *given, forced="explained" in given: self.forced,
+            is_forced=lambda *given: self.forced,
+            has_terms_in_state=lambda *given: self.swings,
             **{name: told(name, answer) for name, answer in names.items()},
         )
-        self.forced = "explained" in given or "shortened" in given
+        self.swings = "explained" in given
+        self.forced = self.swings or "shortened" in given
         attempts = SimpleNamespace(
             explained_step=told("explained step", given.pop("shortened", 2.0)),
             explained_attempt=told("explained attempt", given.pop("explained", math.inf)),
@@ -177,7 +180,7 @@ class TestStep:
     def test_pulses_of_the_field_shorten_a_step(self):
         found, calls = self.step(remaining=1.5, shortened=0.5)
         assert found == (GO_ON, 0.5)
-        assert calls[:3] == [("explained step", 1.5), ("attempt", 1, 7.0, 0.5, 3), ("explained attempt", 0.5)]
+        assert calls[:3] == [("explained step", 1.5), ("attempt", 1, 7.0, 0.5, 3), ("accept", 3, 0.5, 0.0)]
         # It is not the last step then.
         assert self.run.next_step == pytest.approx(0.5 * SAFETY * 2.0, rel=1e-14)
         found, calls = self.step(remaining=1.5, shortened=1.5)
@@ -186,7 +189,9 @@ class TestStep:
         found, calls = self.step(shortened=2.0, explained=0.25)
         assert found == (GO_ON, 0.0)
         assert (self.run.rejected, self.run.next_step, self.run.last_step) == (6, 0.25, 0.0)
-        assert self.step(shortened=2.0, explained=2.0)[0] == (GO_ON, 2.0)
+        found, calls = self.step(shortened=2.0, explained=2.0)
+        assert found == (GO_ON, 2.0)
+        assert calls[2:4] == [("interpolation_stages", 1, 7.0, 2.0), ("explained attempt", 2.0)]
 
     def test_an_event_ends_a_step(self):
         found, calls = self.step(outgoing=(3,), event=(0.5, 0.125, 3), room=1)
