@@ -112,7 +112,6 @@ def _longest_explained(model, method, run, path, order, clock, nodes, timed, swi
     mode, start = run.mode, run.phase
     if timed and clock < 0 and _is_calm(model, method, run, mode, path, order, h, work):
         timed = False
-    swings = swings and _arguments_change(model, mode, path, order, clock, start, h, work)
     if not (timed or swings):
         return h
     rounding = 0.0 if clock >= 0 else measured_time(model, run, mode)
@@ -205,6 +204,8 @@ def explained_attempt(model, method, run, h, work):
             path[k, i] *= unit
             if not abs(path[k, i]) < math.inf:
                 return h
+    if not _arguments_change(model, run.mode, path, degree, -1, run.phase, h, work):
+        return h
     explicit = method.implicit == 0
     if explicit:
         _keep_places(model, method, run, h, work)
@@ -318,8 +319,9 @@ def explained_series(model, method, run, tangents, order, clock, h, work):
     nodes, longest = method.series_nodes, h
     rounding = 0.0 if clock >= 0 else measured_time(model, run, run.mode)
     for _ in range(MOST_CUTS):
+        swings = _arguments_change(model, run.mode, work.series, order, clock, run.phase, h, work)
         h = _longest_explained(
-            model, method, run, work.series, order, clock, nodes, True, True, False, h, work
+            model, method, run, work.series, order, clock, nodes, True, swings, False, h, work
         )
         for noisy in (False, True):
             if _follows_field(model, method, run, tangents, order, clock, h, noisy, work):

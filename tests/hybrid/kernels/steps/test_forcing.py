@@ -137,7 +137,6 @@ class TestLongest:
         swings=False,
         calm=False,
         clock=-1,
-        change=True,
         seen=False,
         **run,
     ):
@@ -160,7 +159,6 @@ class TestLongest:
             forcing,
             first_hidden=first_hidden,
             _is_calm=lambda *given: calm,
-            _arguments_change=lambda *given: change,
         )._longest_explained
         made = new_run(**run)
         given = (None, 1, clock, "nodes", timed, swings, seen, 1.0, None)
@@ -193,7 +191,6 @@ class TestLongest:
         assert self.longest(yes, kinds=kinds, timed=False, swings=True)[1] == both[1:]
         assert self.longest(yes, kinds=kinds, timed=True, swings=False)[1] == both[:1]
         assert self.longest(yes, kinds=kinds, swings=True, calm=True)[1] == both[1:]
-        assert self.longest(yes, kinds=kinds, swings=True, change=False)[1] == both[:1]
         assert self.longest(yes, kinds=kinds, calm=True)[1] == []
         # Calm is known of time alone, not of a clock.
         assert self.longest(yes, kinds=kinds, calm=True, clock=1)[1] == both[:1]
@@ -229,7 +226,7 @@ class TestAttempt:
         implicit=0,
     )
 
-    def attempt(self, share, path, **changes):
+    def attempt(self, share, path, changed=True, **changes):
         """``path`` stands for the powers of the interpolant on [0, 1]; ``share`` of the step is explained."""
         self.asked = []
 
@@ -248,7 +245,17 @@ class TestAttempt:
             path=np.full((4, 2), 99.0),
             places=np.full((4, 3), 99.0),
         )
-        tested = plain(forcing, _longest_explained=longest, interpolant_path=interpolant_path)
+
+        def changes_on(model, mode, path, order, clock, start, h, work):
+            assert (mode, path is work.path, order, clock, start, h) == (1, True, 3, -1, 3.0, self.H)
+            return changed
+
+        tested = plain(
+            forcing,
+            _longest_explained=longest,
+            interpolant_path=interpolant_path,
+            _arguments_change=changes_on,
+        )
         model = model_with(ARGUMENTS, TERMS)
         return tested.explained_attempt(model, tested_method, new_run(y=self.Y), self.H, self.work)
 
@@ -271,6 +278,10 @@ class TestAttempt:
         self.attempt(1.0, self.PATH, implicit=1)
         assert not self.asked[0][-1]
         assert self.work.places.tolist() == [[99.0] * 3] * 4
+
+    def test_no_pulse_is_looked_for_if_no_argument_changes_enough(self):
+        assert self.attempt(0.75, self.PATH, changed=False) == 0.5
+        assert self.asked == []
 
     def test_an_infinite_one_is_taken_as_it_is(self):
         assert self.attempt(0.75, (*self.PATH[:3], (0.375, math.inf))) == 0.5
