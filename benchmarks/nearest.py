@@ -261,6 +261,7 @@ NEAREST = {
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
     "hybrid/orbits/periodic_orbit.py": ("orbits/test_objections.py", "orbits/test_newton.py"),
+    "hybrid/orbits/sections.py": ("orbits/test_section_rules.py",),
     "hybrid/plot/arcs.py": ("plot/test_plot.py",),
     "hybrid/plot/graph.py": ("plot/test_plot.py",),
     "hybrid/plot/orbits.py": ("plot/test_arcs.py", "plot/test_plot.py"),
@@ -297,6 +298,8 @@ NEAREST = {
     "hybrid/sweep/local.py": ("sweep/test_sweep.py", "sweep/test_store.py", "simulation/test_interrupt.py"),
     "hybrid/sweep/outcome.py": ("sweep/test_sweep.py", "sweep/test_store.py"),
     "hybrid/sweep/parts.py": ("sweep/test_outcome.py", "sweep/test_store.py"),
+    "hybrid/sweep/many.py": ("kernels/types/test_notes.py", "sweep/test_many_statuses.py"),
+    "hybrid/sweep/remote.py": ("sweep/test_remote_rules.py",),
     "hybrid/sweep/rows.py": ("sweep/test_many.py", "../lyapunov/test_chart.py"),
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
     "hybrid/symbolic/expressions.py": (
@@ -338,8 +341,10 @@ NEAREST = {
     ),
     "hybrid/transform/surface.py": ("transform/test_filippov.py", "transform/test_two_folds.py"),
     "lyapunov/kernels.py": ("../lyapunov/test_spectrum.py", "../lyapunov/test_two_orbit.py"),
+    "lyapunov/spectrum.py": ("../lyapunov/test_spectrum_rules.py",),
     "lyapunov/study/kernels.py": ("../lyapunov/study/test_ode23s.py",),
     "lyapunov/study/regimes.py": ("../lyapunov/study/test_figures.py",),
     "lyapunov/study/report.py": ("../lyapunov/test_main.py",),
     "lyapunov/study/tangents.py": ("../lyapunov/test_main.py",),
+    "lyapunov/two_orbit.py": ("../lyapunov/test_two_orbit_rules.py",),
 }

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import attrs
 
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.notes import MOST_LATENESS, is_plain
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import (
     SUCCESS,
@@ -22,11 +23,6 @@ from hybrid.status import (
 from hybrid.system.functions import guard_function
 from hybrid.system.growth import Unexplored
 
-# The rounding of the time may be worth so many tolerances in one step: it is measured between neighbouring
-# numbers, which are a few times as far apart as the time is from the nearest.
-MOST_LATENESS = 10.0
-
-
 # What helps where a level runs dry.
 LOWER = (
     "Lower atol, or write the exponents as 1/2, 1/3, 2/3 or 3/4: with Taylor, such powers have a series "
@@ -37,12 +33,20 @@ LOWER = (
 def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     _grow(trajectory, code)
+    complete = code == codes.DONE and not trajectory.tangents
+    if complete and is_plain(trajectory.model, trajectory.run, len(trajectory.beyond)):
+        return SUCCESS
     status = _status(trajectory, code)
-    notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory, code)]
-    notes += [*_unproved(trajectory), *_unresolved(trajectory)]
+    notes = _notes(trajectory, code)
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
+
+
+def _notes(trajectory: Trajectory, code: int) -> list[str]:
+    """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
+    notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory, code)]
+    return [*notes, *_unproved(trajectory), *_unresolved(trajectory)]
 
 
 def _grow(trajectory: Trajectory, code: int) -> None:

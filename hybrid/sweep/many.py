@@ -23,7 +23,7 @@ from hybrid.simulation.memory import fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.simulate import simulate
-from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.local import LOOK, cores
@@ -247,6 +247,7 @@ class _Runs:
     ) -> None:
         self.system, self.t_span, self.options, self.found = system, t_span, options, found
         self.max_jumps = max_jumps
+        self.one_by_one = _OneByOne(system, t_span, options, max_jumps, found)
         compiled = self.compiled = compile_system(system)
         # Before threads need the same kernels.
         plan = self.plan = plan_of(compiled, options["solver"], 0)
@@ -297,7 +298,9 @@ class _Runs:
             i = int(reached[0])
             resumed = int(code == codes.GO_ON)
             if code == codes.REFUSED:
-                self._refuse(block.start + i)
+                # Python finds a mode where a guard of another one is not finite, takes steps in time where
+                # series hold the root of a guard that the start lies beyond, or says why no mode is allowed.
+                self.one_by_one.run(range(block.start + i, block.start + i + 1))
             elif not resumed and i < len(block):
                 self._tell(block.start + i, trajectory, code, verdicts)
             if not resumed and i < len(block):
@@ -327,17 +330,3 @@ class _Runs:
         found.t_end[i] = found.t1 if code == codes.DONE else trajectory.t
         found.mode[i], found.jumps[i] = trajectory.mode, trajectory.jumps
         found.tell(i, status_of(trajectory, code))
-
-    def _refuse(self, i: int) -> None:
-        """Keep why a run cannot start, in the words of `simulate`."""
-        try:
-            start(
-                self.system,
-                self.found.origins[i],
-                self.t_span[0],
-                time="t_span",
-                horizon=self.t_span[1] - self.t_span[0],
-                **self.options,
-            )
-        except HybridError as failure:
-            self.found.tell(i, Status(StatusCode.FAILED, str(failure)))

@@ -95,6 +95,21 @@ def test_a_run_that_fails_is_never_within():
     assert str(found).splitlines()[1:][found.names.index("chattering")].split()[-3:] == ["-", "-", "1"]
 
 
+def test_distances_of_spectra():
+    """Exponents in any order; two of minus infinity agree, and a run that failed is at no distance."""
+
+    def spectrum(*exponents, ok=True):
+        return SimpleNamespace(exponents=np.array(exponents), status=SimpleNamespace(ok=ok))
+
+    low = -math.inf
+    assert compare._distance(spectrum(1.0, -2.0), spectrum(-1.5, 1.25)) == 0.5
+    assert compare._distance(spectrum(1.0, low), spectrum(low, 0.75)) == 0.25
+    assert compare._distance(spectrum(low), spectrum(low)) == 0.0
+    assert compare._distance(spectrum(1.0, low), spectrum(1.0, -2.0)) == math.inf
+    for ok, other in ((True, False), (False, True), (False, False)):
+        assert math.isnan(compare._distance(spectrum(1.0, ok=ok), spectrum(1.0, ok=other)))
+
+
 def test_arguments_that_do_not_fit(comparison):
     systems = {"a": decay(lambda p: p.a)}
     with pytest.raises(ArgumentError, match="Reference model 'b' does not exist"):

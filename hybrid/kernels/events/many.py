@@ -3,19 +3,18 @@
 from numba import njit
 
 from hybrid.kernels.events.initial_mode import verdicts_on
+from hybrid.kernels.types import notes
 from hybrid.kernels.types.codes import (
     BEYOND,
     DESINGULARISED,
     DONE,
     GO_ON,
-    HELD,
     MAX_STEPS,
     NO_MODE,
     NO_OBJECTION,
     NO_TRANSITION,
     REFUSED,
     ROOTED,
-    RUNGE_KUTTA,
 )
 from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, VECTOR
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
@@ -27,6 +26,16 @@ def set_words(words, fresh):
     """Make a structure's memory what it was when the structure was new."""
     for i in range(words.shape[0]):
         words[i] = fresh[i]
+
+
+@njit(**KERNEL)
+def guards_beyond(named, verdicts):
+    """Number of guards that a start in the mode ``named`` lies beyond: none where the mode was found."""
+    count = 0
+    for i in range(verdicts.shape[0] if named != NO_MODE else 0):
+        if verdicts[i] == BEYOND:
+            count += 1
+    return count
 
 
 @njit(**KERNEL)
@@ -44,10 +53,7 @@ def mode_of_start(parts, task, named, verdicts):
         return NO_MODE
     if named != NO_MODE:
         rooted = model.propagator[named] == DESINGULARISED or model.propagator[named] == ROOTED
-        for i in range(verdicts.shape[0] if rooted else 0):
-            if verdicts[i] == BEYOND:
-                return NO_MODE
-        return named
+        return NO_MODE if rooted and guards_beyond(named, verdicts) > 0 else named
     chosen = NO_MODE
     for mode in range(modes):
         allowed = True
@@ -63,21 +69,7 @@ def mode_of_start(parts, task, named, verdicts):
     return chosen
 
 
-@njit(**KERNEL)
-def is_plain(model, run, verdicts):
-    """Whether there is nothing to tell of a run that has reached its end.
-
-    In doubt there is: the status that is made then knows.
-    """
-    notes = run.unproved + run.unresolved + run.coarse + run.order_mattered
-    for i in range(verdicts.shape[0]):
-        if verdicts[i] == BEYOND:
-            notes += 1
-    for i in range(model.dimension):
-        if run.trail[HELD, i] != 0.0:
-            notes += 1
-    steep = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA
-    return notes == 0 and not steep and run.lateness <= 1.0 and run.unknown_time == 0.0
+is_plain = njit(**KERNEL)(notes.is_plain)
 
 
 @exported(
@@ -130,7 +122,7 @@ def many_runs(
     ``run_words`` and ``work_words`` are the memory of run and work, ``fresh_run`` and ``fresh_work`` what
     that holds at the start. ``places (N, 3)`` gets the mode, the number of jumps and the number of states
     reached. Stops at the first run that is not complete, or of which there is something to tell: its index
-    goes into ``reached (1,)``. Returns the code of that run; REFUSED if it cannot start, GO_ON if the
+    goes into ``reached (1,)``. Returns the code of that run; REFUSED if it cannot start here, GO_ON if the
     ``budget`` of steps was used up, after which the next call resumes the run: ``resumed``.
     """
     run, n = task.run, task.model.dimension
@@ -160,7 +152,7 @@ def many_runs(
                 states[i, s, c] = run.y[c]
             places[i, 2] = s + 1
         places[i, 0], places[i, 1] = run.mode, run.jumps
-        if not is_plain(task.model, run, verdicts):
+        if not is_plain(task.model, run, guards_beyond(named, verdicts)):
             return DONE
     reached[0] = origins.shape[0]
     return DONE

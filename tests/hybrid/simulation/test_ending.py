@@ -247,14 +247,37 @@ def test_a_run_that_ends_at_a_mode_not_made_yet_has_it_made(code, last, onward, 
 
 @pytest.mark.parametrize("code", [StatusCode.SUCCESS, StatusCode.DISCONTINUOUS_FIELD])
 def test_kinks_are_not_told_beside_jumps(code, monkeypatch):
-    for name in ("_start_beyond", "_held", "_run_dry", "_unproved", "_unresolved"):
-        monkeypatch.setattr(ending, name, lambda *given: ())
+    monkeypatch.setattr(ending, "_notes", lambda *given: [])
     monkeypatch.setattr(ending, "_kinks", lambda trajectory: ["Kinks."])
     monkeypatch.setattr(ending, "_status", lambda trajectory, code: Status(code, "Done.", ""))
     found = ending.status_of(
-        SimpleNamespace(system=SimpleNamespace(growth=None), run=SimpleNamespace(last_fired=-1)), code
+        SimpleNamespace(system=SimpleNamespace(growth=None), run=SimpleNamespace(last_fired=-1), tangents=2),
+        code,
     )
     assert found.message == ("Done. Kinks." if code == StatusCode.SUCCESS else "Done.")
+
+
+@pytest.mark.parametrize("code", [codes.DONE, codes.MAX_STEPS])
+@pytest.mark.parametrize("tangents", [0, 2])
+@pytest.mark.parametrize("is_plain", [False, True])
+def test_notes_are_looked_for_unless_the_run_is_plain(is_plain, tangents, code, monkeypatch):
+    """Runs with tangent vectors, and runs that end early, have more to tell than is asked for."""
+    asked = []
+    monkeypatch.setattr(ending, "is_plain", lambda *given: asked.append(given) or is_plain)
+    monkeypatch.setattr(ending, "_notes", lambda trajectory, code: ["A note."])
+    monkeypatch.setattr(ending, "_kinks", lambda trajectory: [])
+    monkeypatch.setattr(ending, "_status", lambda trajectory, code: Status(StatusCode.FAILED, "Done."))
+    trajectory = SimpleNamespace(
+        system=SimpleNamespace(growth=None),
+        run=SimpleNamespace(last_fired=-1),
+        model="model",
+        beyond=("a", "b"),
+        tangents=tangents,
+    )
+    found = ending.status_of(trajectory, code)
+    quick = code == codes.DONE and not tangents
+    assert asked == ([("model", trajectory.run, 2)] if quick else [])
+    assert found.message == ("Reached the end." if quick and is_plain else "Done. A note.")
 
 
 @pytest.mark.parametrize(

@@ -141,6 +141,18 @@ def test_systems_that_grow(monkeypatch):
     np.testing.assert_array_equal(sampled.mode_end, found.mode_end)
 
 
+def test_a_mode_that_is_named_may_have_several_parts():
+    """A block that rubs: each start is in the part that its velocity belongs to."""
+    rubbing = hybrid.HybridSystem(
+        state=("q", "v"), modes=[hybrid.Mode("rub", lambda t, x, p: (x.v, -x.q - 0.3 * np.sign(x.v)))]
+    )
+    block = hybrid.split(rubbing)
+    assert len(block.parts_of("rub")) > 1
+    starts = [(1.0, 1.0), (1.0, -1.0), (-1.0, 0.5), (2.0, -0.5)]
+    found = simulate_many(block, starts, (0.0, 3.0), mode="rub")
+    assert_one_by_one(found, block, starts, (0.0, 3.0), mode="rub")
+
+
 class Impatient:
     """Ctrl-C at the fifth question."""
 

@@ -12,7 +12,6 @@ from hybrid.kernels.types.codes import (
     DONE,
     EXACT,
     GO_ON,
-    HELD,
     LEAVES,
     MAX_STEPS,
     NO_MODE,
@@ -24,6 +23,7 @@ from hybrid.kernels.types.codes import (
     TAYLOR,
 )
 from tests.hybrid.kernels.plain import plain
+from tests.hybrid.kernels.types.ends import end
 
 
 def start(
@@ -91,47 +91,13 @@ def test_a_mode_that_is_named(kind):
         assert start({}, named=named, kinds=kinds, undefined=True) == NO_MODE
 
 
-COUNTED = ("unproved", "unresolved", "coarse", "order_mattered")
-
-
-def plain_end():
-    """A model with a steep mode, and what a run counts of which there is nothing to tell."""
-    kinds = np.array([RUNGE_KUTTA, RUNGE_KUTTA, EXACT, RUNGE_KUTTA, RUNGE_KUTTA])
-    model = SimpleNamespace(dimension=2, steep=np.array([1, 0, 1, 0, 0]), propagator=kinds)
-    counted = dict.fromkeys(COUNTED, 0)
-    trail = np.zeros((HELD + 1, 3))
-    # The last number of a row belongs to no component.
-    trail[HELD, 2] = 1.0
-    return model, {"mode": 1, "lateness": 1.0, "unknown_time": 0.0, "trail": trail} | counted
-
-
-@pytest.mark.parametrize(
-    "note",
-    [
-        *((name, 1) for name in COUNTED),
-        ("lateness", 1.1),
-        ("unknown_time", 1e-9),
-        ("mode", 0),
-        ("trail", 1),
-        None,
-    ],
-)
-def test_what_there_is_to_tell(note):
-    """Also that the mode is steep and followed in time, and that a chatter has left components."""
-    model, told = plain_end()
-    kernels = plain(many)
-    if note and note[0] == "trail":
-        told["trail"][HELD, note[1]] = 1.0
-    elif note:
-        told[note[0]] = note[1]
-    run = SimpleNamespace(**told)
-    assert bool(kernels.is_plain(model, run, np.array([NO_OBJECTION, LEAVES]))) is (note is None)
-    assert not kernels.is_plain(model, run, np.array([BEYOND, LEAVES]))
-
-
-def test_a_steep_mode_with_a_series_has_nothing_to_tell():
-    model, told = plain_end()
-    assert plain(many).is_plain(model, SimpleNamespace(**told | {"mode": 2}), np.array([NO_OBJECTION]))
+def test_guards_beyond_the_start_count_only_in_a_mode_that_is_named():
+    """Elsewhere they belong to modes that the state is not in."""
+    verdicts = np.array([BEYOND, LEAVES, NO_OBJECTION, BEYOND])
+    assert plain(many).guards_beyond(1, verdicts) == 2
+    assert plain(many).guards_beyond(0, verdicts) == 2
+    assert plain(many).guards_beyond(NO_MODE, verdicts) == 0
+    assert plain(many).guards_beyond(1, verdicts[1:3]) == 0
 
 
 class TestManyRuns:
@@ -139,12 +105,12 @@ class TestManyRuns:
 
     TIMES = (2, 3, 7)
 
-    def begin(self, *origins, refused=(), told=()):
+    def begin(self, *origins, refused=(), told=(), verdict=NO_OBJECTION):
         """Memory for runs from ``origins``; those ``refused`` cannot start, those ``told`` have a note."""
         count = len(origins)
         self.origins = np.array([[each, -each] for each in origins], dtype=float)
-        self.refused, self.told = refused, told
-        self.model, told = plain_end()
+        self.refused, self.told, self.verdict = refused, told, verdict
+        self.model, told = end()
         told |= {"y": np.zeros(2), "scale": np.zeros(2), "mode": -1, "jumps": 0, "steps": 0}
         self.run = SimpleNamespace(**told)
         self.run_words, self.work_words = np.array([7, 7]), np.array([7, 7, 7])
@@ -185,7 +151,7 @@ class TestManyRuns:
             *(self.advance, "parts", task),
             *(self.run_words, np.array([1, 2]), self.work_words, np.array([3, 4, 5])),
             *(self.origins, cycles, 0.5 * cycles, 4, begin, resumed, max_steps, budget, 50),
-            *(self.states, self.places, np.array([NO_OBJECTION]), self.reached),
+            *(self.states, self.places, np.array([self.verdict]), self.reached),
         )
 
     def assert_complete(self, rows, origins):
@@ -242,6 +208,12 @@ class TestManyRuns:
         assert self.reached[0] == 1
         self.assert_complete((0, 1), (10, 15))
         assert np.all(np.isnan(self.states[2]))
+
+    def test_a_start_beyond_a_guard_of_the_mode_that_is_named_is_told(self):
+        assert self.begin(10, 15, verdict=BEYOND).call() == DONE
+        assert self.reached[0] == 0
+        assert self.begin(10, 15, verdict=LEAVES).call() == DONE
+        assert self.reached[0] == 2
 
 
 def test_memory_is_set_to_what_is_fresh():

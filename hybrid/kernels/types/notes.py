@@ -1,0 +1,28 @@
+"""Whether there is anything to tell of a run that has reached its end.
+
+Nothing here needs the compiler: the function is a kernel for runs from many starts, and runs as Python for a
+single run.
+"""
+
+from hybrid.kernels.types.codes import HELD, RUNGE_KUTTA
+
+# The rounding of the time may be worth so many tolerances in one step: it is measured between neighbouring
+# numbers, which are a few times as far apart as the time is from the nearest.
+MOST_LATENESS = 10.0
+
+
+def is_plain(model, run, beyond):
+    """Whether a run without tangent vectors that has reached its end has a status without notes.
+
+    All that the status of such a run may tell is listed here, and only here: a note that is missing is told
+    neither of a single run nor of many. ``beyond`` counts the guards that the start lies beyond. In doubt
+    the answer is no.
+    """
+    steps = run.unproved + run.unresolved + run.coarse
+    held = 0
+    for i in range(model.dimension):
+        if run.trail[HELD, i] != 0.0:
+            held += 1
+    may_run_dry = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA
+    uncertain = run.unknown_time != 0.0 or run.lateness > MOST_LATENESS or may_run_dry
+    return steps + run.order_mattered + held + beyond == 0 and not uncertain
