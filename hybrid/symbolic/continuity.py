@@ -208,7 +208,7 @@ def _with_exact_turns(expression: sympy.Expr) -> sympy.Expr:
 def _turns(number: sympy.Float) -> sympy.Expr:
     parts = round(float(number) / math.pi * PARTS_OF_PI)
     value = parts * math.pi / PARTS_OF_PI
-    return sympy.Rational(parts, PARTS_OF_PI) * sympy.pi if abs(value - number) <= 1e-15 * value else number
+    return sympy.Rational(parts, PARTS_OF_PI) * sympy.pi if abs(value - number) <= 1e-15 * abs(value) else number
 
 
 def _ratio(one: sympy.Expr, other: sympy.Expr) -> float:
