@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import sympy
+from sympy.core.parameters import distribute
 
 from hybrid.symbolic import continuity
 from hybrid.symbolic.expressions import (
@@ -60,6 +61,29 @@ class TestSurfaces:
         found = continuity.jumps_of([Sign(V), Sign(V) + 2 * Sign(Q)], (Q, V))
         assert sorted(found) == ["x[0] = 0", "x[1] = 0"]
         assert found[0] == "x[1] = 0"
+
+    @pytest.mark.parametrize(
+        ("entry", "jumps"),
+        [
+            (Sign(Q - 1) - 2 * Step(Q - 1), False),
+            (Sign(Q - 1) + 2 * Step(Q - 1), True),
+            (Step(Q - 1) + Step(1 - Q), False),
+            (Step(Q - 1) - Step(1 - Q), True),
+            (Step(3 * Q - 3) - Step(Q - 1), False),
+            (Step(Q / 4 - V) + Step(4 * V - Q), False),
+            (V * Less(Q, ONE) + V * Step(Q - 1), False),
+            (sympy.sin(2 * sympy.pi * Floor(Q)) * V, False),
+            (sympy.cos(2 * sympy.pi * Ceiling(Q) / 3) * V, True),
+        ],
+    )
+    def test_atoms_with_one_surface_jump_together(self, entry, jumps):
+        assert bool(continuity.jumps_of([entry], (Q, V))) == jumps
+
+    @pytest.mark.parametrize("distributing", [False, True])
+    def test_proofs_distribute_numbers_whatever_the_caller_does(self, distributing):
+        with distribute(distributing):
+            assert continuity.jumps_of([Step(Q - V) * (2 * (Q + V) - 2 * Q - 2 * V + Q - V)], (Q, V)) == []
+            assert continuity.vanishes_on(-(Q - V) + V, 2 * (V - Q / 2))
 
     @pytest.mark.parametrize(
         ("atom", "may"),
@@ -119,6 +143,7 @@ class TestSurfaces:
             (Q, {Q: ZERO}),
             (2 * Q - 6 * V + 4, {Q: 3 * V - 2, V: Q / 3 + sympy.Rational(2, 3)}),
             (Q - K, {Q: K}),
+            (K * Q - 1, {Q: 1 / K}),
             (T - V, {T: V, V: T}),
             (3 * sympy.sin(Q) - 6, {sympy.sin(Q): sympy.Integer(2)}),
             (Q * V - 1, {Q * V: ONE}),
@@ -208,6 +233,11 @@ class TestChoices:
         assert continuity._without_choices(sympy.sin(Q)) == sympy.sin(Q)
 
 
+# In floats 0.1 times 3 is not 0.3.
+ROUNDED = sympy.Mul(sympy.Float(0.1), Q + 3, evaluate=False)
+SMALL = sympy.Mul(sympy.Float(1e-6), K, Q + 1, evaluate=False)
+
+
 @pytest.mark.parametrize(
     ("expression", "zero"),
     [
@@ -215,7 +245,10 @@ class TestChoices:
         (Q * (V + 1) - Q * V - Q, True),
         (Q, False),
         (sympy.Float(1e-14) * Q * V + (1 + Q) * 1.0 - 1.0 - Q, False),
-        (sympy.Mul(sympy.Float(0.1), Q + 3, evaluate=False) - sympy.Float(0.1) * Q - sympy.Float(0.3), True),
+        (ROUNDED - sympy.Float(0.1) * Q - sympy.Float(0.3), True),
+        # What rounding leaves is judged by the largest number, beside smaller ones as well.
+        (ROUNDED - sympy.Float(0.1) * Q - sympy.Float(0.3) + SMALL - 1e-6 * K - 1e-6 * K * Q, True),
+        (ROUNDED - sympy.Float(0.1) * Q - sympy.Float(0.3) + V, False),
         (Q * sympy.zoo, False),
         (sympy.nan, False),
         (sympy.oo, False),
@@ -237,13 +270,6 @@ def helper(value):
 class Callable:
     def __call__(self, t, x, p):
         return (x[0],)
-
-
-closed_over = (lambda value: value, 2.0)
-
-
-def closing_over(value):
-    return lambda t, x, p: (x[0] * (value(1.0) if False else value),)
 
 
 def calls_what_it_closes_over(value):
