@@ -1,4 +1,4 @@
-"""The steps of the proof that a field is continuous, one by one, and what the bytecode of a function tells."""
+"""The steps of the proof that a field is continuous, one by one, and what bytecode tells."""
 
 import math
 
