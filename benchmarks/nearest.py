@@ -20,7 +20,11 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
-    "hybrid/compiler/emit.py": ("compiler/test_emitted.py", "symbolic/test_continuity.py"),
+    "hybrid/compiler/emit.py": (
+        "compiler/test_emit_rules.py",
+        "compiler/test_emitted.py",
+        "symbolic/test_continuity.py",
+    ),
     "hybrid/compiler/emitted.py": (
         "compiler/bounds/test_forcing.py",
         "kernels/events/test_proved_crossings.py",

@@ -74,6 +74,8 @@ class TestSurfaces:
             (V * Less(Q, ONE) + V * Step(Q - 1), False),
             (sympy.sin(2 * sympy.pi * Floor(Q)) * V, False),
             (sympy.cos(2 * sympy.pi * Ceiling(Q) / 3) * V, True),
+            (Truncate(K) + TruncatedRemainder(K, V) * Truncate(T) + V * Sign(V), True),
+            (Truncate(Q) * 0 + V * Sign(V), False),
         ],
     )
     def test_atoms_with_one_surface_jump_together(self, entry, jumps):
