@@ -313,7 +313,11 @@ NEAREST = {
     "hybrid/symbolic/ranges.py": ("symbolic/test_ranges_rules.py",),
     "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
     "hybrid/symbolic/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
-    "hybrid/symbolic/values.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/symbolic/values.py": (
+        "symbolic/test_values_rules.py",
+        "symbolic/test_tracing.py",
+        "compiler/test_operations.py",
+    ),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",
