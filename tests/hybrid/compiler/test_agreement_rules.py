@@ -120,6 +120,18 @@ class TestDerivatives:
         text = told(stub(system_of(field, jacobian), (0.25, -1.5), slopes))
         assert text is None if expected is None else text.startswith(expected)
 
+    def test_that_are_given_but_have_no_value(self):
+        """The point is passed over, as where the function has none."""
+
+        def raising(t, x, p):
+            return (0.0, 1.0), (-3.0, 1 / 0)
+
+        system = SimpleNamespace(
+            variables=system_of(field).variables, modes=[Mode("a", field, jacobian=raising)]
+        )
+        system.dimension, system.state, system.parameters = 2, ("q", "v"), {"k": 3.0}
+        assert told(stub(system, (0.25, -1.5), np.zeros((2, 3)))) is None
+
     def test_that_are_derived_by_tracing_are_not_compared(self):
         assert told(stub(system_of(field), (0.25, -1.5), np.full((2, 3), 7.0))) is None
 
@@ -150,6 +162,21 @@ class TestDerivatives:
             return (x.v, -p.k * x.q) if x.q > 0 else (x.q, x.v)
 
         assert told(stub(system_of(ordered), (0.25, -1.5), np.zeros((2, 3)), opaque=True)) is None
+
+
+def test_points_are_near_1_and_of_other_sizes_with_parameters_near_the_declared():
+    points = [*agreement.comparison_points(system_of(field))]
+    assert [values.tolist() for *_, values in points[:4]] == [[3.0]] * 4
+    for size, *pair in zip((1e-3, 30.0, 1e3), points[4::2], points[5::2], strict=True):
+        for t, x, _ in pair:
+            assert 0.5 * size <= t <= 1.5 * size
+            assert np.all((0.5 * size <= abs(x)) & (abs(x) <= 1.5 * size))
+        assert pair[0][2] == 3.0
+        assert 0.0 < abs(pair[1][2] / 3.0 - 1.0) <= 0.1
+    # States of both signs, and parameters on both sides of the declared ones.
+    signs = np.array([np.sign(x) for _, x, _ in points[4:]])
+    assert {*signs.ravel()} == {-1.0, 1.0}
+    assert {*np.sign([values[0] - 3.0 for *_, values in points[5::2]])} == {-1.0, 1.0}
 
 
 def test_every_function_is_compared_until_one_differs():
