@@ -3,6 +3,7 @@
 # Relative to tests/hybrid. The tests of the same name, in the same place of the tree, come first in any case.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
+    "hybrid/compiler/agreement.py": ("compiler/test_agreement_rules.py",),
     "hybrid/compiler/bounds/forcing.py": (
         "compiler/bounds/test_forcing_rules.py",
         "compiler/bounds/test_pulses_in_state.py",
@@ -19,7 +20,11 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
-    "hybrid/compiler/emit.py": ("compiler/test_emitted.py", "symbolic/test_continuity.py"),
+    "hybrid/compiler/emit.py": (
+        "compiler/test_emit_rules.py",
+        "compiler/test_emitted.py",
+        "symbolic/test_continuity.py",
+    ),
     "hybrid/compiler/emitted.py": (
         "compiler/bounds/test_forcing.py",
         "kernels/events/test_proved_crossings.py",
@@ -302,14 +307,20 @@ NEAREST = {
     "hybrid/sweep/remote.py": ("sweep/test_remote_rules.py",),
     "hybrid/sweep/rows.py": ("sweep/test_many.py", "../lyapunov/test_chart.py"),
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
+    "hybrid/symbolic/continuity.py": ("symbolic/test_continuity_rules.py",),
     "hybrid/symbolic/expressions.py": (
         "symbolic/test_tracing.py",
         "symbolic/test_derivatives.py",
         "compiler/taylor/test_series.py",
     ),
+    "hybrid/symbolic/ranges.py": ("symbolic/test_ranges_rules.py",),
     "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
     "hybrid/symbolic/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
-    "hybrid/symbolic/values.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/symbolic/values.py": (
+        "symbolic/test_values_rules.py",
+        "symbolic/test_tracing.py",
+        "compiler/test_operations.py",
+    ),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",

@@ -8,7 +8,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.compiler.emitted import Emitted
-from hybrid.compiler.opaque import OpaqueFunction
 from hybrid.errors import ModelError
 from hybrid.symbolic.values import WHERE, TraceError, values_of
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
@@ -148,10 +147,7 @@ def disagreement(
 
 
 def _is_opaque(compiled: Compiled, function: Callable[..., Any]) -> bool:
-    return any(
-        isinstance(value, OpaqueFunction) and value.function is function
-        for value in compiled.emitted.opaque.values()
-    )
+    return any(value.function is function for value in compiled.emitted.opaque.values())
 
 
 def _difference(

@@ -161,8 +161,7 @@ def _known_side(
     if isinstance(atom, (*ROUNDING, *REMAINDERS, Atan2)):
         return None
     surface, sides = _sides(atom, step)
-    if surface is None:
-        return None
+    assert surface is not None, "the kinds of atoms that remain have a surface"
     height = sympy.expand(_replaced(surface, {}, names).subs(old, new))
     if not (height.is_number and height.is_real) or height == 0:
         return None
@@ -208,7 +207,9 @@ def _with_exact_turns(expression: sympy.Expr) -> sympy.Expr:
 def _turns(number: sympy.Float) -> sympy.Expr:
     parts = round(float(number) / math.pi * PARTS_OF_PI)
     value = parts * math.pi / PARTS_OF_PI
-    return sympy.Rational(parts, PARTS_OF_PI) * sympy.pi if abs(value - number) <= 1e-15 * value else number
+    return (
+        sympy.Rational(parts, PARTS_OF_PI) * sympy.pi if abs(value - number) <= 1e-15 * abs(value) else number
+    )
 
 
 def _ratio(one: sympy.Expr, other: sympy.Expr) -> float:
@@ -265,7 +266,7 @@ def _is_zero(expression: sympy.Expr) -> bool:
     expanded = sympy.expand(expression)
     if expanded == 0:
         return True
-    scale = max((abs(float(c)) for c in _coefficients(expression)), default=0.0)
+    scale = max(abs(float(c)) for c in _coefficients(expression))
     return all(abs(float(c)) <= SMALL * scale for c in _coefficients(expanded))
 
 

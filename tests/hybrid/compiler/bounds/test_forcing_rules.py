@@ -8,6 +8,7 @@ from hybrid.compiler.bounds.forcing import (
     FACTORS_OF_HARMONIC,
     MOST_FACTORS,
     NO_COMPONENT,
+    _saturates,
     arguments_of,
     forcings,
     is_harmless,
@@ -170,6 +171,7 @@ def test_logarithms_of_powers_that_fall_so_fast_that_their_tails_do_not_show():
         (sympy.cos(A) ** 20, [20 * sympy.log(Absolute(sympy.cos(A)))]),
         (A**K, [K * sympy.log(Absolute(A))]),
         (C**-3, []),
+        (1 / Maximum(A**3, K), [-sympy.log(Absolute(Maximum(A**3, K))), 16 * Sign(A**3 - K)]),
     ):
         assert set(arguments_of(expression, own)) == set(expected)
 
@@ -230,6 +232,18 @@ M = MOST_FACTORS
 def test_what_may_be_flat_to_all_digits(term, saturates):
     kinds = [each.kind for each in forcings([C, A, term, A], [], SYMBOLS)]
     assert (ARGUMENTS in kinds) == saturates
+
+
+def test_roots_of_the_larger_of_two_saturate_if_one_of_them_does():
+    for base, saturates in (
+        (Maximum(A, C), False),
+        (Maximum(A, C**2), True),
+        (Maximum(C * A, K), True),
+        (Absolute(A), False),
+        (Absolute(A**2), True),
+        (Maximum(sympy.sin(A), C), True),
+    ):
+        assert _saturates(sympy.sqrt(base), (A, C), frozenset()) is saturates
 
 
 def test_the_root_of_a_guard_does_not_saturate():
