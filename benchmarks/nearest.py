@@ -140,6 +140,7 @@ NEAREST = {
         "kernels/events/test_domain.py",
     ),
     "hybrid/kernels/events/sides.py": (
+        "kernels/events/test_side_rules.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
