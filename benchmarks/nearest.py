@@ -163,8 +163,13 @@ NEAREST = {
         "kernels/jumps/test_skipped.py",
         "kernels/jumps/test_rounds.py",
     ),
-    "hybrid/kernels/jumps/collapse.py": ("kernels/jumps/test_rounds.py", "kernels/jumps/test_locked.py"),
+    "hybrid/kernels/jumps/collapse.py": (
+        "kernels/jumps/test_collapse_rules.py",
+        "kernels/jumps/test_rounds.py",
+        "kernels/jumps/test_locked.py",
+    ),
     "hybrid/kernels/jumps/corner.py": (
+        "kernels/jumps/test_corner_rules.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/jumps/test_instant.py",
     ),
@@ -207,6 +212,7 @@ NEAREST = {
     ),
     "hybrid/kernels/steps/forcing.py": (
         "kernels/steps/test_forcing_field.py",
+        "kernels/steps/test_forcing_series.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),
