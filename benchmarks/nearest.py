@@ -104,6 +104,7 @@ NEAREST = {
         "kernels/jumps/test_instant_rules.py",
     ),
     "hybrid/kernels/events/guards.py": (
+        "kernels/events/test_guard_rules.py",
         "kernels/events/test_touch_rules.py",
         "kernels/events/test_onset.py",
         "kernels/events/test_condition.py",
