@@ -260,7 +260,17 @@ def test_the_order_matters_if_the_states_or_the_modes_differ(way):
 class TestFirstInOrder:
     """The second of three modes has the guards 1, 2 and 3, of which the flow has reached that of 2."""
 
-    def first(self, due, *, foreseen=(0, 0, 0), sides=(-1, -1, -1), refused=(), markers=(), matters=never):
+    def first(
+        self,
+        due,
+        *,
+        foreseen=(0, 0, 0),
+        sides=(-1, -1, -1),
+        refused=(),
+        markers=(),
+        matters=never,
+        touches=False,
+    ):
         def take_sides(model, run, mode, t, x, came, left, fired, side, due_of, zero, work):
             assert (mode, t, came, left, fired) == (1, 7.0, FLOWED, 1, NO_TRANSITION)
             self.known = side[1:4].tolist()
@@ -283,7 +293,9 @@ class TestFirstInOrder:
             corner,
             task_of=lambda task: task,
             take_sides=take_sides,
-            turns_back=lambda *given: False,
+            turns_back=lambda *given: touches,
+            guard_value=lambda *given: 0.0,
+            keep_grazing=lambda *given: None,
             allowed=lambda model, transition, *given: transition not in refused,
             order_matters=matters,
         )
@@ -303,6 +315,10 @@ class TestFirstInOrder:
         assert self.first((1, 0, 0), markers=(1,))[0] == 1
         assert self.first((0, 0, 1), refused=(2,)) == (3, [1, 1, 1], [0, 1, 1])
         assert (self.run.stage, self.run.last_step) == (0, 1.0)
+
+    def test_another_one_where_a_guard_has_only_touched(self):
+        """The next step shows the side of the one that has touched."""
+        assert self.first((1, 0, 0), touches=True) == (1, [1, 0, 1], [1, 0, 0])
 
     def test_none_if_all_are_refused(self):
         """Their sides are left to the next step."""
