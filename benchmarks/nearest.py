@@ -109,6 +109,7 @@ NEAREST = {
         "kernels/jumps/test_instant_rules.py",
     ),
     "hybrid/kernels/events/guards.py": (
+        "kernels/events/test_guard_rules.py",
         "kernels/events/test_touch_rules.py",
         "kernels/events/test_onset.py",
         "kernels/events/test_condition.py",
@@ -145,6 +146,7 @@ NEAREST = {
         "kernels/events/test_domain.py",
     ),
     "hybrid/kernels/events/sides.py": (
+        "kernels/events/test_side_rules.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
@@ -167,8 +169,13 @@ NEAREST = {
         "kernels/jumps/test_skipped.py",
         "kernels/jumps/test_rounds.py",
     ),
-    "hybrid/kernels/jumps/collapse.py": ("kernels/jumps/test_rounds.py", "kernels/jumps/test_locked.py"),
+    "hybrid/kernels/jumps/collapse.py": (
+        "kernels/jumps/test_collapse_rules.py",
+        "kernels/jumps/test_rounds.py",
+        "kernels/jumps/test_locked.py",
+    ),
     "hybrid/kernels/jumps/corner.py": (
+        "kernels/jumps/test_corner_rules.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/jumps/test_instant.py",
     ),
@@ -211,6 +218,7 @@ NEAREST = {
     ),
     "hybrid/kernels/steps/forcing.py": (
         "kernels/steps/test_forcing_field.py",
+        "kernels/steps/test_forcing_series.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),

@@ -24,14 +24,14 @@ class TestInherit:
 
     def inherited(self, surfaces, orientations, directions, side, due, zero, own_direction=1):
         model = SimpleNamespace(
-            first_outgoing=integers(0, 3),
+            first_outgoing=integers(0, 0, 3),
             outgoing=integers(0, 1, 2),
             surface=integers(*surfaces, 7),
             orientation=integers(*orientations, -1),
             direction=integers(*directions, own_direction),
         )
         arrays = (integers(*side, 5), integers(*due, 5), integers(*zero, 5))
-        known = kernels.inherit(model, 0, 3, *arrays)
+        known = kernels.inherit(model, 1, 3, *arrays)
         return known, *(int(each[3]) for each in arrays)
 
     def test_of_no_guard_that_is_the_same(self):
@@ -283,8 +283,11 @@ def test_the_side_of_a_guard(sign):
         assert side_of(0.9, direction=direction, before=sign) == (-direction, BY_STEP)
         assert side_of(0.9, direction=direction, before=sign, was_on=True) == (sign, BY_STEP)
     assert side_of(0.9, direction=0, before=sign) == (sign, BY_STEP)
-    # A guard without a value keeps its side.
+    # A guard without a value keeps its side, an infinite one has that of its sign.
     assert side_of(np.nan, speed=-sign, before=sign) == (sign, 0)
+    assert side_of(np.nan, jumps=2, before=sign) == (sign, sides.JUMPING)
+    for speed in (-sign, np.nan):
+        assert side_of(sign * np.inf, speed=speed, before=-sign, was_on=True, jumps=2) == (sign, 0)
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -300,3 +303,5 @@ def test_the_side_of_a_guard_that_jumps(sign):
     # In the middle of a jump.
     assert side_of(0.3, acceleration=sign, jumps=2, before=sign, was_on=True) == (sign, jumping)
     assert side_of(0.3, acceleration=sign, jumps=2, direction=-1) == (1, BY_STEP)
+    for before, was_on in ((0, True), (-1, False)):
+        assert side_of(0.3, jumps=2, direction=-1, before=before, was_on=was_on) == (1, BY_STEP)

@@ -63,9 +63,9 @@ class TestMemory:
         assert kernels.time_before(model, run, 0, 1) == 2.0
         assert kernels.time_before(model, run, 1, 2) == 4.0
         assert kernels.time_before(model, run, 0, 2) == 6.0
-        run.visits[40 % SLOTS, 3] = 2.0
+        run.visits[40 % SLOTS, 3], run.visits[39 % SLOTS, 3] = 3.0, 1.0
         assert kernels.time_before(model, run, 0, 1) == 22.0
-        assert kernels.time_before(model, run, 1, 2) == 4.0
+        assert kernels.time_before(model, run, 1, 2) == 14.0
 
     def test_the_transitions_that_fired(self):
         _, run = run_of(geometric(0.5, 6), fired=(3, 7, 5))
@@ -137,10 +137,22 @@ class TestTimeLeft:
             model, run = run_of(left[: jumps + 1], jumps=jumps)
             assert kernels.time_left_of_rounds(model, run, 1, 0) == (0.0, 1.0)
 
+    @pytest.mark.parametrize("turn", [1, 2, 3])
+    @pytest.mark.parametrize("jumps", [16, 63, 90])
+    def test_of_many_that_are_passed_over_the_first_ones_known_tell_the_ratio(self, jumps, turn):
+        """All rounds are shorter than the rounding of time; the last of them have no length at all."""
+        unit = 0.5 * EPSILON * 64.0
+        known = min(jumps, SLOTS - 1)
+        rounds = known // turn - 3
+        left = [8.0 * unit] * (rounds * turn) + [each * unit for each in (8, 9, 11, 15) for _ in range(turn)]
+        model, run = run_of(left[: known + 1], jumps=jumps, end=64.0)
+        found = kernels.time_left_of_rounds(model, run, turn, 0)
+        assert found == (unit * 0.5**rounds, 0.5)
+
 
 class TestShortens:
     def shortens(self, recent, earlier, jumps=17):
-        left = [0.0] * 8 + [recent] * 8 + [recent + earlier] * 8
+        left = [0.0] + [0.5 * recent] * 7 + [recent] * 8 + [recent + earlier] * 8
         model, run = run_of(left, jumps=jumps)
         return bool(kernels.shortens(model, run))
 
@@ -289,6 +301,8 @@ class TestEndless:
         """Its jumps are equal; between them it moves by 3 in the first round and by 1.5 in the second."""
         found = self.held(last=(0.0, 20.0 + 1.5), before=(0.0, 10.0), earlier=(0.0, 10.0 - 13.0))
         assert found == [55.0, 21.5 + 1.5 * 0.5]
+        found = self.held((0.0, 21.5), (0.0, 10.0), (0.0, -3.0), lengths=(1.0, 3.0))
+        assert found == [55.0, 21.5 + 0.75 * 0.5]
         # Rounds that do not shorten tell no rate.
         found = self.held((0.0, 21.5), (0.0, 10.0), (0.0, -3.0), lengths=(1.0, 1.0))
         assert found == [55.0, 21.5]
@@ -402,12 +416,16 @@ class TestLimitOfRounds:
     """Rounds of two, with a state that is linear in the time left."""
 
     def found(
-        self, ratio=0.5, *, bent=0.0, is_limit=True, first=0.01, jumps=40, rtol=1e-9, end=1.0, agrees=None
-    ):
-        left = geometric(ratio, count=40, turn=2, first=first)
+        self, ratio=0.5, *, bent=0.0, is_limit=True, first=0.01, jumps=40, rtol=1e-9, end=1.0, agrees=None,
+        turn=2, longer=0.0,
+    ):  # fmt: skip
+        left = geometric(ratio, count=40, turn=turn, first=first)
         left = [time * (1.0 + bent * time) for time in left]
+        # One more round may be longer than all others say.
+        left[4 * turn :] = [time + longer for time in left[4 * turn :]]
         states = [(5.0 + 2.0 * time, -3.0 * time) for time in left]
-        model, run = run_of(left, states=states, end=end, jumps=jumps)
+        fired = TURN if turn == 2 else tuple(range(1, 1 + turn))
+        model, run = run_of(left, states=states, end=end, jumps=jumps, fired=fired)
         model.field = lambda mode, t, x, parameters, out: out.fill(0.0)
         names = ("trial", "settled", "error", "field")
         work = SimpleNamespace(**{name: np.zeros(2) for name in names})
@@ -440,7 +458,12 @@ class TestLimitOfRounds:
         assert self.work.error == pytest.approx([5.0, 0.0], abs=1e-9)
 
     def test_none_yet(self):
-        assert self.found(jumps=16) == (0.0, 0)
+        for turn in (1, 2):
+            assert self.found(jumps=16, turn=turn) == (0.0, 0)
+            assert self.asked == []
+        assert self.found(jumps=17, turn=1) == (pytest.approx(0.01, rel=1e-12), 1)
+        # There must have been a limit one round earlier, too.
+        assert self.found(longer=0.1) == (0.0, 0)
         assert self.asked == []
         assert self.found(is_limit=False) == (0.0, 0)
         assert self.found(agrees=False) == (0.0, 0)
@@ -449,14 +472,33 @@ class TestLimitOfRounds:
         """They differ by the term of third order of a series that is bent."""
         assert self.found(bent=0.5, rtol=1e-3) != (0.0, 0)
         assert self.found(bent=0.5, rtol=1e-12) == (0.0, 0)
+        assert self.found(bent=0.5, rtol=1e-12, agrees=True) == (0.0, 0)
+        # They count against the time of the last 16 jumps, from 2^8 units of 0.01 to none.
+        model, run = run_of([time * (1.0 + 0.5 * time) for time in geometric(0.5, count=40, turn=2)], end=1.0)
+        left, earlier = (kernels.time_left_of_rounds(model, run, 2, back)[0] for back in (0, 2))
+        apart = abs(left + kernels.time_before(model, run, 0, 2) - earlier)
+        lasted = 2.56 * (1.0 + 0.5 * 2.56)
+        for share, expected in ((1.1, True), (0.9, False)):
+            found = self.found(bent=0.5, rtol=share * apart / lasted, agrees=True)
+            assert (found != (0.0, 0)) == expected
 
     def test_next_to_nothing_left_is_a_limit_if_the_resets_lead_back(self):
         """The states need not agree then, as long as rounds are longer than the rounding of time."""
         assert self.found(ratio=0.1, agrees=False) == (pytest.approx(0.01, rel=1e-9), 2)
         assert self.found(ratio=0.1, agrees=False, is_limit=False) == (0.0, 0)
+        # That is 1e-7 of the time that 16 jumps or five rounds took.
+        for turn, ratio in ((1, 1e-7 ** (1 / 16)), (2, 1e-7 ** (1 / 8)), (4, 1e-7 ** (1 / 5))):
+            for share, expected in ((0.99, True), (1.01, False)):
+                found = self.found(ratio=share * ratio, turn=turn, agrees=False)
+                assert (found != (0.0, 0)) == expected
         # Without them, the components must agree as series of their own.
         late = {"ratio": 0.1, "first": 1e-13, "end": 1e3}
         assert self.found(**late, agrees=False) == (0.0, 0)
+        assert self.found(**late, agrees=True, is_limit=False) == (0.0, 0)
+        assert self.found(**late, agrees=True) == (pytest.approx(1e-13, rel=1e-6), 2)
+        assert [each[:2] for each in self.asked] == [("hold", 2), ("limit", 2)]
+        for found in (self.work.settled, self.work.error):
+            assert found == pytest.approx([5.0, 0.0], abs=1e-15)
 
 
 def test_the_transition_that_names_the_mode_of_the_limit_fires_next():
@@ -473,3 +515,6 @@ def test_the_transition_that_names_the_mode_of_the_limit_fires_next():
     assert following((7,)) == NO_TRANSITION
     assert following((5,)) == 3
     assert following((), turn=1) == 7
+    model, run = run_of(geometric(0.5, 8, 3), fired=(3, 7, 5))
+    model.accumulates_to = np.full(9, NO_MODE)
+    assert kernels.next_in_turn(model, run, 3) == 3

@@ -63,7 +63,7 @@ def follows(gaps, *, tangents=1, noise=(0.0,) * 4, noisy=False, clock=-1, ends=F
 @pytest.mark.parametrize("component", range(4))
 def test_each_component_may_miss_some_tolerances_over_the_step(component, way):
     """The gap is weighed by 2 (1 + 2)."""
-    for share, expected in ((0.99, True), (1.01, False)):
+    for share, expected in ((0.9999, True), (1.0001, False)):
         gaps = np.zeros(4)
         gaps[component] = way * share * ALLOWED[component] / 6.0
         assert follows(gaps) == expected
@@ -83,6 +83,50 @@ def test_noise_of_the_state_explains_a_gap(component, way):
     # Less than the noise is no gap at all.
     gaps[component] = way * 99.0
     assert follows(gaps, noise=noise, noisy=True)
+
+
+def test_the_rounding_of_the_state_moves_its_components_both_ways():
+    """By eight units in the last place; of two neighbours some move together and some apart."""
+    moved = []
+
+    def rates(model, mode, t, x, tangents, jacobian, out):
+        moved.append(x / ALONG - 1.0)
+        out[:] = 0.0
+
+    tested = plain(
+        forcing,
+        _along_series=lambda model, mode, tangents, order, s, work: np.copyto(work.trial, ALONG),
+        rates_by_jacobian=rates,
+    )
+    method = SimpleNamespace(atol=ATOL, rtol=RTOL, series_nodes=np.zeros(2), series_weights=np.zeros(2))
+    work = SimpleNamespace(series=None, stages=np.zeros((2, 4)), jacobian=None)
+    work.error, work.trial, work.new = np.zeros(4), np.zeros(4), np.zeros(4)
+    run = SimpleNamespace(mode=1, phase=7.0, y=START)
+    assert tested._follows_field(SimpleNamespace(dimension=2), method, run, 1, 5, -1, 2.0, True, work)
+    exact, rounded = moved
+    assert exact.tolist() == [0.0] * 4
+    assert np.abs(rounded) == pytest.approx(ROUNDING, rel=0.1)
+    assert set(np.sign(rounded[1:] * rounded[:-1])) == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize(("gap", "expected"), [(0.3, True), (0.35, False)])
+def test_a_vector_of_one_component_has_no_absolute_size(gap, expected):
+    """It is 1 at the start and at the end: twice a quarter of both is 1, for three times the gap."""
+
+    def along_series(model, mode, tangents, order, s, work):
+        work.trial[:], work.new[:] = 1.0, (0.0, gap)
+
+    def rates(model, mode, t, x, tangents, jacobian, out):
+        out[:] = 0.0
+
+    tested = plain(forcing, _along_series=along_series, rates_by_jacobian=rates)
+    method = SimpleNamespace(atol=9.0, rtol=RTOL)
+    method.series_nodes, method.series_weights = np.array([0.0, 1.0]), np.array([9.0, 3.0])
+    work = SimpleNamespace(series=None, stages=np.zeros((2, 2)), jacobian=None)
+    work.error, work.trial, work.new = np.zeros(2), np.zeros(2), np.zeros(2)
+    run = SimpleNamespace(mode=1, phase=7.0, y=np.ones(2))
+    found = tested._follows_field(SimpleNamespace(dimension=1), method, run, 1, 5, -1, 1.0, False, work)
+    assert bool(found) == expected
 
 
 def test_a_gap_that_is_no_number_is_one():
