@@ -35,6 +35,7 @@ class StatusCode(IntEnum):
     FAILED = 106
     INFINITE_SLOPE = 107
     ROUNDED_TIME = 108
+    OUT_OF_MEMORY = 109
 
 
 @attrs.frozen
@@ -110,6 +111,11 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
             f"Interrupted {where}.",
             "The result holds everything up to that time. Continue from its last time, state and mode, or "
             "call again.",
+        ),
+        StatusCode.OUT_OF_MEMORY: (
+            f"The steps and jumps that the run keeps fill a third of this machine's memory {where}.",
+            "The result holds everything up to that time. Ask for the states at given times with samples=: "
+            "then the steps are not kept.",
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",

@@ -165,7 +165,7 @@ def _kinks(trajectory: Trajectory) -> Iterator[str]:
 
 
 def _status(trajectory: Trajectory, code: int) -> Status:
-    if code == StatusCode.INTERRUPTED:
+    if code in (StatusCode.INTERRUPTED, StatusCode.OUT_OF_MEMORY):
         return run_status(code, _place(trajectory), None, bare_time=False)
     run = trajectory.run
     singular, ambiguous = run.singular_jumps, run.order_mattered

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import os
+from contextlib import suppress
 from functools import cache, lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +24,19 @@ ISOLATION_DEPTH = 64
 RECENT = 64
 # Solvers, and shapes of memory, that are kept for the next run.
 MOST_LAYOUTS = 64
+
+
+@cache
+def memory_for_records() -> float:
+    """Bytes that the kept steps and jumps of one run may fill; infinite if the memory is not known.
+
+    An arc needs as much again when its steps are joined.
+    """
+    sizes = [os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")] if hasattr(os, "sysconf") else []
+    with suppress(OSError, ValueError):
+        # A container may have less; the limit is "max" if it has not.
+        sizes.append(int(Path("/sys/fs/cgroup/memory.max").read_text(encoding="ascii")))
+    return min(sizes, default=math.inf) / 3
 
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int, rows: int = 0) -> Any:

@@ -14,7 +14,7 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.kernels.types import codes
 from hybrid.simulation.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.memory import empty_record, record_layout
+from hybrid.simulation.memory import empty_record, memory_for_records, record_layout
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -138,6 +138,8 @@ class _Recorder:
         self.states = np.empty((0 if times is None else len(times), trajectory.model.dimension))
         self.places = np.empty((2, len(self.states)), dtype=np.int64)
         self.sampled = 0
+        # Bytes of the steps and jumps that are kept.
+        self.kept = 0
 
     def run(self, t1: float, max_jumps: int) -> HybridArc:
         trajectory, run = self.trajectory, self.trajectory.run
@@ -145,9 +147,12 @@ class _Recorder:
         if code == codes.RECORD_FULL:
             with trajectory.stop:
                 while code == codes.RECORD_FULL:
-                    code = (
-                        StatusCode.INTERRUPTED if trajectory.stop.is_set() else self._advance(t1, max_jumps)
-                    )
+                    if trajectory.stop.is_set():
+                        code = StatusCode.INTERRUPTED
+                    elif self.kept > memory_for_records():
+                        code = StatusCode.OUT_OF_MEMORY
+                    else:
+                        code = self._advance(t1, max_jumps)
         model, system = trajectory.model, trajectory.system
         columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
         jumps = Jumps(system, model.parameters, model.period, *columns)
@@ -190,12 +195,13 @@ class _Recorder:
         period = self.trajectory.model.period
         steps, jumps, grazings, matrices = record.used.tolist()
         if jumps:
-            self.jumps.append(_jump_columns(record, jumps, matrices))
+            self._keep(self.jumps, _jump_columns(record, jumps, matrices))
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
-            self.steps.append(_places_of_steps(record, steps, period))
+            self._keep(self.steps, _places_of_steps(record, steps, period))
             polynomials = record.step_coefficients[:steps]
+            self.kept += polynomials.nbytes
             if 2 * steps > self.steps_at_once:
                 # The arc keeps the record: new memory costs more than what of this was not used.
                 self.blocks.append(polynomials)
@@ -205,6 +211,10 @@ class _Recorder:
             places = _places_of_steps(record, steps, period)
             self._sample(Pieces([record.step_coefficients[:steps]], *places))
         self.layout.take_back(record)
+
+    def _keep(self, parts: list[tuple[np.ndarray, ...]], columns: tuple[np.ndarray, ...]) -> None:
+        parts.append(columns)
+        self.kept += sum(column.nbytes for column in columns)
 
     def _sample(self, pieces: Pieces) -> None:
         """States at the samples that fall before the current end of the run."""

@@ -22,16 +22,17 @@ def shapes(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("solver", "stages", "degree", "coupled", "order", "nodes"),
+    ("solver", "stages", "degree", "coupled", "order", "nodes", "places"),
     [
-        # Stages with those of the interpolant, its degree, coupled stages, order of the series, nodes.
-        (hybrid.DOP853(), 16, 7, 0, 0, 8),
-        (hybrid.Tsit5(), 7, 4, 0, 0, 6),
-        (hybrid.Taylor(rtol=1e-9), 16, 7, 0, None, 8),
-        (hybrid.RadauIIA(), 4, 3, 3, 0, 6),
+        # Stages with those of the interpolant, its degree, coupled stages, order of the series, nodes, of
+        # which those of a series are more than those of Radau; nodes and stages of the interpolant alone.
+        (hybrid.DOP853(), 16, 7, 0, 0, 8, 8 + 3),
+        (hybrid.Tsit5(), 7, 4, 0, 0, 6, 6),
+        (hybrid.Taylor(rtol=1e-9), 16, 7, 0, None, 8, 8 + 3),
+        (hybrid.RadauIIA(), 4, 3, 3, 0, 6, 4),
     ],
 )
-def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes):
+def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes, places):
     method = kernel_method(solver, solver.by_series)
     order = method.order if order is None else order
     # Whole registers of eight columns; three more rows than the order for the error and two of scratch.
@@ -58,6 +59,7 @@ def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes):
         "weights": (1, 16),
         "registers": (ROWS, 6),
         "samples": (nodes + 1, 2 * ROWS),
+        "places": (places, N + 1),
     }
 
 
@@ -120,3 +122,54 @@ def test_records_keep_nothing_at_first_and_implicit_methods_have_no_last_step():
     for solver, last in ((hybrid.RadauIIA(), -1.0), (hybrid.DOP853(), None)):
         work = memory.workspace(kernel_method(solver, solver.by_series), 2, 0, 8)
         assert work.systems[-1].tolist() == ([] if last is None else [last] * 6)
+
+
+class TestRecordsThatFillTheMemory:
+    """An oscillator of frequency one, with a marker of each upward passage through zero."""
+
+    SYSTEM = hybrid.HybridSystem(
+        state=("q", "v"),
+        modes=[hybrid.Mode("swing", lambda t, x, p: (x.v, -x.q))],
+        transitions=[hybrid.Transition("swing", "swing", hybrid.Guard(lambda t, x, p: x.q, +1))],
+    )
+
+    @pytest.fixture
+    def small(self, monkeypatch):
+        monkeypatch.setattr("hybrid.simulation.simulate.memory_for_records", lambda: 1e6)
+
+    def test_the_run_ends_with_what_it_has(self, small):
+        arc = hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing")
+        assert arc.status.code == hybrid.StatusCode.OUT_OF_MEMORY
+        assert not arc.status.ok
+        assert "samples=" in arc.status.remedy
+        assert f"at t = {arc.t[-1]:.12g} in mode 'swing'" in arc.status.message
+        assert 100.0 < arc.t[-1] < 1e5
+        np.testing.assert_allclose(arc.x[:, 0], np.sin(arc.t), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(arc(50.0), [np.sin(50.0), np.cos(50.0)], rtol=0, atol=1e-9)
+
+    def test_samples_need_no_steps(self, small):
+        end = 2e4
+        arc = hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, end), mode="swing", samples=[1.0, end])
+        assert arc.status.ok
+        np.testing.assert_allclose(arc.x[:, 0], np.sin([1.0, end]), rtol=0, atol=1e-8)
+
+    def test_jumps_count_too(self, small):
+        arc = hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing", samples=[1e6])
+        assert arc.status.code == hybrid.StatusCode.OUT_OF_MEMORY
+        assert len(arc.jumps) == int(arc.jumps[-1].t / (2 * np.pi) + 0.5)
+
+    def test_the_room_is_a_third_of_the_memory(self, monkeypatch):
+        pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 3000}
+        room = memory.memory_for_records.__wrapped__
+        monkeypatch.setattr(memory.os, "sysconf", pages.get, raising=False)
+        for limit, found in (("max\n", 4096 * 1000), ("6000000\n", 2e6), ("99999999999999\n", 4096 * 1000)):
+            monkeypatch.setattr(memory.Path, "read_text", lambda *given, limit=limit, **named: limit)
+            assert room() == found
+
+        def absent(*given, **named):
+            raise FileNotFoundError
+
+        monkeypatch.setattr(memory.Path, "read_text", absent)
+        assert room() == 4096 * 1000
+        monkeypatch.delattr(memory.os, "sysconf")
+        assert room() == np.inf
