@@ -126,13 +126,20 @@ def evaluate(
     t: float,
     x: np.ndarray,
     parameters: np.ndarray,
+    *,
+    plain: bool = False,
 ) -> Any:
-    """Values of a model function as a flat array, or None if the call fails or a value is not finite."""
+    """Values of a model function as a flat array, or None if the call fails or a value is not finite.
+
+    The function is called with numbers of NumPy, or with Python's if ``plain``.
+    """
     assert function is not None
-    p = variables.parameter_view(parameters)
+    p = variables.parameter_view(parameters.tolist() if plain else parameters)
+    state = variables.state_view(x.tolist() if plain else x)
     try:
         with np.errstate(all="ignore"):
-            values = np.ravel(np.asarray(function(np.float64(t), variables.state_view(x), p), dtype=float))
+            value = function(float(t) if plain else np.float64(t), state, p)
+            values = np.ravel(np.asarray(value, dtype=float))
     except Exception:  # whatever the cause, the function has no value there
         return None
     return values if np.all(np.isfinite(values)) else None
