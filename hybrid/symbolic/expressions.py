@@ -99,7 +99,7 @@ def power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
     SymPy looks for their signs itself, which may take for ever where sums are not expanded. SymPy also splits
     ``(t/50)**200``, which leaves the floating range and is prevented here.
     """
-    if base.is_zero and not exponent.is_Number:
+    if base.is_Number and base.is_zero and not exponent.is_Number:
         # SymPy takes the sign out of the exponent, and then has complex infinity for a base.
         return Select(Less(ZERO, exponent), ZERO, Select(Equal(exponent, ZERO), ONE, sympy.oo))
     if exponent.is_Number and base.is_Mul:

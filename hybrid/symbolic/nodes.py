@@ -17,6 +17,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # A tree with more operations than this is not expanded: the time may grow with the square of its size.
 MOST_EXPANDED = 2000
 
+# Facts that SymPy looks for in the tree below an expression.
+SIGNS = ("zero", "nonzero", "positive", "negative", "nonnegative", "nonpositive")
+KINDS = ("finite", "infinite", "integer", "noninteger", "even", "odd", "rational", "irrational", "algebraic")
+FACTS = (*SIGNS, *(f"extended_{sign}" for sign in SIGNS if sign != "zero"), *KINDS, "transcendental")
+
 _remembered: list[Any] = []
 # _seen, by identity: expressions seen so far, each with the one object that represents all equal ones.
 _seen: dict[int, tuple[sympy.Basic, sympy.Basic]] = {}
@@ -59,6 +64,17 @@ def interned(expression: Any) -> Any:
         standing = _standing.setdefault(expression, expression)
     _seen[id(expression)] = expression, standing
     return standing
+
+
+def ask_no_more(expression: sympy.Basic) -> None:
+    """Let SymPy take signs and kinds of a large expression that it does not know yet as unknown.
+
+    SymPy looks for them when the expression becomes a factor or a base, branch by branch in the tree below.
+    """
+    if expression._assumptions is expression.default_assumptions:
+        expression._assumptions = expression.default_assumptions.copy()
+    for fact in FACTS:
+        expression._assumptions.setdefault(fact, None)
 
 
 def nodes(*expressions: sympy.Basic) -> Iterator[sympy.Basic]:

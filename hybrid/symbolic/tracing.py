@@ -12,7 +12,7 @@ from sympy.core.parameters import distribute
 
 from hybrid.errors import ModelError
 from hybrid.symbolic.expressions import number
-from hybrid.symbolic.nodes import interned, is_larger_than, nodes, once
+from hybrid.symbolic.nodes import ask_no_more, interned, is_larger_than, nodes, once
 from hybrid.symbolic.ufuncs import RULES
 from hybrid.symbolic.values import Traced as Traced
 from hybrid.symbolic.values import TraceError as TraceError
@@ -20,6 +20,8 @@ from hybrid.symbolic.values import values_of
 
 # Largest number of operations of an expression shown in an error text.
 SHOWN = 100
+# Whether an expression with more operations is positive, zero or finite is not asked.
+MOST_ASKED = 200
 
 
 class SymbolicAlgebra:
@@ -40,7 +42,10 @@ class SymbolicAlgebra:
 
 @once
 def _combined(name: str, contents: tuple[sympy.Expr, ...]) -> sympy.Expr:
-    return interned(RULES[name](*contents))
+    made = interned(RULES[name](*contents))
+    if is_larger_than(MOST_ASKED, made):
+        ask_no_more(made)
+    return made
 
 
 SYMBOLIC = SymbolicAlgebra()

@@ -9,6 +9,7 @@ from sympy.core.parameters import distribute
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, compile_system, simulate
 from hybrid.symbolic.nodes import (
+    ask_no_more,
     contains,
     degree_of,
     forget,
@@ -151,3 +152,33 @@ def test_a_model_whose_function_uses_its_result_twice_forty_times(where):
     assert arc.status.ok
     assert len(arc.jumps) > 0
     np.testing.assert_allclose(arc.jumps.x_minus[:, 0], 0.0, atol=1e-9)
+
+
+def root_of_cubic(value):
+    """``z**3 + z = value`` by Newton's method."""
+    z = value
+    for _ in range(12):
+        z = z - (z**3 + z - value) / (3 * z * z + 1)
+    return z
+
+
+def test_a_model_that_solves_an_equation_in_its_field():
+    """SymPy looks for signs in the tree below a quotient, five times as many branches in each round."""
+    system = HybridSystem(state=("q", "v"), modes=[Mode("swing", lambda t, x, p: (x.v, -root_of_cubic(x.q)))])
+    arc = simulate(system, (0.4, 0.6), (0.0, 2.0), tangent=True)
+    # The energy, with the potential as an integral over z.
+    z = root_of_cubic(arc.x[:, 0])
+    energy = 0.5 * arc.x[:, 1] ** 2 + 0.75 * z**4 + 0.5 * z**2
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
+    assert np.isclose(np.linalg.det(arc.fundamental), 1.0, rtol=1e-9)
+
+
+def test_facts_of_a_large_expression_are_not_looked_for_again():
+    known, unknown = 1 + X**2, X + Y
+    assert known.is_positive
+    for expression in (known, unknown):
+        ask_no_more(expression)
+    assert known.is_positive
+    assert unknown.is_positive is None
+    assert unknown.is_real
+    assert (X + Z).default_assumptions == sympy.Add.default_assumptions
