@@ -258,6 +258,7 @@ NEAREST = {
         "accuracy/test_order.py",
         "simulation/test_simulate.py",
     ),
+    "hybrid/orbits/closing.py": ("orbits/test_closing_rules.py",),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
     "hybrid/orbits/periodic_orbit.py": ("orbits/test_objections.py", "orbits/test_newton.py"),
