@@ -268,6 +268,7 @@ NEAREST = {
     "hybrid/plot/orbits.py": ("plot/test_arcs.py", "plot/test_plot.py"),
     "hybrid/plot/style.py": ("plot/test_plot.py", "test_arguments.py"),
     "hybrid/simulation/ending.py": (
+        "simulation/test_ending_rules.py",
         "simulation/test_simulate.py",
         "simulation/test_ending.py",
         "kernels/events/test_grazing.py",
