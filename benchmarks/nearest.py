@@ -261,7 +261,11 @@ NEAREST = {
     "hybrid/orbits/closing.py": ("orbits/test_closing_rules.py",),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
-    "hybrid/orbits/periodic_orbit.py": ("orbits/test_objections.py", "orbits/test_newton.py"),
+    "hybrid/orbits/periodic_orbit.py": (
+        "orbits/test_shooting_rules.py",
+        "orbits/test_objections.py",
+        "orbits/test_newton.py",
+    ),
     "hybrid/orbits/sections.py": ("orbits/test_section_rules.py",),
     "hybrid/plot/arcs.py": ("plot/test_plot.py",),
     "hybrid/plot/graph.py": ("plot/test_plot.py",),
