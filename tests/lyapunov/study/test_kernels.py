@@ -137,14 +137,15 @@ class TestQuotients:
         np.testing.assert_allclose(jacobian, MATRIX, atol=1e-6)
         assert evaluations == 3
 
-    def test_increments_of_steep_and_of_flat_columns(self):
+    @pytest.mark.parametrize("unit", [2.0**-40, 1.0, 2.0**40])
+    def test_increments_of_steep_and_of_flat_columns(self, unit):
         """The first column changes its function by a share of 3e-4, the second by 3e-13."""
 
         def field(t, y, p, out):
-            out[0], out[1] = 1.0 + 3e4 * (y[0] - 1.0), 1.0 + 3e-5 * (y[1] - 1.0)
+            out[0], out[1] = unit * (1.0 + 3e4 * (y[0] - 1.0)), unit * (1.0 + 3e-5 * (y[1] - 1.0))
 
         jacobian, increments, evaluations = self.found(field, (1.0, 1.0))
-        np.testing.assert_allclose(np.diag(jacobian), [3e4, 3e-5], rtol=1e-3)
+        np.testing.assert_allclose(np.diag(jacobian) / unit, [3e4, 3e-5], rtol=1e-3)
         assert increments == pytest.approx([1e-9, 1e-7])
         assert evaluations == 2
 
@@ -178,6 +179,17 @@ class TestQuotients:
         assert (jacobian[0, 0], evaluations) == (0.0, 2)
         assert increments == pytest.approx([1e-3])
         assert self.found(field, (1.0,), increment=0.1)[2] == 1
+
+    def test_values_of_zero_do_not_tell_where_rounding_is(self):
+        """A slope is taken as it is found; a function that is zero at both places is tried further away."""
+
+        def field(t, y, p, out):
+            out[0], out[1] = 0.0, 1e-3 * y[1]
+
+        jacobian, increments, evaluations = self.found(field, (1.0, 0.0))
+        np.testing.assert_allclose(jacobian, np.diag([0.0, 1e-3]), atol=1e-18)
+        assert increments == pytest.approx([1e-3, 1e-8])
+        assert evaluations == 3
 
 
 @pytest.mark.parametrize(
