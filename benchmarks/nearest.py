@@ -330,6 +330,7 @@ NEAREST = {
     ),
     "hybrid/testing/case.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
     "hybrid/testing/check.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
+    "hybrid/testing/crossings.py": ("testing/test_planted_faults.py",),
     "hybrid/testing/derivatives.py": ("testing/test_planted_faults.py", "testing/test_check.py"),
     "hybrid/testing/events.py": ("testing/test_planted_faults.py", "testing/test_check.py"),
     "hybrid/testing/functions.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
