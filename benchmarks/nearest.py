@@ -267,6 +267,7 @@ NEAREST = {
         "orbits/test_newton.py",
     ),
     "hybrid/orbits/sections.py": ("orbits/test_section_rules.py",),
+    "hybrid/plot/__init__.py": ("plot/test_drawn.py",),
     "hybrid/plot/arcs.py": ("plot/test_plot.py",),
     "hybrid/plot/graph.py": ("plot/test_plot.py",),
     "hybrid/plot/orbits.py": ("plot/test_arcs.py", "plot/test_plot.py"),
