@@ -25,7 +25,7 @@ def test_datasets_are_drawn_by_a_variable_that_they_have(monkeypatch):
         (["three"], "own"),
         ([], "own"),
     ):
-        data = SimpleNamespace(data_vars=variables, plot=own.plot)
+        data = SimpleNamespace(data_vars=variables.split(), plot=own.plot)
         assert drawn(data, ax=3) == (wanted, {"ax": 3})
     assert plot(own, x="q") == ("own", {"x": "q"})
 
