@@ -19,12 +19,7 @@ def test_datasets_are_drawn_by_a_variable_that_they_have(monkeypatch):
     monkeypatch.setitem(DATASETS, "one", told("first"))
     monkeypatch.setitem(DATASETS, "two", told("second"))
     own = SimpleNamespace(plot=lambda **options: ("own", options))
-    for variables, wanted in (
-        (["two"], "second"),
-        (["two", "one"], "first"),
-        (["three"], "own"),
-        ([], "own"),
-    ):
+    for variables, wanted in (("two", "second"), ("two one", "first"), ("three", "own"), ("", "own")):
         data = SimpleNamespace(data_vars=variables.split(), plot=own.plot)
         assert drawn(data, ax=3) == (wanted, {"ax": 3})
     assert plot(own, x="q") == ("own", {"x": "q"})
