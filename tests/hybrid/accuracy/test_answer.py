@@ -112,7 +112,7 @@ def test_a_run_has_the_exponents_of_its_fundamental_matrix(span):
     rows = hybrid.work_precision(
         system,
         (1.0, 1.0),
-        (0.0, span),
+        (3.0, 3.0 + span),
         tolerances=(1e-10,),
         methods={"DOP853": hybrid.DOP853()},
         tangent=True,
