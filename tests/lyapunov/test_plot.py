@@ -207,7 +207,11 @@ def test_a_figure_of_each_kind(line, grid):
     # The map and its colour bar.
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
-    assert len(plot_chart(bare).axes) == 1
+    # Whether the axis of section points is empty or absent.
+    for without in (bare, bare.drop_dims("sample", errors="ignore")):
+        assert len(plot_chart(without).axes) == 1
+        with pytest.raises(ArgumentError, match="chart must have section points"):
+            plot_bifurcation(without)
     # One exponent needs no legend.
     assert bare.sizes["exponent"] == 1
     assert plot_exponents(bare).get_legend() is None

@@ -1,5 +1,6 @@
 """Lyapunov spectra rule by rule: bursts of the kernel, lengths of intervals, annihilated vectors."""
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -111,6 +112,24 @@ def test_the_clock_must_reach_the_end_of_all_intervals(monkeypatch):
     system = SimpleNamespace(growth=None)
     with pytest.raises(ArgumentError, match="and 7 intervals"):
         spectrum.lyapunov_spectrum(system, (0.0,), interval=1.0, intervals=5, transient=2)
+
+
+def test_the_bar_counts_the_intervals_of_the_transient_too(monkeypatch):
+    totals = []
+
+    def bar(total, *given):
+        totals.append(total)
+        raise StopAsyncIteration
+
+    monkeypatch.setattr(spectrum, "start", lambda *given, **options: SimpleNamespace(stop=nullcontext()))
+    monkeypatch.setattr(spectrum, "first_vectors", lambda system, k: np.eye(1))
+    monkeypatch.setattr(spectrum, "interval_length", lambda *given: 1.0)
+    monkeypatch.setattr(spectrum, "load_kernels", lambda module: None)
+    monkeypatch.setattr(spectrum, "progress_bar", bar)
+    system = SimpleNamespace(growth=None, dimension=1)
+    with pytest.raises(StopAsyncIteration):
+        spectrum.lyapunov_spectrum(system, (0.0,), interval=1.0, intervals=5, transient=2)
+    assert totals == [7]
 
 
 def annihilated(vectors):

@@ -1,5 +1,6 @@
 """The two-orbit method rule by rule: how runs are followed, placed and judged."""
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -150,6 +151,24 @@ def test_the_clock_must_reach_the_end_of_all_intervals(monkeypatch):
     system = SimpleNamespace(growth=None, dimension=1)
     with pytest.raises(ArgumentError, match="and 7 intervals"):
         two_orbit.two_orbit_exponents(system, (0.0,), interval=1.0, intervals=5, transient=2)
+
+
+def test_the_bar_counts_the_intervals_of_the_transient_too(monkeypatch):
+    totals = []
+
+    def bar(total, *given):
+        totals.append(total)
+        raise StopAsyncIteration
+
+    monkeypatch.setattr(two_orbit, "start", lambda *given, **options: SimpleNamespace(stop=nullcontext()))
+    monkeypatch.setattr(two_orbit, "as_system", lambda name, system: system)
+    monkeypatch.setattr(two_orbit, "interval_length", lambda *given: 1.0)
+    monkeypatch.setattr(two_orbit, "load_kernels", lambda module: None)
+    monkeypatch.setattr(two_orbit, "progress_bar", bar)
+    system = SimpleNamespace(growth=None, dimension=1)
+    with pytest.raises(StopAsyncIteration):
+        two_orbit.two_orbit_exponents(system, (0.0,), interval=1.0, intervals=5, transient=2)
+    assert totals == [7]
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,54 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy.answer import EPSILON, _exponents, errors_of, rounding_of
+import models
+from hybrid.accuracy.answer import EPSILON, _exponents, as_answer, errors_of, rounding_of
 
 
 def answer(**others):
     return hybrid.Answer(state=np.array([1.0, -2.0]), **others)
+
+
+def test_what_is_given_becomes_arrays_of_numbers():
+    found = hybrid.Answer(
+        [1, 2], times=[3], exponents=(4, 5), fundamental=[[1, 0], [0, 1]], steps=7, seconds=0
+    )
+    for name, kept in (("state", [1, 2]), ("times", [3]), ("exponents", [4, 5]), ("fundamental", np.eye(2))):
+        value = getattr(found, name)
+        assert value.dtype == float
+        np.testing.assert_array_equal(value, kept)
+    assert (found.saltation, found.steps, found.seconds) == (None, 7, 0)
+    for wrong in ({"state": None}, {"times": "x"}, {"steps": -1}, {"steps": 1.5}, {"seconds": -1.0}):
+        with pytest.raises(hybrid.ArgumentError, match=f"Answer: {next(iter(wrong))}"):
+            hybrid.Answer(**{"state": [1.0], **wrong})
+
+
+@pytest.mark.parametrize("span", [0.0, 2.0])
+def test_results_of_methods_become_answers(span):
+    """A span of zero tells no exponents; those that are given stay."""
+    matrix = np.diag([np.exp(3.0), 1.0])
+    found = as_answer("m", answer(fundamental=matrix), 2, span)
+    assert (found.exponents is None) == (span == 0.0)
+    assert span == 0.0 or found.exponents.tolist() == pytest.approx([1.5, 0.0])
+    given = answer(fundamental=matrix, exponents=[7.0, 8.0])
+    assert as_answer("m", given, 2, span) is given
+    assert as_answer("m", (1.0, -2.0), 2, span).state.tolist() == [1.0, -2.0]
+    arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), tangent=True)
+    found = as_answer("m", arc, 2, span)
+    assert (found.steps, found.times.tolist()) == (arc.steps, arc.jumps.t.tolist())
+    np.testing.assert_array_equal(found.state, arc.x[-1])
+    np.testing.assert_array_equal(found.saltation, arc.jumps.saltation)
+    np.testing.assert_array_equal(found.fundamental, arc.fundamental)
+    with pytest.raises(hybrid.ArgumentError, match=r"m: the state must have shape \(3,\); got \(2,\)"):
+        as_answer("m", arc, 3, span)
+    with pytest.raises(hybrid.ArgumentError, match="m must be the state at the end, an Answer or"):
+        as_answer("m", "x", 2, span)
+
+
+def test_a_run_that_did_not_reach_its_end_has_no_state_there():
+    arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), samples=[1.0], max_jumps=0)
+    assert len(arc.x) == 0
+    assert np.isnan(as_answer("m", arc, 2, 1.0).state).tolist() == [True, True]
 
 
 def test_states_times_and_exponents_are_compared_absolutely():
@@ -69,7 +112,7 @@ def test_a_run_has_the_exponents_of_its_fundamental_matrix(span):
     rows = hybrid.work_precision(
         system,
         (1.0, 1.0),
-        (0.0, span),
+        (3.0, 3.0 + span),
         tolerances=(1e-10,),
         methods={"DOP853": hybrid.DOP853()},
         tangent=True,

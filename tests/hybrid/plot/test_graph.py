@@ -171,6 +171,18 @@ class TestLoops:
         assert aligned == [("left", "center"), ("center", "bottom"), ("right", "center"), ("center", "top")]
 
 
+def test_a_few_modes_are_on_a_circle_and_the_neighbours_of_many_are_near():
+    """The ends of a chain of six modes are as far apart as the chain is long."""
+    for names in ("abc", "abcd"):
+        places = modes(plot_graph(system(names, [*zip(names, names[1:] + names[0], strict=True)])))
+        turns = 2 * np.pi * np.arange(len(names)) / len(names)
+        circle = np.column_stack([np.cos(turns), np.sin(turns)])
+        np.testing.assert_allclose([places[name] for name in names], circle, atol=1e-6)
+    places = modes(plot_graph(system("abcdef", ["ab", "bc", "cd", "de", "ef"])))
+    step, whole = np.hypot(*(places["a"] - places["b"])), np.hypot(*(places["a"] - places["f"]))
+    assert whole > 3.0 * step
+
+
 @pytest.mark.parametrize("names", ["a", "ab", "abc", "abcd", "abcde", "abcdefgh"])
 @pytest.mark.parametrize("loops", [False, True])
 def test_everything_is_inside_of_the_frame(names, loops):

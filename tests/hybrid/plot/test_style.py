@@ -34,6 +34,7 @@ def test_new_axes_are_in_a_column_and_share_their_time():
         axes = axes_for(None, count)
         assert axes.shape == (count,)
         figure = axes[0].get_figure()
+        assert figure.axes == axes.tolist()
         assert tuple(figure.get_size_inches()) == (7.0, pytest.approx(0.8 + 1.5 * count))
         tops = [ax.get_subplotspec().rowspan.start for ax in axes]
         assert tops == [*range(count)]

@@ -108,12 +108,16 @@ def test_what_a_run_does_not_need_is_not_loaded(need, steps):
 def test_parts_that_a_run_needs():
     """By guards with a series and without one, and by fields that may change abruptly."""
 
-    def parts_of(field, guard, tangents, reset=None):
+    def parts_of(field, guard, tangents, reset=None, other=None):
+        guards = [guard] if other is None else [guard, other]
         system = hybrid.HybridSystem(
             state=("q", "v"),
             modes=[hybrid.Mode("move", field)],
             transitions=[
-                hybrid.Transition("move", "move", hybrid.Guard(guard), reset and hybrid.Reset(reset))
+                hybrid.Transition(
+                    "move", "move", hybrid.Guard(each), reset and hybrid.Reset(reset), name=f"{k}"
+                )
+                for k, each in enumerate(guards)
             ],
         )
         made = plan.plan_of(hybrid.compile_system(system), hybrid.Taylor(), tangents)
@@ -132,6 +136,9 @@ def test_parts_that_a_run_needs():
 
     assert parts_of(smooth, level, 0) == (False, False, False, False)
     assert parts_of(smooth, lambda t, x, p: np.exp(x.q) - 2.0, 0) == (False, False, True, False)
+    # One of two guards without a series is enough.
+    both = parts_of(smooth, level, 0, other=lambda t, x, p: np.exp(x.q) - 2.0)
+    assert both == (False, False, True, False)
     assert parts_of(smooth, level, 2) == (True, False, False, False)
     assert parts_of(steep, level, 0) == (False, False, False, False)
     assert parts_of(steep, level, 2) == (True, True, False, False)

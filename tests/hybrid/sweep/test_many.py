@@ -131,7 +131,7 @@ def test_systems_that_grow(monkeypatch):
     starts = [(1.0, -0.1), (2.0, 0.1)]
     found = simulate_many(block, starts, (0.0, 4.0), executor=2)
     assert not found.status.any()
-    times = [0.5, 2.0]
+    times = [0.5, 2.0, 4.0]
     sampled = simulate_many(block, starts, (0.0, 4.0), samples=times)
     for i, x0 in enumerate(starts):
         arc = simulate(block, x0, (0.0, 4.0))

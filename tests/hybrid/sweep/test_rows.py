@@ -164,6 +164,20 @@ def test_rows_that_cannot_be(over, options, text):
         rows(over=over, **options)
 
 
+def test_a_stage_of_a_growing_system_is_marked_once():
+    """What is compiled for it is kept; an entry of another stage, which is gone, is replaced."""
+    found = rows(points=1, at=Guard(lambda t, x, p: x.x - 0.5, +1))
+    first = found._with(SIDES)
+    assert first.system is SIDES
+    assert len(first.marked.transitions) == len(SIDES.transitions) + len(SIDES.modes)
+    assert found._with(SIDES).marked is first.marked
+    found._stages[id(SAW)] = SIDES, first.marked
+    other = found._with(SAW)
+    assert other.system is SAW
+    assert len(other.marked.transitions) == 2
+    assert rows(at="jumps", points=1)._with(SIDES).marked is SIDES
+
+
 def test_rows_of_a_whole_system_are_worked_on_once():
     found = rows()
     assert found.grown(lambda each: each) is found

@@ -91,6 +91,17 @@ def test_what_was_saved_comes_back(tmp_path):
         np.testing.assert_array_equal(other.y, swept.y)
 
 
+def test_what_another_attempt_has_left_is_no_obstacle(tmp_path):
+    """Folders are removed; what cannot be removed so, as a file, stays."""
+    path = tmp_path / "run.zarr"
+    swept = sweep(task, GRID, store=path)
+    (path / ".new-folder").mkdir()
+    (path / ".new-file").touch()
+    store._lay_out(swept, path)
+    assert same(swept, hybrid.open(path).load())
+    assert [each.name for each in path.glob(".new-*")] == [".new-file"]
+
+
 def test_the_same_call_computes_nothing(tmp_path):
     first = sweep(task, GRID, store=tmp_path / "s")
     CALLS.made = []

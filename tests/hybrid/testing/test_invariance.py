@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis.errors import UnsatisfiedAssumption
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.status import StatusCode
 from hybrid.testing import PropertyError
 from hybrid.testing.case import Case
@@ -85,6 +85,16 @@ def test_time_is_reversed_by_name_or_by_a_function():
 def test_one_transition_has_no_other_order():
     with pytest.raises(UnsatisfiedAssumption):
         check_order(Case(bouncing_ball(), dict(bouncing_ball().parameters), "flight", (1.0, 0.0), 0.0, 1.0))
+
+
+def test_names_may_be_of_several_words():
+    falls = Mode("falls and flies", lambda t, x, p: (x.v, -9.81))
+    floor = Transition(
+        falls.name, falls.name, Guard(lambda t, x, p: x.q, -1), Reset(lambda t, x, p: (0.0, -0.8 * x.v)),
+        name="hits the floor",
+    )  # fmt: skip
+    system = HybridSystem(state=("q", "v"), modes=[falls], transitions=[floor])
+    check_names(Case(system, {}, falls.name, (1.0, 0.0), 0.0, 1.0))
 
 
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])

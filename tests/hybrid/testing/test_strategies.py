@@ -6,9 +6,15 @@ from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import NoSuchExample
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import ArgumentError, Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.testing import cases, parameters, states
-from hybrid.testing.strategies import default_duration
+from hybrid.testing.strategies import (
+    _drawn_parameters,
+    _drawn_state,
+    _time_span,
+    _values,
+    default_duration,
+)
 from tests.hybrid.systems import BALL_SYSTEM, OSCILLATOR_SYSTEM
 
 FAST = settings(phases=(Phase.generate,), max_examples=250)
@@ -74,6 +80,36 @@ def test_the_ends_of_spans_and_fractions_occur():
     shares = strategy.map(lambda case: (case.t1 - case.t0) / (5.0 - case.t0))
     assert extremes(shares, lambda share: (share - 0.6) / 0.4)
     assert extremes(strategy, lambda case: (case.fraction - 0.5) / 0.49)
+
+
+@pytest.mark.parametrize("wrong", [(1.0,), (1.0, 2.0, 3.0), (1.0, np.inf), (np.nan, 1.0), 1.0, ((1.0, 2.0),)])
+def test_states_drawn_by_a_strategy_of_the_user_are_checked(wrong):
+    assert _drawn_state("x", 2, (1, 2.5)) == (1.0, 2.5)
+    with pytest.raises(ArgumentError, match="x must draw states of 2 finite numbers"):
+        _drawn_state("x", 2, wrong)
+
+
+def test_parameters_drawn_by_a_strategy_of_the_user_are_checked():
+    declared = {"a": 1.0, "b": 2.0}
+    assert _drawn_parameters("p", declared, {}) == declared
+    assert _drawn_parameters("p", declared, {"b": 3}) == {"a": 1.0, "b": 3.0}
+    for wrong, text in (((1.0,), "draw mappings"), ({"c": 1.0}, "'c' does not exist"), ({"a": "x"}, "'a'")):
+        with pytest.raises(ArgumentError, match=text):
+            _drawn_parameters("p", declared, wrong)
+
+
+@pytest.mark.parametrize("wrong", [(1.0, 0.0), (0.0, np.inf), (np.nan, 1.0), (1.0, 2.0, 3.0), (1.0,)])
+def test_ranges_are_checked(wrong):
+    assert find(_values("q", (2.0, 2.0)), lambda drawn: True, settings=FAST) == 2.0
+    with pytest.raises(ArgumentError, match=r"q must be \(low, high\), a number or a strategy"):
+        _values("q", wrong)
+
+
+@pytest.mark.parametrize("wrong", [(1.0, 1.0), (2.0, 1.0)])
+def test_spans_are_checked(wrong):
+    assert _time_span((1, 2.5)) == (1.0, 2.5)
+    with pytest.raises(ArgumentError, match="t_span must"):
+        _time_span(wrong)
 
 
 def test_durations():

@@ -13,7 +13,7 @@ from hybrid.kernels.types.numba_types import signature_of
 from hybrid.system.derivatives import evaluate
 from lyapunov.study import kernels
 from lyapunov.study.ode23s import parameters_of, scratch
-from lyapunov.study.places import DFDT, EVALUATIONS, F0, INCREMENTS, THRESHOLDS
+from lyapunov.study.places import DFDT, EVALUATIONS, F0, INCREMENTS, NEW, THRESHOLDS
 
 EPSILON = np.finfo(float).eps
 
@@ -137,14 +137,15 @@ class TestQuotients:
         np.testing.assert_allclose(jacobian, MATRIX, atol=1e-6)
         assert evaluations == 3
 
-    def test_increments_of_steep_and_of_flat_columns(self):
+    @pytest.mark.parametrize("unit", [2.0**-40, 1.0, 2.0**40])
+    def test_increments_of_steep_and_of_flat_columns(self, unit):
         """The first column changes its function by a share of 3e-4, the second by 3e-13."""
 
         def field(t, y, p, out):
-            out[0], out[1] = 1.0 + 3e4 * (y[0] - 1.0), 1.0 + 3e-5 * (y[1] - 1.0)
+            out[0], out[1] = unit * (1.0 + 3e4 * (y[0] - 1.0)), unit * (1.0 + 3e-5 * (y[1] - 1.0))
 
         jacobian, increments, evaluations = self.found(field, (1.0, 1.0))
-        np.testing.assert_allclose(np.diag(jacobian), [3e4, 3e-5], rtol=1e-3)
+        np.testing.assert_allclose(np.diag(jacobian) / unit, [3e4, 3e-5], rtol=1e-3)
         assert increments == pytest.approx([1e-9, 1e-7])
         assert evaluations == 2
 
@@ -179,6 +180,17 @@ class TestQuotients:
         assert increments == pytest.approx([1e-3])
         assert self.found(field, (1.0,), increment=0.1)[2] == 1
 
+    def test_values_of_zero_do_not_tell_where_rounding_is(self):
+        """A slope is taken as it is found; a function that is zero at both places is tried further away."""
+
+        def field(t, y, p, out):
+            out[0], out[1] = 0.0, 1e-3 * y[1]
+
+        jacobian, increments, evaluations = self.found(field, (1.0, 0.0))
+        np.testing.assert_allclose(jacobian, np.diag([0.0, 1e-3]), atol=1e-18)
+        assert increments == pytest.approx([1e-3, 1e-8])
+        assert evaluations == 3
+
 
 @pytest.mark.parametrize(
     ("t", "h", "ahead"), [(2.0, 0.1, 2.1 * 2.0**-26), (0.0, 0.5, 2.0**-27), (1e9, 0.125, 0.125)]
@@ -194,6 +206,41 @@ def test_the_derivative_in_time_looks_ahead_by_half_of_the_digits_and_at_most_a_
     kernels.time_derivative(field, t, np.zeros(2), (), h, work)
     assert times[1] - times[0] == pytest.approx(ahead, rel=1e-6)
     np.testing.assert_allclose(work[DFDT], [3.0, -0.5], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("y", "f", "slope", "dfdt", "ahead", "step"),
+    [
+        # A rate of 50, and a second derivative of 1250 over the state: (1250 / 2)**0.5 = 25.
+        (2.0, -100.0, -25.0, 0.0, 0.08 / 50.0, 0.08 / 25.0),
+        # The change of the field in time adds to it: 7500, or takes it away.
+        (-2.0, -100.0, -25.0, 7500.0, 0.08 / 50.0, 0.08 / 50.0),
+        (-2.0, -100.0, -25.0, -2500.0, 0.08 / 50.0, 1.0),
+        # Below the threshold of 0.5 the state counts as that.
+        (0.0, 25.0, 25.0, 0.0, 0.08 / 50.0, 0.08 / 25.0),
+        # A tenth of the span, 10, where neither is large.
+        (2.0, -0.1, -0.05, 0.0, 1.0, 1.0),
+        (2.0, -0.2, 0.0, 0.04, 0.8, 0.8),
+    ],
+)
+def test_the_first_step(y, f, slope, dfdt, ahead, step, monkeypatch):
+    """Its square times half of the second derivative, and the step itself times the first, are 0.08."""
+    steps = []
+
+    def time_derivative(field, t, state, p, h, work):
+        assert (field, t, state.tolist(), p) == ("field", 3.0, [1e9, y], ())
+        steps.append(h)
+        work[DFDT] = 0.0, dfdt
+
+    monkeypatch.setattr(kernels, "time_derivative", time_derivative)
+    work, counters = scratch(2)
+    # The first component moves slowly for its size, and has no part in the rate of the second.
+    work[F0], work[NEW] = (1.0, f), 0.5
+    jacobian = np.array([[0.0, 0.0], [0.0, slope]])
+    found = kernels.first_step("field", 3.0, np.array([1e9, y]), (), 10.0, 1e-3, work, jacobian, counters)
+    assert steps == [pytest.approx(ahead)]
+    assert found == pytest.approx(step)
+    assert counters[EVALUATIONS] == 1
 
 
 def test_growth_rates_of_a_linear_field_are_its_eigenvalues():

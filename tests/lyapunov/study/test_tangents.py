@@ -1,5 +1,7 @@
 """The tangent vector as a state, exponents from it, and the candidates for the paper's figures."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,29 @@ def test_exponents_outside_the_error_control_are_right_at_a_tight_tolerance():
     assert found.sum() == pytest.approx(2 * (pair + other), abs=1e-6)
     assert found[:2].mean() == pytest.approx(pair, abs=1e-2)
     assert found[2:].mean() == pytest.approx(other, abs=1e-2)
+
+
+@pytest.mark.parametrize(("periods", "bursts"), [(3, 1), (10, 1), (59, 5), (60, 6)])
+def test_growth_outside_the_error_control_is_that_of_ten_periods_at_once(periods, bursts, monkeypatch):
+    """The first fifth of the bursts does not count; each goes on where the last one ended."""
+    ends = []
+
+    def run(system, x0, t_span, *, mode, parameters, solver, samples):
+        assert (system, parameters, solver) == ("extended", {"omega": 4 * np.pi}, "solver")
+        assert t_span == (0.0, samples[0]) == (0.0, pytest.approx(5.0))
+        burst = len(ends) // 4
+        assert (mode, x0[4]) == (("free", STARTS[0].x0[0]) if burst == 0 else ("contact", float(burst)))
+        ends.append(x0)
+        # Only the first burst grows by another factor.
+        growth = np.exp([5.0, 10.0, -5.0, 0.0]) * (7.0 if burst == 0 else 1.0)
+        end = np.concatenate([growth * x0[:4], [burst + 1.0, 0.0, 0.0, 0.0]])
+        return SimpleNamespace(x=np.array([end]), mode=["contact"])
+
+    monkeypatch.setattr(tangents, "simulate", run)
+    found = uncontrolled_exponents("extended", 4 * np.pi, "solver", periods)
+    assert len(ends) == 4 * bursts
+    first = np.log(7.0) / 5.0 if bursts < 5 else 0.0
+    np.testing.assert_allclose(found, np.add([1.0, 2.0, -1.0, 0.0], first), atol=1e-12)
 
 
 def test_candidates_differ_in_one_thing_each():

@@ -1,0 +1,31 @@
+"""Which function draws a result."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from hybrid import ArgumentError
+from hybrid.plot import DATASETS, drawn, plot
+
+
+def told(name):
+    return lambda result, **options: (name, options)
+
+
+def test_datasets_are_drawn_by_a_variable_that_they_have(monkeypatch):
+    """The first that is registered decides; other objects draw themselves."""
+    for name in list(DATASETS):
+        monkeypatch.delitem(DATASETS, name)
+    monkeypatch.setitem(DATASETS, "one", told("first"))
+    monkeypatch.setitem(DATASETS, "two", told("second"))
+    own = SimpleNamespace(plot=lambda **options: ("own", options))
+    for variables, wanted in (("two", "second"), ("two one", "first"), ("three", "own"), ("", "own")):
+        data = SimpleNamespace(data_vars=variables.split(), plot=own.plot)
+        assert drawn(data, ax=3) == (wanted, {"ax": 3})
+    assert plot(own, x="q") == ("own", {"x": "q"})
+
+
+@pytest.mark.parametrize("result", [3, SimpleNamespace(plot="no function"), SimpleNamespace(data_vars=["?"])])
+def test_other_objects_have_no_picture(result):
+    with pytest.raises(ArgumentError, match="result must be a system, an arc, a section"):
+        plot(result)
