@@ -3,6 +3,7 @@
 # Relative to tests/hybrid. The tests of the same name, in the same place of the tree, come first in any case.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
+    "hybrid/arguments.py": ("test_arguments_rules.py",),
     "hybrid/compiler/agreement.py": ("compiler/test_agreement_rules.py",),
     "hybrid/compiler/bounds/forcing.py": (
         "compiler/bounds/test_forcing_rules.py",
