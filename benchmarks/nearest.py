@@ -75,6 +75,11 @@ NEAREST = {
     "hybrid/compiler/steep.py": ("simulation/test_infinite_slopes.py", "compiler/test_surfaces.py"),
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/taylor/loops.py": ("compiler/taylor/test_series.py",),
+    "hybrid/compiler/taylor/series.py": ("compiler/taylor/test_series_rules.py",),
+    "hybrid/compiler/taylor/sums.py": (
+        "compiler/taylor/test_series_rules.py",
+        "compiler/taylor/test_series.py",
+    ),
     "hybrid/compiler/whole_numbers.py": ("system/test_periodicity.py", "test_arguments.py"),
     "hybrid/errors.py": ("test_arguments.py", "sweep/test_points.py", "compiler/test_opaque.py"),
     "hybrid/kernels/arithmetic/columns.py": ("compiler/taylor/test_series.py",),

@@ -115,6 +115,8 @@ class TestArrays:
             (b"12", None),
             (bytearray(b"12"), None),
             (np.array([1, 2], dtype="m8[s]"), None),
+            # As objects, these would be the counts of their unit.
+            (np.array([1, 2], dtype="m8[ns]"), None),
             (np.array(["2020"], dtype="M8[Y]"), None),
             (np.array([1j]), None),
             (np.ma.masked_array([1.0, 2.0], [False, True]), None),
