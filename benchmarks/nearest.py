@@ -21,6 +21,7 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
+    "hybrid/compiler/compiled.py": ("compiler/test_compiled_rules.py",),
     "hybrid/compiler/emit.py": (
         "compiler/test_emit_rules.py",
         "compiler/test_emitted.py",
