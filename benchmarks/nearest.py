@@ -325,6 +325,7 @@ NEAREST = {
         "symbolic/test_tracing.py",
         "compiler/test_operations.py",
     ),
+    "hybrid/system/checks.py": ("system/test_checks_rules.py",),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",
