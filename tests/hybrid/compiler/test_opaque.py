@@ -72,6 +72,7 @@ class TestTextOfTheCompiler:
             ("Failed in nopython mode\n  | Use of unknown type.\nFile x, line 3", "Use of unknown type"),
             ("Unknown.\nMore", "Unknown"),
             ("None for signature:\n >>> floor(complex128)\nMore", "None for signature: floor(complex128)"),
+            ("None for signature:\n >>> floor(complex128)", "None for signature: floor(complex128)"),
             ("Wrong signature:", "Wrong signature:"),
             ("Failed in nopython mode", "Failed in nopython mode"),
             ("", "it gives no reason"),
