@@ -338,6 +338,7 @@ NEAREST = {
         "simulation/test_ending.py",
         "simulation/test_simulate.py",
     ),
+    "hybrid/system/periodicity.py": ("system/test_periodicity_rules.py",),
     "hybrid/system/switching.py": ("system/test_switching_rules.py",),
     "hybrid/testing/case.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
     "hybrid/testing/check.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
