@@ -318,6 +318,7 @@ NEAREST = {
         "compiler/taylor/test_series.py",
     ),
     "hybrid/symbolic/ranges.py": ("symbolic/test_ranges_rules.py",),
+    "hybrid/symbolic/switches.py": ("symbolic/test_switches_rules.py",),
     "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
     "hybrid/symbolic/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
     "hybrid/symbolic/values.py": (
