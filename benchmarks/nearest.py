@@ -32,6 +32,7 @@ NEAREST = {
         "kernels/events/test_proved_crossings.py",
         "compiler/test_compiled.py",
     ),
+    "hybrid/compiler/llvm/builder.py": ("compiler/llvm/test_builder_rules.py",),
     "hybrid/compiler/llvm/calls.py": ("compiler/llvm/test_lowering.py", "kernels/arithmetic/test_doubled.py"),
     "hybrid/compiler/llvm/engine.py": (
         "compiler/llvm/test_machine.py",
@@ -82,6 +83,7 @@ NEAREST = {
         "compiler/taylor/test_series.py",
     ),
     "hybrid/compiler/whole_numbers.py": ("system/test_periodicity.py", "test_arguments.py"),
+    "hybrid/compiler/written.py": ("compiler/test_written_rules.py",),
     "hybrid/errors.py": ("test_arguments.py", "sweep/test_points.py", "compiler/test_opaque.py"),
     "hybrid/kernels/arithmetic/columns.py": ("compiler/taylor/test_series.py",),
     "hybrid/kernels/arithmetic/slopes.py": ("kernels/events/test_guards.py",),
