@@ -354,6 +354,7 @@ NEAREST = {
     "hybrid/testing/strategies.py": ("testing/test_check.py",),
     "hybrid/testing/units.py": ("testing/test_planted_faults.py", "testing/test_check.py"),
     "hybrid/transform/cells.py": ("transform/test_split.py", "transform/test_corners.py"),
+    "hybrid/transform/corners.py": ("transform/test_corners_rules.py",),
     "hybrid/transform/naming.py": ("transform/test_split.py",),
     "hybrid/transform/splitter.py": (
         "transform/test_split.py",
