@@ -315,10 +315,12 @@ NEAREST = {
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
     "hybrid/symbolic/continuity.py": ("symbolic/test_continuity_rules.py",),
     "hybrid/symbolic/expressions.py": (
+        "symbolic/test_expressions_rules.py",
         "symbolic/test_tracing.py",
         "symbolic/test_derivatives.py",
         "compiler/taylor/test_series.py",
     ),
+    "hybrid/symbolic/printer.py": ("symbolic/test_printer_rules.py",),
     "hybrid/symbolic/ranges.py": ("symbolic/test_ranges_rules.py",),
     "hybrid/symbolic/switches.py": ("symbolic/test_switches_rules.py",),
     "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
