@@ -68,3 +68,14 @@ def test_steps_and_signs(a, step, sign):
 def test_nan_stays():
     for expression in (Step(x), Sign(x), Gate(x, ONE + y)):
         assert math.isnan(value(expression, math.nan, 1.0))
+
+
+@pytest.mark.parametrize("thorough", [False, True])
+def test_a_divisor_of_two_products_is_divided_by_once(thorough):
+    """That of a single product is not inverted first, which would round twice."""
+    below = sympy.sin(x) + y
+    twice = "\n".join(assignments(["a", "b"], [x / below, y / below], thorough=thorough))
+    assert twice.count("/") == 1
+    once = "\n".join(assignments(["a", "b"], [x / below, y * x], thorough=thorough))
+    assert once.count("/") == 1
+    assert "1.0/" not in once

@@ -174,6 +174,18 @@ def test_a_better_start_replaces_that_of_the_operations():
     np.testing.assert_allclose(found, [5.0, 2 * A, 1.0, *[0.0] * (ORDER - 2)], atol=1e-14)
 
 
+@pytest.mark.parametrize("power", [2, 4])
+@pytest.mark.parametrize(("function", "sign"), [(sympy.tanh, -1), (sympy.tan, 1)])
+def test_the_slope_of_a_hyperbolic_tangent_serves_again(function, sign, power):
+    """It is ``1 - tanh(u)^2``, and no other power."""
+    series = Series()
+    series.block.coefficient(function(X))
+    found = series.of(1 + sign * function(X) ** power)
+    exact = getattr(mp, function.__name__)
+    expected = taylor(lambda u: 1 + sign * exact(u) ** power)
+    np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-13)
+
+
 def test_what_is_not_analytic_has_no_series():
     for expression in (Sign(X), X * Sign(Y), sympy.exp(Sign(X))):
         with pytest.raises(NoSeries, match="Sign is not analytic"):
