@@ -3,6 +3,7 @@
 # Relative to tests/hybrid. The tests of the same name, in the same place of the tree, come first in any case.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
+    "hybrid/arguments.py": ("test_arguments_rules.py",),
     "hybrid/compiler/agreement.py": ("compiler/test_agreement_rules.py",),
     "hybrid/compiler/bounds/forcing.py": (
         "compiler/bounds/test_forcing_rules.py",
@@ -20,6 +21,7 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
+    "hybrid/compiler/compiled.py": ("compiler/test_compiled_rules.py",),
     "hybrid/compiler/emit.py": (
         "compiler/test_emit_rules.py",
         "compiler/test_emitted.py",
@@ -30,6 +32,7 @@ NEAREST = {
         "kernels/events/test_proved_crossings.py",
         "compiler/test_compiled.py",
     ),
+    "hybrid/compiler/llvm/builder.py": ("compiler/llvm/test_builder_rules.py",),
     "hybrid/compiler/llvm/calls.py": ("compiler/llvm/test_lowering.py", "kernels/arithmetic/test_doubled.py"),
     "hybrid/compiler/llvm/engine.py": (
         "compiler/llvm/test_machine.py",
@@ -74,7 +77,13 @@ NEAREST = {
     "hybrid/compiler/steep.py": ("simulation/test_infinite_slopes.py", "compiler/test_surfaces.py"),
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/taylor/loops.py": ("compiler/taylor/test_series.py",),
+    "hybrid/compiler/taylor/series.py": ("compiler/taylor/test_series_rules.py",),
+    "hybrid/compiler/taylor/sums.py": (
+        "compiler/taylor/test_series_rules.py",
+        "compiler/taylor/test_series.py",
+    ),
     "hybrid/compiler/whole_numbers.py": ("system/test_periodicity.py", "test_arguments.py"),
+    "hybrid/compiler/written.py": ("compiler/test_written_rules.py",),
     "hybrid/errors.py": ("test_arguments.py", "sweep/test_points.py", "compiler/test_opaque.py"),
     "hybrid/kernels/arithmetic/columns.py": ("compiler/taylor/test_series.py",),
     "hybrid/kernels/arithmetic/slopes.py": ("kernels/events/test_guards.py",),
@@ -324,11 +333,14 @@ NEAREST = {
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
     "hybrid/symbolic/continuity.py": ("symbolic/test_continuity_rules.py",),
     "hybrid/symbolic/expressions.py": (
+        "symbolic/test_expressions_rules.py",
         "symbolic/test_tracing.py",
         "symbolic/test_derivatives.py",
         "compiler/taylor/test_series.py",
     ),
+    "hybrid/symbolic/printer.py": ("symbolic/test_printer_rules.py",),
     "hybrid/symbolic/ranges.py": ("symbolic/test_ranges_rules.py",),
+    "hybrid/symbolic/switches.py": ("symbolic/test_switches_rules.py",),
     "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
     "hybrid/symbolic/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
     "hybrid/symbolic/values.py": (
@@ -336,6 +348,7 @@ NEAREST = {
         "symbolic/test_tracing.py",
         "compiler/test_operations.py",
     ),
+    "hybrid/system/checks.py": ("system/test_checks_rules.py",),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",
@@ -348,6 +361,8 @@ NEAREST = {
         "simulation/test_ending.py",
         "simulation/test_simulate.py",
     ),
+    "hybrid/system/periodicity.py": ("system/test_periodicity_rules.py",),
+    "hybrid/system/switching.py": ("system/test_switching_rules.py",),
     "hybrid/testing/case.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
     "hybrid/testing/check.py": ("testing/test_check.py", "testing/test_planted_faults.py"),
     "hybrid/testing/crossings.py": ("testing/test_planted_faults.py",),
@@ -360,6 +375,7 @@ NEAREST = {
     "hybrid/testing/strategies.py": ("testing/test_check.py",),
     "hybrid/testing/units.py": ("testing/test_planted_faults.py", "testing/test_check.py"),
     "hybrid/transform/cells.py": ("transform/test_split.py", "transform/test_corners.py"),
+    "hybrid/transform/corners.py": ("transform/test_corners_rules.py",),
     "hybrid/transform/naming.py": ("transform/test_split.py",),
     "hybrid/transform/splitter.py": (
         "transform/test_split.py",

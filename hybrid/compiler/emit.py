@@ -37,7 +37,7 @@ from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import WIDE
 from hybrid.symbolic.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.symbolic.derivatives import jacobian_of
-from hybrid.symbolic.expressions import JUMPING, ONE, ZERO, Select
+from hybrid.symbolic.expressions import JUMPING, ONE, ZERO
 from hybrid.symbolic.nodes import forget, mentions, nodes_of
 from hybrid.symbolic.periodicity import is_periodic
 from hybrid.symbolic.printer import IMPORTS, assignments, unprintable
@@ -283,7 +283,7 @@ class _Writer:
         return Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
     def condition(self, function: ModelFunction) -> Written:
-        """Statements for the condition of a guard; a truth value becomes 1 or 0."""
+        """Statements for the condition of a guard, whose truth values are 1 and 0."""
         return self.remembered((CONDITION, *function.identity), lambda: self._condition(function))
 
     def _condition(self, function: ModelFunction) -> Written:
@@ -291,7 +291,6 @@ class _Writer:
             [value] = self.traced(function.value)
         except ModelError as reason:
             return Written(self._opaque_value(function, ["out[0]"], reason), [])
-        value = Select(value, ONE, ZERO) if value.is_Boolean else value
         # It is evaluated at crossings only, so it is not worth a long search for common parts.
         return Written(assignments(["out[0]"], [value], thorough=False), [], [value])
 

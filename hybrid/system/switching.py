@@ -94,7 +94,8 @@ def _values(variables: Variables, function: Function, points: Any, values: np.nd
 def _proportional(heights: Sequence[float], others: Sequence[float]) -> bool:
     with np.errstate(all="ignore"):
         ratios = np.array(heights) / np.array(others)
-    return bool(np.ptp(ratios) <= SAME * np.abs(ratios).max())
+    # Where only the other one vanishes, the ratio is infinite.
+    return bool(np.ptp(ratios) <= SAME * np.abs(ratios).max() < np.inf)
 
 
 class _Probe(NDArrayOperatorsMixin):

@@ -257,7 +257,9 @@ def test_a_function_that_is_used_twice_is_compiled_once():
 )
 def test_a_gradient_that_branches_may_lack_the_column_of_time(guard, gradient, cells):
     system = system_of(("a", "b", Guard(guard, +1, gradient=gradient), None))
-    [written] = guards_of(system)
+    writer = module._Writer(system)
+    written = writer.write(guard_function(system.transitions[0]))
+    assert [each.shape for each in writer.opaque.values()] == [(), (3 - cells.count("0.0"),)]
     assert written.expressions is None
     assert written.derivative == [
         "r = model_1(t, x, p)",

@@ -11,12 +11,14 @@ from numba.core.compiler import run_frontend
 from hybrid.compiler import whole_numbers
 
 
-@pytest.mark.parametrize(("a", "b", "found"), [(3, 4, 48), (-5, 2, -20), (1, 62, 2**62), (0, 62, 0)])
+@pytest.mark.parametrize(
+    ("a", "b", "found"), [(3, 4, 48), (-5, 2, -20), (1, 62, 2**62), (0, 62, 0), (3, 0, 3)]
+)
 def test_a_shift(a, b, found):
     assert whole_numbers.WHOLE["lshift"](a, b) == found
 
 
-@pytest.mark.parametrize(("a", "b"), [(1, -1), (1, 63), (3, 62), (2**40, 30)])
+@pytest.mark.parametrize(("a", "b"), [(1, -1), (1, 63), (0, 70), (3, 62), (2**40, 30)])
 def test_a_shift_out_of_range(a, b):
     with pytest.raises(OverflowError):
         whole_numbers.WHOLE["lshift"](a, b)
@@ -42,6 +44,9 @@ def test_a_complex_number_keeps_its_slope_in_a_power():
         ("truediv", 7, -2, -3.5),
         ("floordiv", 7, -2, -4),
         ("mod", 7, -2, -1),
+        ("truediv", 7, 1, 7.0),
+        ("floordiv", 7, 1, 7),
+        ("mod", 7, 1, 0),
         ("add", 2**61, 2**61, 2**62),
         ("mul", 2**31, 2**31, 2**62),
     ],

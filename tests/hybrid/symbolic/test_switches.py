@@ -8,7 +8,14 @@ import sympy
 
 from hybrid.symbolic.expressions import Absolute, Less, Level, Select, Sign
 from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.switches import Surfaces, Switches, _first_atom, _without_truths, switching_names
+from hybrid.symbolic.switches import (
+    MOST_TERMS,
+    Surfaces,
+    Switches,
+    _first_atom,
+    _without_truths,
+    switching_names,
+)
 from hybrid.symbolic.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
@@ -121,6 +128,19 @@ class TestSurfaces:
         assert (implied if implied is None else implied * orientation) == side
         # Its own side is not asked for.
         assert surfaces.implied(number, {**sides, number: -1}) == implied
+
+
+def test_surfaces_that_are_too_long_to_be_expanded():
+    """Two of them are one if they are written alike. Sides imply nothing between them and others."""
+    surfaces = Surfaces(SYMBOLS)
+    long = Q * sympy.Add(*(sympy.sin(k * V) for k in range(1, MOST_TERMS)))
+    first, orientation = surfaces.find(long)
+    assert (orientation, surfaces.known[first].level, surfaces.known[first].core) == (1, 0.0, str(long))
+    assert surfaces.find(long) == (first, 1)
+    assert surfaces.find(-long)[0] != first
+    other, _ = surfaces.find(Q + 1)
+    assert surfaces.implied(first, {other: -1}) is None
+    assert surfaces.implied(other, {first: 1}) is None
 
 
 FIELDS = {

@@ -7,7 +7,13 @@ import pytest
 from hybrid.errors import ModelError
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.tracing import model_symbols, trace
-from hybrid.system.derivatives import _central_difference, complex_step_error, reference_derivative
+from hybrid.system.derivatives import (
+    DIFFERENCE_STEP,
+    _central_difference,
+    complex_step_error,
+    reference_derivative,
+    sample_points,
+)
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem
@@ -17,6 +23,18 @@ def oscillator(jacobian=None, *, field=lambda t, x, p: (x.v, -p.k * x.q**3 + np.
     return HybridSystem(
         state=("q", "v"), parameters={"k": 2.0, "w": 3.0}, modes=[Mode("a", field, jacobian=jacobian)]
     )
+
+
+def test_points_are_near_1_and_have_all_signs():
+    """At the first two, all components are positive, at the last one all are negative."""
+    points = [*sample_points(40)]
+    assert all(0.5 <= t <= 1.5 for t, _ in points)
+    sizes = np.abs([x for _, x in points])
+    assert 0.5 <= sizes.min() < 0.7
+    assert 1.3 < sizes.max() <= 1.5
+    signs = [{*np.sign(x)} for _, x in points]
+    assert signs == [{1.0}, {1.0}, {-1.0, 1.0}, {-1.0}]
+    assert len({x[0] for _, x in points}) == len(points)
 
 
 def test_columns_are_the_states_then_time():
@@ -210,6 +228,26 @@ class TestReference:
         found = self.at(lambda t, x: np.sin(1e3 * x.q))
         assert np.all(np.isfinite(found.tolerance))
         assert found.values[1, 0] == pytest.approx(1e3 * np.cos(1250.0), rel=1e-12)
+
+    def test_a_small_kink_beside_a_large_term_widens_the_tolerance(self):
+        """The complex step leaves out the kink, and central differences have it."""
+        found = self.at(lambda t, x: x.q**2 + 1e-8 * np.abs(x.q))
+        assert found.source == "complex step"
+        assert found.values[1, 0] == 2.5
+        assert 1e-8 < found.tolerance[1, 0] < 1e-7
+        assert np.all(found.tolerance > 0.0)
+
+    @pytest.mark.parametrize("method", [reference_derivative, _central_difference])
+    def test_there_is_none_where_the_function_ends(self, method):
+        """On one side of the point, or within a part of the larger step."""
+        q, step = self.x[0], DIFFERENCE_STEP
+        for ends in (
+            lambda q: q > self.x[0],
+            lambda q: q < self.x[0],
+            lambda u: abs(u - q) > 0.75 * step,
+        ):
+            assert self.at(lambda t, x, ends=ends: np.nan if ends(x.q) else x.q, method) is None
+        assert self.at(lambda t, x: np.nan if abs(x.q - q) > 1.5 * step else x.q, method) is not None
 
     def test_another_is_confirmed_within_the_tolerance(self):
         found = self.at(lambda t, x: x.q * x.v)
