@@ -82,6 +82,7 @@ NEAREST = {
         "kernels/steps/test_disguised_jumps.py",
     ),
     "hybrid/kernels/events/bounds.py": (
+        "kernels/events/test_bound_rules.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_crossings.py",
     ),
