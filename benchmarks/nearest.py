@@ -182,6 +182,7 @@ NEAREST = {
     ),
     "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless_rules.py",),
     "hybrid/kernels/jumps/jump.py": (
+        "kernels/jumps/test_jump_rules.py",
         "kernels/jumps/test_steep.py",
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
