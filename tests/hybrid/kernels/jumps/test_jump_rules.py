@@ -267,9 +267,16 @@ class TestJump:
         calls = self.jumped(tangents=1, grazes=grazes, orthonormal=orthonormal)
         kind = GRAZING if grazes else TRANSVERSE
         assert calls == [
-            "steep", ("time", 1), ("with map", 1, 1), ("grazing", 1, 7.0),
-            ("record", 1, 7.0, kind, True, "new"), ("judge", 2), ("carry", 1, orthonormal == 1, grazes), ("leave", 1, 7.0), "steep behind",
-        ]  # fmt: skip
+            "steep",
+            ("time", 1),
+            ("with map", 1, 1),
+            ("grazing", 1, 7.0),
+            ("record", 1, 7.0, kind, True, "new"),
+            ("judge", 2),
+            ("carry", 1, orthonormal == 1, grazes),
+            ("leave", 1, 7.0),
+            "steep behind",
+        ]
         assert self.counts == (grazes, int(grazes), 0.5 * grazes)
 
     @pytest.mark.parametrize(("tangents", "room"), [(0, 1), (1, 0), (3, 4)])
