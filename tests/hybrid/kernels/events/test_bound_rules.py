@@ -146,6 +146,37 @@ def test_where_a_slope_may_be_anything(rows):
     assert bounded(rows, path=path)[1] == WHOLE_LINE
 
 
+def test_beyond_a_pole_any_value_is_possible():
+    path = np.array([[0.0, 2.0], [1.0, 0.0]])
+    for row in ((op.WHOLE_POWER, 0, -1, 0), (op.WHOLE_POWER, 0, -3, 0), (op.QUOTIENT, 1, 0, 0)):
+        assert bounded([X, Y, row], path=path)[:2] == (WHOLE_LINE, WHOLE_LINE)
+
+
+def test_the_larger_and_the_smaller_of_a_steep_and_a_flat_line():
+    """``2 + s`` and ``2 - s / 8``: neither is beyond 2 by more than a sixteenth on both sides."""
+    path = np.array([[2.0, 2.0], [1.0, -0.125]])
+    for rows in ([X, Y, (op.MAXIMUM, 0, 1, 0)], [X, Y, (op.MAXIMUM, 1, 0, 0)]):
+        assert bounded(rows, path=path) == near(((1.9375, 2.5), (-0.125, 1.0), (2.0, 2.0)))
+    for rows in ([X, Y, (op.MINIMUM, 0, 1, 0)], [X, Y, (op.MINIMUM, 1, 0, 0)]):
+        assert bounded(rows, path=path) == near(((1.5, 2.0625), (-0.125, 1.0), (2.0, 2.0)))
+
+
+def test_an_angle_jumps_where_its_second_argument_is_negative():
+    """The first one goes from -1/2 to 1/2, or beside zero."""
+    for start, second, slopes in (
+        (0.0, -2.0, WHOLE_LINE),
+        (0.5, -2.0, WHOLE_LINE),
+        (-0.5, -2.0, WHOLE_LINE),
+        (0.0, 0.0, WHOLE_LINE),
+        (0.75, -2.0, (-2.0 / (4.0 + 1.0 / 16.0), -2.0 / (4.0 + 25.0 / 16.0))),
+        (-0.75, -2.0, (-2.0 / (4.0 + 1.0 / 16.0), -2.0 / (4.0 + 25.0 / 16.0))),
+        (0.0, 0.75, (0.75 / (9.0 / 16.0 + 0.25), 4.0 / 3.0)),
+    ):
+        path = np.array([[start, second], [1.0, 0.0]])
+        found = bounded([X, Y, (op.ANGLE, 0, 1, 0)], path=path)[1]
+        assert found == pytest.approx(slopes, rel=1e-13)
+
+
 def test_where_neither_a_pole_nor_a_jump_is():
     path = np.array([[0.0, 2.0, -2.0], [1.0, 0.0, 0.0]])
     # The first component changes its sign, the others are 2 and -2.
@@ -185,26 +216,19 @@ class TestLeaves:
             self.outside(found, exact)
 
     def test_the_rest_of_higher_order(self):
-        """``s^3`` and ``s^4`` from 1/2 to 1: terms beyond the parabola are bounded at the end."""
-        r = 0.25
-        for power in (3, 4):
-            coefficients = [0.0] * power + [-1.0]
-            (low, high), (least, most), _ = self.state(*coefficients, middle=0.75, radius=r)
-            third = math.comb(power, 3)
-            parabola = [
-                0.75**power
-                + sign * power * 0.75 ** (power - 1) * r
-                + math.comb(power, 2) * 0.75 ** (power - 2) * r * r
-                for sign in (-1, 1)
-            ]
-            slopes = [
-                power * 0.75 ** (power - 1) + sign * 2.0 * math.comb(power, 2) * 0.75 ** (power - 2) * r
-                for sign in (-1, 1)
-            ]
-            assert (low, high) == near([(-parabola[1] - third * r**3, -parabola[0] + third * r**3)])[0]
-            assert (least, most) == near(
-                [(-slopes[1] - 3.0 * third * r**2, -slopes[0] + 3.0 * third * r**2)]
-            )[0]
+        """``-s^3`` and ``-s^4`` from 3/2 to 2: terms beyond the parabola are bounded at the end."""
+        m, r = 1.75, 0.25
+        # Value, slope and bend in the middle, and the bound of a third of the third derivative.
+        for power, value, slope, bend, third in (
+            (3, m**3, 3.0 * m**2, 3.0 * m, 1.0),
+            (4, m**4, 4.0 * m**3, 6.0 * m**2, 4.0 * 2.0),
+        ):
+            found = self.state(*[0.0] * power, -1.0, middle=m, radius=r)
+            low, high = (value + sign * slope * r + bend * r * r for sign in (-1, 1))
+            rest = third * r**3
+            assert found[0] == near([(-high - rest, rest - low)])[0]
+            turn = 2.0 * bend * r + 3.0 * third * r * r
+            assert found[1] == near([(-slope - turn, -slope + turn)])[0]
 
     @pytest.mark.parametrize("pace", [0.5, 2.0])
     def test_time_at_a_pace(self, pace):
@@ -260,6 +284,11 @@ class TestSpread:
         for x, distance in ((2.4, -1.0), (3.4, -1.0), (2.75, -1.0)):
             assert self.spread(floor, (x, 0.0)) == distance
         assert self.spread([Y, NUMBER, (op.PRODUCT, 0, 1, 0), (op.FLOOR, 2, 0, 0)], (0.0, 5.0), (0.1,)) == 0.0
+        # A vertical tangent is no better than a jump, in either direction.
+        root = [X, (op.SQRT, 0, 0, 0), NUMBER, (op.PRODUCT, 1, 2, 0)]
+        for sign in (1.0, -1.0):
+            assert self.spread(root, (0.25, 0.0), (sign,)) < 0.0
+            assert self.spread(root, (1.0, 0.0), (sign,)) > 0.0
 
 
 class TestNarrowed:
