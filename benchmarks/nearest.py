@@ -157,6 +157,7 @@ NEAREST = {
         "kernels/events/test_grazing.py",
     ),
     "hybrid/kernels/events/soon.py": ("kernels/events/test_soon_rules.py",),
+    "hybrid/kernels/events/surface.py": ("kernels/events/test_surface_rules.py",),
     "hybrid/kernels/jumps/chatter.py": (
         "kernels/jumps/test_chatter_rules.py",
         "kernels/jumps/test_chatter_matrix.py",
