@@ -245,6 +245,48 @@ def test_impacts_that_change():
     np.testing.assert_allclose(work.saltation, expected, rtol=0, atol=1e-9)
 
 
+def test_steps_along_the_columns_are_those_of_the_component_that_allows_least():
+    """The state without its speed is (1/2, -1, 0), and the sizes are 1/2, 1 and 1/8."""
+    places = []
+
+    class Noted(Changing):
+        def field(self, mode, t, x, parameters, out):
+            places.append(x.copy())
+            super().field(mode, t, x, parameters, out)
+
+    run, work = new_run((0.5, 1.0, 0.5), scale=np.full(3, 0.125)), memory()
+    columns = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 3.0], [2.0, 0.0, -1.0]])
+    work.saltation[:] = columns
+    kernels.add_change_of_impacts(Noted(), run, 1, 2.0, 0.25, work)
+    # An impact has rates before and after it as well.
+    start, found = np.array([0.5, -1.0, 0.0]), np.array(places)[::3]
+    expected = [
+        sign * 6e-6 * 0.125 / most * columns[:, j] for j, most in ((0, 2.0), (2, 1.0)) for sign in (1, -1)
+    ]
+    np.testing.assert_allclose(found - start, expected, rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.9, False), (1.1, True)])
+def test_changes_of_an_impulse_that_are_rounding_of_the_state_do_not_count(share, counts):
+    """Sixteen units of a size of 1e6, against a change of the speed by 3; no step is longer than 6e-6."""
+
+    class Turning(Model):
+        def reset(self, transition, t, x, parameters, out):
+            # The impulse grows by the noise over both steps along the height.
+            tilt = 0.25 + share * noise / 2.0 * x[0] / 6e-6
+            out[:] = x[0], -0.5 * x[1], x[2] - tilt * 1.5 * x[1]
+
+    noise = 16.0 * EPSILON * 1e6 / 3.0
+    run, work = new_run((0.0, 2.0, 0.0), scale=np.array([1.0, 1.0, 1e6])), memory()
+    run.trail[IMPULSE, :3] = 0.0, 1.0, 0.0
+    work.saltation[:] = 0.0
+    work.saltation[0, 0] = 1.0
+    kernels.add_change_of_impacts(Turning(), run, 1, 2.0, 0.0, work)
+    # The impulse takes out a speed of 2.
+    expected = -2.0 * share * noise / 12e-6 if counts else 0.0
+    np.testing.assert_allclose(work.saltation[2, 0], expected, rtol=1e-3, atol=0.0)
+
+
 class Resting(Ball):
     """A ball, and a mode at rest with a drift of its own."""
 
