@@ -96,6 +96,7 @@ NEAREST = {
         "kernels/steps/test_disguised_jumps.py",
     ),
     "hybrid/kernels/events/bounds.py": (
+        "kernels/events/test_bound_rules.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_crossings.py",
     ),
@@ -169,6 +170,8 @@ NEAREST = {
         "kernels/events/test_touch_rules.py",
         "kernels/events/test_grazing.py",
     ),
+    "hybrid/kernels/events/soon.py": ("kernels/events/test_soon_rules.py",),
+    "hybrid/kernels/events/surface.py": ("kernels/events/test_surface_rules.py",),
     "hybrid/kernels/jumps/chatter.py": (
         "kernels/jumps/test_chatter_rules.py",
         "kernels/jumps/test_chatter_matrix.py",
@@ -195,6 +198,7 @@ NEAREST = {
     ),
     "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless_rules.py",),
     "hybrid/kernels/jumps/jump.py": (
+        "kernels/jumps/test_jump_rules.py",
         "kernels/jumps/test_steep.py",
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",

@@ -249,6 +249,8 @@ class TestFire:
         for jumps, code in ((1, GO_ON), (2, codes.RECORD_FULL), (3, codes.RECORD_FULL)):
             record = {"jump_phase": np.zeros(3), "jumps": jumps}
             assert self.fired(pending=0, record=record)[0] == code
+        record = {"jump_phase": np.zeros(1), "jumps": 0}
+        assert self.fired(pending=0, record=record)[0] == codes.RECORD_FULL
 
 
 class TestEnter:
@@ -293,6 +295,9 @@ def test_when_a_record_is_full():
         (2, 3, 0, 0, True),
         (0, 0, 2, 3, False),
         (0, 0, 3, 3, True),
+        (0, 1, 0, 0, True),
+        (0, 0, 1, 1, True),
+        (0, 0, 0, 1, False),
     ):
         record = SimpleNamespace(
             step_phase=np.zeros(room), steps=steps, grazing_phase=np.zeros(touches), grazings=grazings

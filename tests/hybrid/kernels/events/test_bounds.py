@@ -21,7 +21,6 @@ from hybrid.kernels.types.codes import (
     REGISTERS,
 )
 from hybrid.kernels.types.layout import Programs
-from tests.hybrid.kernels.plain import plain
 
 _bound, _spread = bounds.bound_guard, bounds.spread_by_rounding
 
@@ -352,39 +351,3 @@ def test_the_distance_is_negative_where_rounding_may_lead_over_a_jump(x, jumps):
     distance = sign.distance(0.0, 0.0, [x, 0.0, 0.0], [1.0, 0.0, 0.0], 1e-9)
     assert (distance < 0.0) == jumps
     assert abs(distance) >= 1.0 if jumps else distance == 0.0
-
-
-class TestNarrowed:
-    """The range that follows from the middle, 1 to 2, and the slopes, and the range that was known."""
-
-    def narrowed(self, low, high, slopes=(0.0, 0.0), radius=0.5, middle=(1.0, 2.0)):
-        row = np.zeros(REGISTERS)
-        row[[LOW, HIGH]], row[[LEAST_SLOPE, MOST_SLOPE]] = (low, high), slopes
-        row[[LOW_MIDDLE, HIGH_MIDDLE]] = middle
-        plain(bounds)._narrowed(row, radius)
-        assert row[[LEAST_SLOPE, MOST_SLOPE]].tolist() == list(slopes)
-        return row[[LOW, HIGH]].tolist()
-
-    def test_the_narrower_end_counts(self):
-        assert self.narrowed(-9.0, 9.0) == [1.0, 2.0]
-        assert self.narrowed(1.25, 9.0) == [1.25, 2.0]
-        assert self.narrowed(-9.0, 1.5) == [1.0, 1.5]
-
-    @pytest.mark.parametrize("slopes", [(-4.0, 2.0), (-2.0, 4.0)])
-    def test_the_steepest_slope_counts_over_the_radius(self, slopes):
-        low, high = self.narrowed(-9.0, 9.0, slopes)
-        assert low == pytest.approx(-1.0, rel=1e-15, abs=1e-15)
-        assert high == pytest.approx(4.0, rel=1e-15)
-        # Outwards by its rounding.
-        assert low < -1.0
-        assert high > 4.0
-        # At one place an infinite slope says nothing.
-        assert self.narrowed(-9.0, 9.0, (-math.inf, 1.0), radius=0.0) == [1.0, 2.0]
-
-    def test_ranges_that_rounding_sets_apart_are_joined(self):
-        assert self.narrowed(3.0, 4.0) == [1.0, 3.0]
-        assert self.narrowed(-1.0, 0.0) == [0.0, 2.0]
-
-    def test_what_has_no_value_has_no_bounds(self):
-        for low, high in ((math.nan, 1.0), (1.0, math.nan)):
-            assert self.narrowed(low, high, middle=(math.nan, math.nan)) == [-math.inf, math.inf]

@@ -102,7 +102,7 @@ class TestBands:
         """The terms of guard 1 come after 3 guards, 5 forcings and 2 residues: program 11 of 12."""
         model, run, work = self.scene(0.25)
         model.dimension, model.target = 2, np.zeros(3)
-        model.first_forcing, model.first_residue = np.array([0, 1, 5]), np.array([0, 2, 2])
+        model.first_forcing, model.first_residue = np.array([0, 1, 5]), np.array([0, 1, 2])
         run.scale, work.gradient = np.array([4.0, 3.0]), np.array([2.0, -5.0, -0.5])
         plainly = SHARE * (2.0 * 4.0 + 5.0 * 3.0 + 0.5 * 10.0)
         assert kernels.gradient_band(model, run, 7.0, work.gradient) == near(plainly)
@@ -161,6 +161,8 @@ class TestBands:
 def test_a_state_beside_another_where_a_guard_is_larger():
     model, out = SimpleNamespace(dimension=2), np.full(3, 77.0)
     kernels.displace(model, np.array([1.0, 2.0]), 5.0, np.array([3.0, -4.0, 9.0]), out)
+    assert out == pytest.approx([1.6, 1.2, 77.0], rel=1e-15)
+    kernels.displace(model, np.array([1.0, 2.0]), 0.5, np.array([0.3, -0.4, 9.0]), out)
     assert out == pytest.approx([1.6, 1.2, 77.0], rel=1e-15)
     kernels.displace(model, np.array([1.0, 2.0]), 5.0, np.array([0.0, 0.0, 9.0]), out)
     assert out.tolist() == [1.0, 2.0, 77.0]

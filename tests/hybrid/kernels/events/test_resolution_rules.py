@@ -52,8 +52,8 @@ class TestKept:
         kernels.keep_crossing(run, 1, 0.75, way)
         assert (run.rehearsal[3, 1], run.passed[1]) == (-way, NO_ROOT)
         run.passed[1] = 0.25
-        kernels.keep_crossing(run, 1, 0.75, way)
-        assert run.passed[1] == 0.5
+        kernels.keep_crossing(run, 1, 0.5, way)
+        assert run.passed[1] == 0.375
 
     @BOTH
     def test_a_guard_that_starts_on_the_side_to_which_it_crosses_passes_zero_before(self, way):
@@ -172,6 +172,7 @@ class TestBesideGuard:
         assert holds(way, -way)
         assert holds(0.0, -way)
         assert not holds(way, way)
+        assert not holds(0.125 * way, 0.125 * way)
 
     @BOTH
     def test_a_field_leads_to_the_guard_from_a_side(self, way):
@@ -239,6 +240,9 @@ class TestDraws:
         assert not self.draws((-1.0, -4.0), (-1.0, -4.0), **given)
         assert not self.draws((1.0, 4.0), (1.0, 4.0), **given)
         assert not self.draws((1.0, 4.0), (0.0, 0.0), **given)
+        # Farther away, too.
+        assert not self.draws((1.0, -0.5), (-1.0, -4.0), **given)
+        assert not self.draws((1.0, 4.0), (-1.0, 0.5), **given)
 
 
 class TestStays:

@@ -5,6 +5,7 @@ import pytest
 
 from hybrid.kernels.jumps import chatter
 from hybrid.kernels.jumps.chatter import BEFORE, IMPULSE
+from hybrid.kernels.types.codes import ENDLESS
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.jumps.balls import METHOD, PULL, Ball, Model, memory, new_run
 from tests.hybrid.kernels.plain import plain
@@ -21,6 +22,55 @@ def test_the_gradient_of_a_speed(bend, scale):
     kernels.speed_gradient(Model(bend=bend), run, 1, 1, 0.0, np.array([q, v, s]), out, memory())
     expected = [2.0 * bend * s, 1.0 + 4.0 * bend * s, 2.0 * bend * (0.5 + q + 2.0 * v)]
     np.testing.assert_allclose(out, expected, rtol=1e-9)
+
+
+def test_the_gradient_of_a_speed_takes_steps_in_the_size_of_each_component():
+    """That of a component that has none is 1."""
+    places = []
+
+    class Bent(Model):
+        def guard_gradient(self, transition, t, x, parameters, out):
+            places.append(x.copy())
+            super().guard_gradient(transition, t, x, parameters, out)
+
+    x, run = np.array([-0.5, 8.0, 0.0]), new_run(scale=np.array([0.25, 16.0, 0.0]))
+    kernels.speed_gradient(Bent(bend=0.75), run, 1, 1, 0.0, x, np.zeros(3), memory())
+    steps = (np.array(places[1:]) - x).reshape(3, 2, 3)
+    for j, size in enumerate((0.5, 16.0, 1.0)):
+        step = 6e-6 * size
+        expected = np.zeros((2, 3))
+        expected[:, j] = step, -step
+        np.testing.assert_allclose(steps[j], expected, rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize(("apart", "exact"), [(1.5e-13, True), (-1.5e-13, True), (2.5e-13, False)])
+def test_entries_that_are_rounding_of_their_terms_are_zero(apart, exact):
+    """Both of their terms are 1, up to what they are apart."""
+    for impulse, carried, slope, height, entry in (
+        # The identity less the motion that the speed brings, or less the speed, and the coupling of both.
+        ((0.0, 1.0, 0.0), 1.0 + apart, (0.0, 0.0, 0.0), 1.0, (0, 0)),
+        ((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0 + apart), 1.0, (2, 2)),
+        ((0.0, 1.0, 0.0), 1.0, (1.0, 0.0, 0.0), 1.0 + apart, (1, 0)),
+    ):
+
+        def speed_gradient(*given, carried=carried, slope=slope):
+            work, out = given[-1], given[-2]
+            out[:], work.jacobian[:] = slope, 0.0
+            work.jacobian[0, 1] = carried
+
+        class Tall(Model):
+            # The gradient of the guard in the height.
+            height = 1.0
+
+            def guard_gradient(self, transition, t, x, parameters, out):
+                out[:] = self.height, 0.0, 0.0, 0.0
+
+        model, run, work = Tall(), new_run(), memory()
+        model.height = height
+        run.trail[IMPULSE, :3] = impulse
+        plain(chatter, speed_gradient=speed_gradient).chatter_matrix(model, run, 1, work)
+        found = work.saltation[entry]
+        assert found == 0.0 if exact else abs(found) == pytest.approx(abs(apart), rel=1e-2, abs=0.0)
 
 
 def test_the_matrix_of_a_whole_chatter():
@@ -134,6 +184,41 @@ def test_an_impulse_that_turns():
     np.testing.assert_allclose(work.saltation, expected, rtol=1e-13)
 
 
+def turned(model, run, settled, speed=-2.0):
+    """How fast the impulse turns on the way of 1/8 to the limit: the slope of the guard is (0, 0, 0) here."""
+    work = memory()
+    work.settled[:], work.error[:], work.saltation[:] = settled, 0.0, 0.0
+    kernels.add_turn_of_impulse(model, run, 1, 3.125, speed, 0.125, work)
+    return work.saltation[:, 0]
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_an_impulse_at_the_limit_is_that_of_an_impact_with_the_last_speed(way):
+    """With the speed ``v`` the height is 1/4 there, and the impulse of the third component 3/8."""
+    found = turned(Changing(), new_run(), (0.25, 0.0, 1.0), speed=way)
+    # The restitution is not the same on both sides, but the impulse is one per unit of speed.
+    np.testing.assert_allclose(found, [0.0, 0.0, (0.375 - 0.25) / 0.125], rtol=1e-13)
+    run = new_run()
+    run.trail[IMPULSE, :3] = 0.5, 1.0, 0.25
+    # An impulse of the height: it has been 1/4 + way / 2 before it is taken out.
+    found = turned(Changing(), run, (0.25, 0.0, 1.0), speed=-way)
+    expected = [-0.5 / 0.125, 0.0, 0.5 * (0.25 + 0.5 * way) / 0.125]
+    np.testing.assert_allclose(found, expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("turn", "counts"), [(1.1e-3, False), (1.3e-3, True), (-1.1e-3, False), (-1.3e-3, True)]
+)
+def test_a_turn_that_is_rounding_of_the_state_does_not_count(turn, counts):
+    """Sixteen units of a size of 1e12, against a change of the speed by 3."""
+    run = new_run(scale=np.array([1.0, 1.0, 1e12]))
+    found = turned(Model(tilt=0.25 + turn), run, (0.0, 0.0, 1.0))
+    np.testing.assert_allclose(found, [0.0, 0.0, turn / 0.125 if counts else 0.0], rtol=1e-9)
+    # What moves for ever has no limit to turn to.
+    run.trail[ENDLESS, 2] = 1.0
+    assert turned(Model(tilt=0.25 + turn), run, (0.0, 0.0, 1.0)).tolist() == [0.0] * 3
+
+
 class Changing(Model):
     """The restitution is ``1/2 + s/8``, and the impulse ``(0, 1, 1/4 + q/2)``."""
 
@@ -158,6 +243,48 @@ def test_impacts_that_change():
     taken = 0.5 * columns[0] * (2.0 + 0.25 * (-PULL + 0.5 * q * s))
     expected = columns - np.array([0.0 * taken, 0.0 * taken, taken])
     np.testing.assert_allclose(work.saltation, expected, rtol=0, atol=1e-9)
+
+
+def test_steps_along_the_columns_are_those_of_the_component_that_allows_least():
+    """The state without its speed is (1/2, -1, 0), and the sizes are 1/2, 1 and 1/8."""
+    places = []
+
+    class Noted(Changing):
+        def field(self, mode, t, x, parameters, out):
+            places.append(x.copy())
+            super().field(mode, t, x, parameters, out)
+
+    run, work = new_run((0.5, 1.0, 0.5), scale=np.full(3, 0.125)), memory()
+    columns = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 3.0], [2.0, 0.0, -1.0]])
+    work.saltation[:] = columns
+    kernels.add_change_of_impacts(Noted(), run, 1, 2.0, 0.25, work)
+    # An impact has rates before and after it as well.
+    start, found = np.array([0.5, -1.0, 0.0]), np.array(places)[::3]
+    expected = [
+        sign * 6e-6 * 0.125 / most * columns[:, j] for j, most in ((0, 2.0), (2, 1.0)) for sign in (1, -1)
+    ]
+    np.testing.assert_allclose(found - start, expected, rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.9, False), (1.1, True)])
+def test_changes_of_an_impulse_that_are_rounding_of_the_state_do_not_count(share, counts):
+    """Sixteen units of a size of 1e6, against a change of the speed by 3; no step is longer than 6e-6."""
+
+    class Turning(Model):
+        def reset(self, transition, t, x, parameters, out):
+            # The impulse grows by the noise over both steps along the height.
+            tilt = 0.25 + share * noise / 2.0 * x[0] / 6e-6
+            out[:] = x[0], -0.5 * x[1], x[2] - tilt * 1.5 * x[1]
+
+    noise = 16.0 * EPSILON * 1e6 / 3.0
+    run, work = new_run((0.0, 2.0, 0.0), scale=np.array([1.0, 1.0, 1e6])), memory()
+    run.trail[IMPULSE, :3] = 0.0, 1.0, 0.0
+    work.saltation[:] = 0.0
+    work.saltation[0, 0] = 1.0
+    kernels.add_change_of_impacts(Turning(), run, 1, 2.0, 0.0, work)
+    # The impulse takes out a speed of 2.
+    expected = -2.0 * share * noise / 12e-6 if counts else 0.0
+    np.testing.assert_allclose(work.saltation[2, 0], expected, rtol=1e-3, atol=0.0)
 
 
 class Resting(Ball):
@@ -214,6 +341,18 @@ def test_a_limit_mode_that_drifts_alike_adds_nothing():
         np.testing.assert_allclose(
             added, (1.5 - drift if apart else 0.0) * run.instant, rtol=1e-5, atol=1e-14
         )
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_drifts_that_differ_by_what_the_tolerances_make_of_them_are_alike(way):
+    """A speed of the size 100 is known up to 1e-6, and so is the rate of the height."""
+    for speed, apart in ((0.9e-6, False), (1.1e-6, True)):
+        model, run, work = Resting(tilt=0.25), new_run((0.0, 0.125, 0.5)), memory()
+        model.drift = 1.5
+        run.scale[:], run.trail[BEFORE, 3] = (1.0, 100.0, 1.0), 0.125
+        kernels.chatter_matrix(model, run, 1, work)
+        work.settled[:] = 0.0, way * speed, 0.5
+        assert kernels.add_change_of_duration(model, METHOD, run, 0, 0.125, work) == apart
 
 
 @pytest.mark.parametrize("side", [1, -1])

@@ -10,6 +10,7 @@ import pytest
 
 from hybrid.kernels.jumps import chatter
 from hybrid.kernels.jumps.chatter import BEFORE, IMPULSE, LIMIT
+from hybrid.kernels.types.codes import ENDLESS
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.jumps.balls import METHOD, PULL, Ball, Model, memory, new_run
 from tests.hybrid.kernels.plain import plain
@@ -116,6 +117,9 @@ class TestAccumulation:
     def test_invisible_jumps_are_not_waited_for(self):
         assert self.bounces(0.09)[0] == 7
         assert self.bounces(0.009)[0] == 4
+        # Against the first speed, in any units.
+        for speed in (0.01, 100.0):
+            assert self.bounces(0.09, speed=speed)[0] == 7
 
     def test_shallow_flights_end_it_before_rounding_spoils_it(self):
         """Heights are ``v^2 / 8``, and a million times the rounding is reached after some flights."""
@@ -136,16 +140,18 @@ class TestAccumulation:
         assert k >= 17
         assert span == pytest.approx(2.0 * speed / (PULL * 0.5), rel=1e-14)
 
-    def after(self, since_last, speed, *, band=1.0, ratio=0.5, value=0.0, **trail):
+    def after(self, since_last, speed, *, band=1.0, ratio=0.5, value=0.0, phase=3.0, **trail):
         """What is found after a series with the speed 2, of which 2 time units were left, and the run."""
         tested = plain(
             chatter,
             rounding_band=lambda *given: band,
             guard_acceleration=lambda *given: -PULL,
             guard_value=lambda *given: value,
-            slower_are_alike=lambda *given: True,
+            slower_are_alike=lambda *given: self.asked.append(given[3:]) or True,
         ).accumulation
+        self.asked = []
         run = new_run((0.0, speed, 0.0), chattering=5, chatter_jumps=8, jumps=9, restitution=ratio)
+        run.phase = phase
         run.trail[BEFORE] = 1.0, 0.0, 0.0, 2.0
         run.trail[LIMIT] = 0.0, 0.0, 0.0, 2.0
         run.trail[IMPULSE] = 0.0, 1.0, 0.0, trail.get("misfit", math.inf)
@@ -162,8 +168,30 @@ class TestAccumulation:
         span, run = self.after(since_last, speed)
         assert span == (2.0 * speed / (PULL * 0.5) if found else 0.0)
         assert run.chattering == 6
+        # Slower impacts may then lead anywhere near.
+        assert len(self.asked) == found
+        if found:
+            transition, towards, left, impulse, apart, _ = self.asked[0]
+            assert (transition, towards, left, apart) == (1, speed, span, math.inf)
+            assert impulse[:3].tolist() == [0.0, 1.0, 0.0]
         # Higher flights are followed.
         assert self.after(since_last, speed, band=1e-9)[0] == 0.0
+
+    @pytest.mark.parametrize(
+        ("since_last", "speed", "found"),
+        [(1.5, 0.5, True), (2.2, 0.5, True), (0.8, 0.5, True), (2.3, 0.5, False), (0.7, 0.5, False),
+         (1.5, 0.74, True), (1.5, 0.26, True), (1.5, 0.76, False), (1.5, 0.24, False)],
+    )  # fmt: skip
+    def test_a_steady_flight_at_another_ratio(self, since_last, speed, found):
+        """The series with the ratio 1/4 has the flight 1.5, and the speed 1/2 after it."""
+        assert (self.after(since_last, speed, ratio=0.25)[0] > 0.0) == found
+
+    @pytest.mark.parametrize("way", [1.0, -1.0])
+    def test_a_flight_as_short_as_the_rounding_of_time_is_steady(self, way):
+        """Eight units of the time count, beside a half of the flight of 1."""
+        for units, found in ((7.0, True), (9.0, False)):
+            since_last = 1.0 + way * (0.5 + units * EPSILON * 1e16)
+            assert (self.after(since_last, 1.0, phase=-1e16)[0] > 0.0) == found
 
     def test_the_change_of_the_limit_is_kept(self):
         """A third of the change of its time for the ratio 1/2, in units of the tolerances."""
@@ -215,7 +243,8 @@ class TestAccumulation:
         tested = plain(chatter, guard_value=lambda *given: 0.0, **options).accumulation
         for jumps, before, left in ((9, 1, 6), (9, 0, 1), (10, 1, 1)):
             run = new_run(chattering=5, chatter_jumps=8, jumps=jumps)
-            run.recent[:] = before
+            run.recent[:] = 1 - before
+            run.recent[jumps - 2] = before
             run.trail[:3, 3] = 0.5, 1.0, math.inf
             run.trail[LIMIT, :3] = math.inf
             tested(Model(), METHOD, run, 1, 0.5, memory())
@@ -235,3 +264,44 @@ def test_impulses():
     work.new[0] = 17.0 * EPSILON
     kernels.remember_impulse(Model(), run, 1, -2.0, work)
     assert run.trail[IMPULSE, 0] == 17.0 * EPSILON / 3.0
+    # By sixteen units of its own size.
+    run.scale[:] = 0.25, 4.0, 4.0
+    for units, moves in ((3.0, False), (5.0, True)):
+        work.new[0] = units * EPSILON
+        kernels.remember_impulse(Model(), run, 1, -2.0, work)
+        assert (run.trail[IMPULSE, 0] != 0.0) == moves
+
+
+class TestEndless:
+    def kept(self, *, found=True, scale=1.0, speed=2.0, impulse=(0.0, 1.0, -0.25)):
+        """Impulses that stay of those of a height, a speed and a counter, and what was asked of their moves.
+
+        The restitution is 1/2: the last impact has changed a speed of 2 by 6.
+        """
+        asked = []
+
+        def mark_endless(model, run, turn, t, x, share, work):
+            asked.append((turn, t, x.tolist(), share.tolist()))
+            run.trail[ENDLESS, :3] = 0.0, 0.0, 1.0
+            return found
+
+        run = new_run((5.0, 7.0, 9.0), scale=np.array([1.0, 1.0, scale]))
+        run.trail[IMPULSE, :3] = impulse
+        plain(chatter, mark_endless=mark_endless).keep_endless(Model(), run, 1, speed, memory())
+        ((turn, t, rest, share),) = asked
+        assert (turn, t) == (1, 3.0)
+        return run.trail[IMPULSE, :3].tolist(), rest, share
+
+    @pytest.mark.parametrize("way", [1.0, -1.0])
+    def test_what_moves_for_ever_has_no_impulse(self, way):
+        """Only moves beyond a tenth of that of the last impact count, or beyond rounding if that is more."""
+        left, rest, share = self.kept(speed=2.0 * way)
+        assert left == [0.0, 1.0, 0.0]
+        assert rest == [5.0, 7.0 - 2.0 * way, 9.0 + 0.5 * way]
+        assert share == [math.inf, pytest.approx(0.6, rel=1e-15), pytest.approx(0.15, rel=1e-15)]
+        assert self.kept(scale=2.0**50)[2][2] == 16.0 * EPSILON * 2.0**50
+        # What the impacts do not move in one component they may move in another.
+        assert self.kept(impulse=(0.5, 1.0, 0.25))[2][0] == pytest.approx(0.3, rel=1e-15)
+
+    def test_without_any_all_stay(self):
+        assert self.kept(found=False)[0] == [0.0, 1.0, -0.25]

@@ -290,6 +290,7 @@ def test_transitions_that_fire_in_turn_at_one_instant(fired, here, turn):
     [
         (0, True, [], (0, 0.0)),
         (3, True, [8.0, 4.0], (3, 8.0)),
+        (1, True, [8.0, 4.0], (1, 8.0)),
         (3, True, [4.0, 16.0], (3, 16.0)),
         (3, False, [4.0, 16.0], (0, 0.0)),
         (3, True, [0.0], (0, 0.0)),

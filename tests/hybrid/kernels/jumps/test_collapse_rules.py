@@ -140,6 +140,14 @@ class TestAffine:
                 assert self.affine(apart, move=move, scale=(2.0, 16.0)) == expected
 
 
+def test_only_the_last_48_jumps_must_have_been_in_turn():
+    for turn in (1, 2, 16):
+        recent = np.array([20] * 16 + list(range(turn)) * (48 // turn))
+        run = SimpleNamespace(jumps=64, jumps_here=60, recent=recent, visits=np.zeros((64, 1)), mode=0)
+        model = SimpleNamespace(target=np.zeros(21, dtype=int), direction=np.ones(21, dtype=int))
+        assert plain(collapse).round_at_once(model, run) == turn
+
+
 class TestDoubling:
     """One component, which a round maps to ``r x + d``; nothing changes the order of the jumps."""
 
@@ -174,6 +182,15 @@ class TestDoubling:
         ]
         # The second 32 of 64 rounds still move it by 2^-31, the second 64 of 128 by 2^-63.
         assert (rounds, limit) == (128.0, 2.0)
+
+    def test_moves_are_rounding_below_sixteen_units_for_each_round(self):
+        """After 64 rounds ``2^-44`` of the way is left, which the rounding of 128 rounds hides."""
+        for unit in (2.0**-20, 1.0, 2.0**20):
+            assert self.followed(2.0 ** (-44 / 64), unit)[0] == 128.0
+
+    def test_a_counter_stays_where_it_is(self):
+        for step in (0.25, -0.25, 4.0):
+            assert self.followed(1.0, step, 3.0)[::2] == (2.0, 3.0)
 
     def test_a_start_that_does_not_move_is_its_own_limit(self):
         assert self.followed(0.5, 1.0, 2.0) == (2.0, [(2.0, 1.0), (2.0, 2.0)], 2.0)

@@ -1,7 +1,6 @@
 """What a jump does to tangent vectors: any number of them, at a start, in a chain, and where a mass rests."""
 
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,10 +9,8 @@ from scipy.linalg import expm
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
 from hybrid.kernels.jumps import jump
-from hybrid.kernels.types.codes import ENTERING, GRAZING, TRANSVERSE
 from hybrid.simulation.trajectory import start
 from lyapunov import lyapunov_spectrum
-from tests.hybrid.kernels.plain import plain
 
 SOLVERS = pytest.mark.parametrize(
     "solver", [Taylor(), DOP853(rtol=1e-12, atol=1e-14)], ids=["Taylor", "DOP853"]
@@ -306,139 +303,3 @@ def test_the_sizes_of_the_terms_of_a_saltation_matrix(unit):
     np.testing.assert_allclose(
         run.work.sizes, np.abs(matrix) + np.outer(terms, np.abs(g)) / abs(speed), rtol=1e-13
     )
-
-
-def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():
-    """A jump multiplies two vectors of three states; each image may be off by the sizes of its own terms."""
-    saltation = np.array([[1.0, -2.0, 0.0], [0.0, 3.0, 0.5], [4.0, 0.0, -1.0]])
-    sizes = np.array([[1.0, 5.0, 7.0], [2.0, 3.0, 1.0], [4.0, 9.0, 6.0]])
-    vectors = np.array([[0.6, 0.0, -0.8], [0.0, -1.0, 0.0]])
-    calls = []
-
-    def orthonormalise(y, n, tangents, growth, terms, images, annihilated):
-        assert annihilated == 0
-        calls.append((y[3:].copy(), terms.copy(), images))
-        growth[0] += 10.0 ** len(calls)
-        # So many directions are lost.
-        return len(calls)
-
-    kernels = plain(jump, orthonormalise=orthonormalise)
-
-    def carried(orthonormal, apart, strain=0.0):
-        calls.clear()
-        run = SimpleNamespace(
-            y=np.array([9.0, 8.0, 7.0, *vectors.ravel()]),
-            growth=np.zeros(2),
-            log_determinant=1.0,
-            strain=strain,
-            indistinct=0,
-        )
-        work = SimpleNamespace(
-            saltation=saltation,
-            sizes=sizes,
-            jacobian=np.zeros((3, 4)),
-            reset_jacobian=np.zeros((3, 4)),
-            state=np.zeros(3),
-            rounding=np.zeros((4, 3)),
-        )
-        added = kernels.carry_tangents(SimpleNamespace(dimension=3), run, 2, orthonormal, apart, work)
-        images = np.array([vectors @ saltation.T])
-        np.testing.assert_allclose(run.y[3:], images.ravel(), rtol=1e-15)
-        np.testing.assert_array_equal(run.y[:3], [9.0, 8.0, 7.0])
-        assert run.log_determinant == pytest.approx(1.0 + np.log(abs(np.linalg.det(saltation))), rel=1e-14)
-        assert run.indistinct == sum(range(1, len(calls) + 1))
-        return added, run.strain
-
-    # The growth that the second call finds is that of the jump alone.
-    assert carried(True, True) == (100.0, 0.0)
-    (before, _, first), (after, terms, second) = calls
-    assert (first, second) == (False, True)
-    np.testing.assert_array_equal(before, vectors.ravel())
-    np.testing.assert_allclose(after, (vectors @ saltation.T).ravel(), rtol=1e-15)
-    np.testing.assert_allclose(terms[:2, :3], np.abs(vectors) @ sizes.T, rtol=1e-15)
-    # Without need, nothing is made orthonormal, and the strain adds up.
-    assert carried(False, True)[0] == carried(True, False)[0] == 0.0
-    assert not calls
-    assert carried(True, False, strain=0.5)[1] - carried(True, False)[1] == pytest.approx(0.5, rel=1e-12)
-    assert carried(True, False, strain=1e9) == (100.0, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("phase", "cycle", "here"), [(3.0, 2, 6), (3.0, 1, 1), (2.0, 2, 1)], ids=["same", "period", "time"]
-)
-def test_a_jump_moves_the_run(phase, cycle, here):
-    """Jumps at one instant are counted, and each stay is as long as it was."""
-    model = SimpleNamespace(dimension=2)
-    run = SimpleNamespace(
-        y=np.zeros(2),
-        scale=np.array([2.0, 2.0]),
-        phase=3.0,
-        cycle=2,
-        last_jump_phase=phase,
-        last_jump_cycle=cycle,
-        jumps_here=5,
-        recent=np.full(8, 9),
-        visits=np.zeros((8, 2)),
-        jumps=10,
-        last_fired=0,
-        stay=np.zeros(3),
-        since_entry=0.75,
-        previous_mode=0,
-        mode=1,
-        stage=0,
-    )
-    plain(jump, remember_visit=lambda model, run: None).move(model, run, 4, 2, np.array([1.0, -3.0]))
-    assert (run.y.tolist(), run.scale.tolist()) == ([1.0, -3.0], [2.0, 3.0])
-    assert (run.jumps_here, run.last_jump_phase, run.last_jump_cycle) == (here, 3.0, 2)
-    assert (run.jumps, run.last_fired, run.recent.tolist()) == (11, 4, [9, 9, 4, 9, 9, 9, 9, 9])
-    assert (run.mode, run.previous_mode, run.stage) == (2, 1, ENTERING)
-    assert (run.stay.tolist(), run.since_entry) == ([0.0, 0.75, 0.0], 0.0)
-
-
-@pytest.mark.parametrize(
-    ("speed", "acceleration", "last", "grazes"),
-    [
-        # The depth ``v^2 / 2 a`` of the dip, compared with a band of 1/2.
-        (2.0, 4.0, {}, True),
-        (2.0, -4.0, {}, True),
-        (2.1, 4.0, {}, False),
-        (-2.1, 4.0, {}, False),
-        # After a grazing by the same transition, on the way back, at most twice as fast.
-        (3.0, 1.0, {"way_in": -1.5}, True),
-        (-3.0, 1.0, {"way_in": 1.5}, True),
-        (3.1, 1.0, {"way_in": -1.5}, False),
-        (3.0, 1.0, {"way_in": 1.5}, False),
-        (3.0, 1.0, {"way_in": -1.5, "kind": TRANSVERSE}, False),
-        (3.0, 1.0, {"way_in": -1.5, "fired": 0}, False),
-    ],
-)
-def test_dips_that_the_tolerances_cannot_tell(speed, acceleration, last, grazes):
-    run = SimpleNamespace(
-        mode=0,
-        phase=0.0,
-        y=np.zeros(1),
-        last_transversality=last.get("way_in", 9.0),
-        last_kind=last.get("kind", GRAZING if last else TRANSVERSE),
-        last_fired=last.get("fired", 1),
-    )
-    model, work = SimpleNamespace(dimension=1), SimpleNamespace(gradient=None)
-    for found in (False, True):
-        tested = plain(
-            jump,
-            guard_acceleration=lambda *given: acceleration,
-            error_band=lambda *given: 0.5,
-            finds_surface=lambda model, transition, t, x, given, work, found=found: found and given == speed,
-        )
-        # What looks like a dip may be a flat or a jumping guard, whose surface is found.
-        hidden = found and not last
-        assert tested.is_grazing(model, None, run, 1, speed, work) == (grazes and not hidden)
-
-
-@pytest.mark.parametrize(
-    ("entry", "largest", "singular"), [(-9.0, 9.0, 0), (1.0, 5.0, 0), (np.inf, np.inf, 1)]
-)
-def test_matrices_that_are_not_finite_are_counted(entry, largest, singular):
-    run = SimpleNamespace(largest_saltation=5.0, singular_jumps=0)
-    work = SimpleNamespace(saltation=np.array([[0.5, entry], [0.0, 1.0]]))
-    plain(jump).judge(run, 2, work)
-    assert (run.largest_saltation, run.singular_jumps) == (largest, singular)

@@ -178,6 +178,14 @@ class TestTurns:
         run = run_of(left, fired=fired, jumps=needed - 1, end=0.0)[1]
         assert kernels.transitions_in_turn(model, run) == 0
 
+    def test_none_if_the_last_round_did_not_shorten(self):
+        for longer, turn in ((0.0, 2), (1.0, 0)):
+            left = geometric(0.5, count=40, turn=2)
+            # Rounds that begin with the other jump have all shortened.
+            left[0] = left[2] - (0.5 + longer) * (left[4] - left[2])
+            model, run = run_of(left, end=0.0, jumps=18)
+            assert kernels.transitions_in_turn(model, run) == turn
+
     def test_no_more_than_eight(self):
         model, run = run_of(geometric(0.5, count=63, turn=9), fired=tuple(range(1, 10)), jumps=63, end=0.0)
         assert kernels.transitions_in_turn(model, run) == 0

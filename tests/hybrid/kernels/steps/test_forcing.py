@@ -122,6 +122,11 @@ def test_arguments_of_exponentials_that_change(change, checked, found):
     work = SimpleNamespace(registers=np.full((3, 6), 99.0))
     assert bool(plain(forcing)._arguments_change(model, 1, None, 1, -1, 3.0, 0.5, work)) == found
     assert asked == [(3, -1, 3.0, 1.0, 0.25, 0.25)]
+    # Arguments come after all that depends on time.
+    model.forcing_kind, model.first_forcing = np.array([IN_TIME, IN_TIME, ARGUMENTS, TERMS]), [0, 0, 4]
+    model.programs.first = np.array([0, 0, 0, 0, 1, 3, 4])
+    assert bool(plain(forcing)._arguments_change(model, 1, None, 1, -1, 3.0, 0.5, work)) == found
+    assert asked[1:] == [(4, -1, 3.0, 1.0, 0.25, 0.25)]
     model.programs.first[:] = 0
     assert plain(forcing)._arguments_change(model, 1, None, 1, -1, 3.0, 0.5, work)
     assert not plain(forcing)._arguments_change(model_with(IN_TIME), 1, None, 1, -1, 3.0, 0.5, work)
@@ -193,7 +198,8 @@ class TestLongest:
         assert self.longest(yes, kinds=kinds, swings=True, calm=True)[1] == both[1:]
         assert self.longest(yes, kinds=kinds, calm=True)[1] == []
         # Calm is known of time alone, not of a clock.
-        assert self.longest(yes, kinds=kinds, calm=True, clock=1)[1] == both[:1]
+        for clock in (0, 1):
+            assert self.longest(yes, kinds=kinds, calm=True, clock=clock)[1] == both[:1]
 
     def test_coarse_pieces_are_counted(self):
         """More than ten tolerances, of 1 here, and of forcings in time."""

@@ -133,11 +133,12 @@ def test_a_gap_that_is_no_number_is_one():
     assert not follows([np.nan, 0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize("clock", [0, 3])
 @pytest.mark.parametrize("component", range(4))
-def test_a_series_on_a_clock_follows_the_field_at_its_pace(component):
+def test_a_series_on_a_clock_follows_the_field_at_its_pace(component, clock):
     """Up to a guard beyond which the mode has ended."""
     for share, expected in ((0.99, True), (1.01, False)):
         gaps = np.zeros(4)
         gaps[component] = share * ALLOWED[component] / 6.0
-        assert follows(gaps, clock=3) == expected
-        assert follows(gaps, clock=3, ends=True)
+        assert follows(gaps, clock=clock) == expected
+        assert follows(gaps, clock=clock, ends=True)

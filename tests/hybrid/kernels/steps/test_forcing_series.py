@@ -109,9 +109,9 @@ def test_a_guard_that_is_passed_on_the_clock(side):
 
 
 class TestExplainedSeries:
-    """A step of 1, of which ``explains`` says how much each trial is left by the forcing."""
+    """A step of a length, of which ``explains`` says how much each trial is left by the forcing."""
 
-    def step(self, follows, *, explains=lambda h: h, clock=-1, finite=True, unresolved=0):
+    def step(self, follows, *, explains=lambda h: h, clock=-1, finite=True, unresolved=0, length=1.0):
         asked = []
 
         def longest(model, method, run, path, order, told, nodes, timed, swings, h, work):
@@ -132,7 +132,7 @@ class TestExplainedSeries:
         )
         self.asked, self.run = asked, SimpleNamespace(mode=1, unresolved=unresolved)
         method, work = SimpleNamespace(series_nodes="nodes"), SimpleNamespace(series="series")
-        return tested.explained_series(None, method, self.run, 2, 5, clock, 1.0, work)
+        return tested.explained_series(None, method, self.run, 2, 5, clock, length, work)
 
     def test_a_series_that_is_not_finite(self):
         assert math.isnan(self.step(lambda h, noisy: True, finite=False))
@@ -154,8 +154,13 @@ class TestExplainedSeries:
 
     def test_no_step_is_shorter_than_rounding_allows(self):
         """64 units of the time 4, and one of the step; a clock has no time to measure."""
-        for clock, shortest in ((-1, 257.0 * EPSILON), (2, EPSILON)):
-            found = self.step(lambda h, noisy: False, clock=clock)
+        for clock, length, shortest in (
+            (-1, 1.0, 257.0 * EPSILON),
+            (-1, 64.0, 320.0 * EPSILON),
+            (0, 1.0, EPSILON),
+            (2, 0.25, 0.25 * EPSILON),
+        ):
+            found = self.step(lambda h, noisy: False, clock=clock, length=length)
             assert 0.5 * shortest < found <= shortest
             assert self.run.unresolved == 1
         # After many of them the longest step is taken.

@@ -22,9 +22,11 @@ CALM = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def memory(nodes=5):
-    # The last row of samples is one more than the nodes.
+    # The last row of samples is one more than the nodes; rows are no shorter than they must be.
     return SimpleNamespace(
-        registers=np.full((4, 6), 1e9), samples=np.full((nodes + 1, 6), 1e9), intervals=np.zeros((60, 2))
+        registers=np.full((4, 6), math.nan),
+        samples=np.full((nodes + 1, 9), math.nan),
+        intervals=np.zeros((60, 2)),
     )
 
 
@@ -90,6 +92,9 @@ class TestIsSteady:
         part = fixed(3.0, 5.0, -9.0, 9.0, 3.5, 4.0)
         assert self.steady(fixed(*CALM), part, fixed(*self.rising)) == (True, 0.0)
         assert self.steady(fixed(*CALM), fixed(*self.rising), part) == (True, 2.0)
+        # The middle alone is too narrow.
+        part = lambda middle, radius: (3.0, 5.0, -9.0, 9.0, *((3.0, 3.1) if radius > 0.0 else (3.0, 4.5)))  # noqa: E731
+        assert self.steady(fixed(*CALM), part, fixed(*self.rising)) == (False, 0.0)
         wider = fixed(3.0, 5.0, -9.0, 9.0, 3.5, 3.99)
         assert self.steady(fixed(*CALM), wider, fixed(*self.rising)) == (False, 0.0)
 
@@ -115,7 +120,7 @@ def test_samples():
     assert asked == [(2.0 * node, 0.0) for node in NODES]
     assert work.samples[:, :2].tolist() == [[8.0, 9.0]] * 6
     assert work.samples[:, 2:4].tolist() == [[-8.0, -7.0]] * 6
-    assert work.samples[:, 4:].tolist() == [*map(list, ends.values()), [1.0, 1.0]]
+    assert work.samples[:, 4:6].tolist() == [*map(list, ends.values()), [1.0, 1.0]]
 
 
 class TestSeen:
@@ -200,17 +205,18 @@ class TestJudged:
     forcing = (9.9, 12.1, -1.0, 1.0, 11.0, 11.0)
     wild = (-1e6, 1e6, -9.0, 9.0, 1e6, 1e6)
 
-    def work(self, part=part, forcing=forcing, noise=0.0, common=1.0):
+    def work(self, part=part, forcing=forcing, noise=0.0, common=1.0, falls=False):
         work = memory()
         work.registers[:] = self.wild, part, forcing, self.wild
-        work.samples[1] = 0.0, 0.0, 2.0 - noise, 2.0, 10.0 - noise, 10.0
-        work.samples[2] = 0.0, 0.0, 4.0, 4.0 + noise, 12.0, 12.0 + noise
+        one, other = (2, 1) if falls else (1, 2)
+        work.samples[one, :6] = 0.0, 0.0, 2.0 - noise, 2.0, 10.0 - noise, 10.0
+        work.samples[other, :6] = 0.0, 0.0, 4.0, 4.0 + noise, 12.0, 12.0 + noise
         # The largest low end less the smallest high end: what samples differ by.
-        work.samples[5] = 0.0, 0.0, 4.0, 4.0 - common, 12.0, 12.0 - common
+        work.samples[5, :6] = 0.0, 0.0, 4.0, 4.0 - common, 12.0, 12.0 - common
         return work
 
     def judged(self, work, *, whole=False, length=1.0, negligible=0.0, tolerance=0.0, between=0.25):
-        programs = SimpleNamespace(checked=np.array([1, 1, 0, 1, 1]))
+        programs = SimpleNamespace(checked=np.array([0, 0, 0, 1, 1]))
         return kernels._judged(programs, 2, 2, 1, whole, length, negligible, tolerance, between, work)
 
     def test_what_lies_beyond_the_samples(self):
@@ -223,8 +229,12 @@ class TestJudged:
             work = self.work(part=(*row, 0.0, 0.0, 0.0, 0.0))
             assert kernels._beyond(work.registers[1], 1, 1, work) == beyond
 
-    def test_what_stays_between_the_samples_is_explained(self):
-        assert self.judged(self.work()) == EXPLAINED
+    @pytest.mark.parametrize("falls", [False, True])
+    def test_what_stays_between_the_samples_is_explained(self, falls):
+        """Whether they rise or fall."""
+        assert self.judged(self.work(falls=falls)) == EXPLAINED
+        for row in ((1.7, 4.0, 1.0, 1.0, 1.7, 1.7), (2.0, 4.3, 1.0, 1.0, 4.3, 4.3)):
+            assert self.judged(self.work(part=row, falls=falls)) == HIDDEN
 
     @pytest.mark.parametrize("row", ["part", "forcing"])
     @pytest.mark.parametrize("side", [-1.0, 1.0])
@@ -311,8 +321,9 @@ class TestJudged:
             assert self.judged(work, whole=False) == HIDDEN
         turning = self.work(part=(0.0, 9.0, -0.1, 0.1, 8.0, 8.0))
         assert self.judged(turning, whole=True) == HIDDEN
-        endless = self.work(forcing=(0.0, math.inf, 0.0, 1.0, 50.0, 50.0))
-        assert self.judged(endless, whole=True) == HIDDEN
+        for ends in ((0.0, math.inf), (-math.inf, 99.0)):
+            endless = self.work(forcing=(*ends, 0.0, 1.0, 50.0, 50.0))
+            assert self.judged(endless, whole=True) == HIDDEN
 
 
 class TestUnseen:

@@ -130,6 +130,12 @@ class TestErrorRatio:
         found = self.ratio([0.0, 0.0, 4.0, 0.0], new=new, tangents=2)
         assert found == pytest.approx(self.H * 4.0 / (0.25 * (mean + 8.0)) / math.sqrt(2.0), **CLOSE)
 
+    def test_a_vector_of_one_component_has_no_absolute_size(self):
+        work = SimpleNamespace(error=np.array([0.0, 4.0]), second_error=np.zeros(2), new=np.array([0.0, 8.0]))
+        method = SimpleNamespace(atol=99.0, rtol=0.25)
+        found = kernels.error_ratio(method, self.H, np.zeros(2), 1, 1, work)
+        assert found == pytest.approx(self.H * 4.0 / (0.25 * (8.0 + 8.0)), **CLOSE)
+
     def test_the_worst_of_state_and_vectors_counts(self):
         """An error of one vector is not diluted by others that have none."""
         new = (0.0, 0.0, 8.0, 0.0, 8.0, 0.0)
@@ -266,7 +272,7 @@ class TestFirstStep:
     The tolerances of state and vectors are 1e-3 of their sizes and 1e-5.
     """
 
-    def first(self, y, rates, turned, *, remaining=1e9, period=0.0, longest=math.inf, tangents=0):
+    def first(self, y, rates, turned, *, remaining=1e9, period=0.0, longest=math.inf, tangents=0, rtol=1e-3):
         """The rates are ``turned`` after the first trial step, which is kept."""
 
         def field(mode, t, x, parameters, out):
@@ -276,7 +282,7 @@ class TestFirstStep:
         model = SimpleNamespace(
             dimension=2, parameters=None, period=period, field=field, variational_field=field
         )
-        method = SimpleNamespace(rtol=1e-3, atol=1e-5, max_step=longest, exponent=0.25)
+        method = SimpleNamespace(rtol=rtol, atol=1e-5, max_step=longest, exponent=0.25)
         work = SimpleNamespace(trial=np.zeros(len(y)), stages=np.zeros((2, len(y) + 1)))
         work.stages[0, : len(y)] = rates
         return kernels.starting_step(model, method, 1, 7.0, np.array(y), tangents, remaining, work)
@@ -297,6 +303,21 @@ class TestFirstStep:
         unit = 1e4 * self.SCALE / (2.0 / math.sqrt(2.0))
         found = self.first((9.0, -9.0), (0.0, -2.0), (0.0, -2.0))
         assert found == pytest.approx(unit * (0.01 / 1e4) ** 0.25, **CLOSE)
+
+    @pytest.mark.parametrize("speed", [1e-6, 1e-3, 2.0])
+    def test_a_slow_orbit(self, speed):
+        """However few tolerances it moves per unit of time."""
+        found = self.first((9.0, -9.0), (speed, -speed), (speed, -speed))
+        assert found == pytest.approx(1e4 * self.SCALE / speed * (0.01 / 1e4) ** 0.25, **CLOSE)
+
+    def test_a_state_of_many_tolerances_changes_by_its_size(self):
+        """The means of both components count: of 9 and 3 in tolerances, and of rates of 2 and 0."""
+        scales = np.array([9e-9 + 1e-5, 3e-9 + 1e-5])
+        size = np.sqrt(np.mean((np.array([9.0, 3.0]) / scales) ** 2))
+        speed = 2.0 / scales[0] / math.sqrt(2.0)
+        found = self.first((9.0, -3.0), (2.0, 0.0), (2.0, 0.0), rtol=1e-9)
+        assert size > 1e4
+        assert found == pytest.approx(size / speed * (0.01 / size) ** 0.25, **CLOSE)
 
     def test_a_large_state_changes_by_its_size(self):
         """With an absolute tolerance that does not count it is 1000 tolerances, here of many more."""

@@ -66,6 +66,13 @@ def test_replace_changes_a_copy():
     assert changed.vector is inner.vector
 
 
+def test_replace_changes_arrays_and_their_shapes():
+    changed = parcel().replace(matrix=np.arange(12.0).reshape(3, 4), vector=np.zeros(5), size=0.25)
+    out = np.zeros(6)
+    read(Box(places=np.zeros(2, dtype=np.int64), parcel=changed), out)
+    np.testing.assert_array_equal(out, [-7.0, 0.25, 0.5, 4.0, 23.0, 345.0])
+
+
 def test_fields_are_fixed():
     with pytest.raises(AttributeError, match=r"Parcel.count is fixed; replace\(count=...\) makes a copy."):
         parcel().count = 3
