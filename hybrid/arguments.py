@@ -53,6 +53,16 @@ def not_negative(name: str, value: object, wanted: str = "be at least 0", *, inf
     return found
 
 
+def result(what: str, value: float) -> float:
+    """A result that must be finite and not zero; else the arguments are too far apart for floats."""
+    if not isfinite(value) or value == 0.0:
+        raise ArgumentError(
+            f"{what} is {value}: the arguments are too large, too small or too far apart for floating point. "
+            "Use other units."
+        )
+    return value
+
+
 def count(name: str, value: object, least: int, most: int = LARGEST_COUNT, of: str = "") -> int:
     """A whole number from ``least`` to ``most``; ``of`` says what ``most`` is."""
     whole = whole_number(value)
@@ -192,7 +202,9 @@ def _as_float(value: object) -> float | None:
     try:
         return float(value)
     except OverflowError:
-        return -inf if str(value).startswith("-") else inf
+        return -inf if value < 0 else inf
+    except Exception:  # whatever a class of the caller raises when it is converted
+        return None
 
 
 def floats(value: object) -> np.ndarray | None:

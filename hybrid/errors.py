@@ -5,8 +5,21 @@ from __future__ import annotations
 import difflib
 import reprlib
 from collections.abc import Iterable
+from math import log10
 
-_short = reprlib.Repr()
+
+class _Short(reprlib.Repr):
+    """Short representations; an integer that Python refuses to write in digits is rounded."""
+
+    def repr_int(self, x: int, level: int) -> str:
+        # Python refuses texts of more than 4300 digits, and a conversion takes quadratic time.
+        if x.bit_length() > 1000:
+            digits = int(x.bit_length() * log10(2))
+            return f"{'-' if x < 0 else ''}10**{digits}, roughly"
+        return super().repr_int(x, level)
+
+
+_short = _Short()
 _short.maxstring = _short.maxother = 100
 
 

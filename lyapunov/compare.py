@@ -170,7 +170,7 @@ def compare_models(
     ('rigid', 'Hertz')
     """
     models = {
-        name: as_system(f"systems[{name!r}]", system)
+        name: as_system(f"systems[{arguments.shown(name)}]", system)
         for name, system in arguments.mapping("systems", systems, "map names to models").items()
     }
     if not models:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # Distinct for the colour-blind and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
 INK = "#333333"
+# Points of a section that spread less than this share of the orbit are drawn as one fixed point.
+SAME_POINT = 1e-6
 STYLE: Any = {
     "figure.constrained_layout.use": True,
     "savefig.dpi": 160,
@@ -94,11 +96,11 @@ def plot_convergence(
         Axes to draw into; by default those of a new figure.
     """
     histories = {
-        label: _numbers(f"estimates[{label!r}]", estimate, 1)
+        label: _numbers(f"estimates[{arguments.shown(label)}]", estimate, 1)
         for label, estimate in arguments.mapping("estimates", estimates, "map labels to histories").items()
     }
     points = {
-        label: _pair(f"points[{label!r}]", pair)
+        label: _pair(f"points[{arguments.shown(label)}]", pair)
         for label, pair in arguments.mapping("points", points, "map labels to numbers and values").items()
     }
     for name, text in (("points_label", points_label), ("truth_label", truth_label)):
@@ -154,13 +156,16 @@ def plot_phase_portrait(
     system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
     i, j = as_component("x", system.state_names, x), as_component("y", system.state_names, y)
     marks = None if section is None else _numbers("section", section, 2)
+    if marks is not None and marks.shape[1] != system.dimension:
+        raise arguments.refusal("section", f"hold points of {system.dimension} components", section)
     across, up = axis_labels(labels, system.state_names[i], system.state_names[j])
     (ax,) = axes_for(ax, 1, figsize=FIGURE)
     orbit = _dense(arc)
     ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
     if marks is not None:
         # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
-        size = 2.0 if np.ptp(marks, axis=0).max() > 1e-6 else 26.0
+        spread = np.ptp(marks, axis=0) > SAME_POINT * np.ptp(orbit, axis=0) if len(marks) else False
+        size = 2.0 if np.any(spread) else 26.0
         ax.scatter(
             marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
         )

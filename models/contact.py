@@ -80,7 +80,7 @@ class Rigid:
     e: float = 1.0
 
     def __post_init__(self) -> None:
-        arguments.not_negative("e", self.e)
+        object.__setattr__(self, "e", arguments.not_negative("e", self.e))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -113,7 +113,7 @@ class Hertz:
     K: float
 
     def __post_init__(self) -> None:
-        arguments.positive("K", self.K)
+        object.__setattr__(self, "K", arguments.positive("K", self.K))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -147,8 +147,9 @@ class Hertz:
         doi:10.1017/CBO9781139171731.
         """
         mass, speed = arguments.positive("mass", mass), arguments.positive("speed", speed)
-        deepest = (5 * mass * speed**2 / (4 * self.K)) ** 0.4
-        return 0.8 * sqrt(pi) * gamma(0.4) / gamma(0.9) * deepest / speed
+        # Powers of each number alone: the square of a speed may be too large or too small for a float.
+        deepest_over_speed = 1.25**0.4 * mass**0.4 / self.K**0.4 / speed**0.2
+        return arguments.result("duration", 0.8 * sqrt(pi) * gamma(0.4) / gamma(0.9) * deepest_over_speed)
 
 
 @dataclass(frozen=True)
@@ -175,8 +176,8 @@ class HuntCrossley:
     alpha: float
 
     def __post_init__(self) -> None:
-        arguments.positive("K", self.K)
-        arguments.not_negative("alpha", self.alpha)
+        object.__setattr__(self, "K", arguments.positive("K", self.K))
+        object.__setattr__(self, "alpha", arguments.not_negative("alpha", self.alpha))
 
     @classmethod
     def from_restitution(cls, e: float, K: float, speed: float) -> HuntCrossley:
@@ -197,7 +198,7 @@ class HuntCrossley:
         ArgumentError
             If ``e`` is out of its range.
         """
-        _check_restitution(e)
+        e = _restitution(e)
         K, speed = arguments.positive("K", K), arguments.positive("speed", speed)
         if e == 1:
             return cls(K, 0.0)
@@ -209,7 +210,7 @@ class HuntCrossley:
         # The root is u = 3/2 (1 - e) to first order, and lies above a sixth of that.
         least = -log1p(-e * (1 - e) / 4)
         w = _root(lambda w: log1p(u(w)) + w - (1 + e) * u(w), least, (1 + e) / e)
-        return cls(K, 2 * u(w) / (3 * speed))
+        return cls(K, arguments.result("alpha", 2 * u(w) / 3 / speed))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -250,8 +251,8 @@ class KelvinVoigt:
     c: float
 
     def __post_init__(self) -> None:
-        arguments.positive("k", self.k)
-        arguments.not_negative("c", self.c)
+        object.__setattr__(self, "k", arguments.positive("k", self.k))
+        object.__setattr__(self, "c", arguments.not_negative("c", self.c))
 
     @classmethod
     def from_restitution(cls, e: float, mass: float, duration: float) -> KelvinVoigt:
@@ -274,17 +275,19 @@ class KelvinVoigt:
         ArgumentError
             If ``e`` is out of its range.
         """
-        _check_restitution(e)
+        e = _restitution(e)
         mass, duration = arguments.positive("mass", mass), arguments.positive("duration", duration)
         if e == 1:
-            return cls(mass * (pi / duration) ** 2, 0.0)
+            omega = pi / duration
+            return cls(arguments.result("k", mass * omega * omega), 0.0)
         if e > CRITICAL_RESTITUTION:
             theta = _root(lambda theta: exp(-2 * theta / tan(theta)) - e, LEAST_ANGLE, pi / 2)
             zeta, omega = cos(theta), 2 * theta / (duration * sin(theta))
         else:
             theta = _root(lambda theta: e - exp(-2 * theta / tanh(theta)), LEAST_ANGLE, LARGEST_ANGLE)
             zeta, omega = cosh(theta), 2 * theta / (duration * sinh(theta))
-        return cls(mass * omega**2, 2 * zeta * omega * mass)
+        k = arguments.result("k", mass * omega * omega)
+        return cls(k, arguments.result("c", 2 * zeta * omega * mass))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -338,7 +341,7 @@ def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[st
     >>> {name: sorted(law.parameters) for name, law in laws.items()}
     {'rigid': ['e'], 'Kelvin-Voigt': ['c', 'k'], 'Hunt-Crossley': ['K', 'alpha']}
     """
-    _check_restitution(e)
+    e = _restitution(e)
     hertz = Hertz(K)
     return {
         "rigid": Rigid(e),
@@ -377,9 +380,11 @@ def _hertz_force(penetration: Any, p: Any) -> Any:
     return p.K * np.maximum(penetration, 0.0) ** 1.5
 
 
-def _check_restitution(e: float) -> None:
-    if not 0 < arguments.not_negative("e", e, RESTITUTION) <= 1:
+def _restitution(e: float) -> float:
+    found = arguments.not_negative("e", e, RESTITUTION)
+    if not 0 < found <= 1:
         raise arguments.refusal("e", RESTITUTION, e)
+    return found
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

@@ -78,8 +78,11 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
     f, A, w = arguments.not_negative("f", f), arguments.number("A", A), arguments.positive("w", w)
     if w == 1.0:
         raise ArgumentError("w must not be 1: the motion has no bound at resonance.")
+    arguments.result("pi / w", np.pi / w)
     D = -f * np.tan(np.pi / (2 * w))
-    X = np.sqrt(np.maximum((A / (1 - w**2)) ** 2 - (D / w) ** 2, 0.0))
+    forced, friction = abs(A / ((1 - w) * (1 + w))), abs(D / w)
+    # The squares of the two may be too large for a float.
+    X = np.sqrt(np.maximum(forced - friction, 0.0)) * np.sqrt(forced + friction)
     s = np.linspace(0.0, np.pi / w, 4001)[1:-1]
     v = f * np.sin(s) + D * (np.cos(s) - np.cos(w * s)) - X * w * np.sin(w * s)
     return float(X) if v.max() < 0 else np.nan

@@ -6,7 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid import arguments
+from hybrid import ArgumentError, arguments
+
+# Of a matrix with a smaller singular value, as a share of its terms, rounding leaves less than six digits.
+SINGULAR = 1e-10
 
 
 class OneImpactOrbit(NamedTuple):
@@ -42,12 +45,27 @@ def one_impact_orbits(
         Zero, one or two orbits, the fastest first; unstable orbits are included.
     """
     k, c, A, d = (arguments.number(*each) for each in (("k", k), ("c", c), ("A", A), ("d", d)))
-    w, r, n = arguments.positive("w", w), arguments.not_negative("r", r), arguments.count("n", n, 1)
+    w, r, n = arguments.positive("w", w), arguments.not_negative("r", r), arguments.count("n", n, 1, 1000)
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return _orbits(k, c, A, w, d, r, n)
+    except (ArithmeticError, ValueError) as error:  # a LinAlgError is a ValueError
+        raise ArgumentError(
+            f"one_impact_orbits: the closed form does not exist, or leaves the range of floating point, at "
+            f"k = {k}, c = {c}, A = {A}, w = {w}, d = {d}, r = {r}, n = {n}: {error}."
+        ) from error
+
+
+def _orbits(k: float, c: float, A: float, w: float, d: float, r: float, n: int) -> list[OneImpactOrbit]:
     T = 2 * np.pi * n / w
     R = A / np.hypot(k - w**2, c * w)
     psi = np.arctan2(c * w, k - w**2)
     phi_T = _free_flow(k, c, T)
-    a, b = np.linalg.solve(phi_T - np.eye(2), phi_T @ (0.0, r) + (0.0, 1.0))
+    closing = phi_T - np.eye(2)
+    scaled = closing * np.array([[1.0, w], [1 / w, 1.0]])
+    if not np.linalg.svd(scaled, compute_uv=False)[-1] > SINGULAR * np.abs(scaled + np.eye(2)).max():
+        raise np.linalg.LinAlgError("the free motion returns to its start, so that the matrix is singular")
+    a, b = np.linalg.solve(closing, phi_T @ (0.0, r) + (0.0, 1.0))
 
     orbits = []
     for V in np.roots([a**2 + (b / w) ** 2, -2 * a * d, d**2 - R**2]):
@@ -94,8 +112,17 @@ def _highest_top(flight: _Flight, times: np.ndarray) -> float:
 
 def _free_flow(k: float, c: float, t: float | np.ndarray) -> np.ndarray:
     """``expm(t [[0, 1], [-k, -c]])``, ``t.shape + (2, 2)``; valid also for critical damping."""
-    w_d = np.sqrt(complex(k - c**2 / 4))
     t = np.asarray(t)[..., None, None]
-    sine = t * np.sinc(w_d * t / np.pi)
     traceless = np.array([[c / 2, 1.0], [-k, -c / 2]])
-    return (np.exp(-c * t / 2) * (np.cos(w_d * t) * np.eye(2) + sine * traceless)).real
+    squared = k - c**2 / 4
+    if squared >= 0:
+        w_d = np.sqrt(squared)
+        decay = np.exp(-c * t / 2)
+        cosine, sine = decay * np.cos(w_d * t), decay * t * np.sinc(w_d * t / np.pi)
+    else:
+        # The larger of the two real exponents; the hyperbolic functions alone may be too large for a float.
+        q = np.sqrt(-squared)
+        far = -(c / 2 + np.copysign(q, c))
+        slow = np.exp(max(far, k / far) * t)
+        cosine, sine = slow * (1 + np.exp(-2 * q * t)) / 2, -slow * np.expm1(-2 * q * t) / (2 * q)
+    return cosine * np.eye(2) + sine * traceless

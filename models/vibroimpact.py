@@ -99,10 +99,14 @@ def hertz_stiffness(
     """
     E, q = arguments.positive("E", E), arguments.positive("q", q)
     A, B = arguments.positive("A", A), arguments.positive("B", B)
-    if not abs(arguments.number("nu", nu)) < 1:
+    nu = arguments.number("nu", nu)
+    if not abs(nu) < 1:
         raise arguments.refusal("nu", "lie between -1 and 1", nu)
-    d1 = d2 = (1 - nu**2) / (E * np.pi)
-    return float(4 / 3 * q / ((d1 + d2) * np.sqrt(A + B)))
+    # E / (1 - nu^2) = 1 / (pi d), and the sum of two curvatures may be too large for a float.
+    curvature = 2 * np.sqrt(A / 4 + B / 4)
+    with np.errstate(over="ignore", under="ignore"):
+        stiffness = 2 / 3 * np.pi * q * (E / ((1 - nu) * (1 + nu))) / curvature
+    return arguments.result("hertz_stiffness", float(stiffness))
 
 
 def _field(t, x, p, Fcon):

@@ -96,6 +96,12 @@ def _exponents(fundamental: np.ndarray, span: float) -> np.ndarray:
 
 def errors_of(found: Answer, truth: Answer) -> dict[str, float]:
     """Errors of all quantities that both have."""
+    # Infinite entries of both, as of a singular saltation matrix, have no difference.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return _errors_of(found, truth)
+
+
+def _errors_of(found: Answer, truth: Answer) -> dict[str, float]:
     errors = {"state": _largest(found.state - truth.state)}
     for name in QUANTITIES[1:]:
         mine, true = getattr(found, name), getattr(truth, name)
@@ -104,9 +110,8 @@ def errors_of(found: Answer, truth: Answer) -> dict[str, float]:
         if mine.shape != true.shape:
             errors[name] = np.inf
         elif name in ("times", "exponents"):
-            with np.errstate(invalid="ignore"):
-                # Two directions that are both annihilated do not differ.
-                errors[name] = _largest(np.where(mine == true, 0.0, mine - true))
+            # Two directions that are both annihilated do not differ.
+            errors[name] = _largest(np.where(mine == true, 0.0, mine - true))
         else:
             size = np.max(np.abs(true), axis=(-2, -1), keepdims=True, initial=0.0)
             errors[name] = _largest((mine - true) / np.where(size > 0, size, 1.0))

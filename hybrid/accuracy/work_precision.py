@@ -253,7 +253,7 @@ def work_precision(
     _check_clock(clock)
     known_errors = {
         arguments.known("reference_error: Quantity", quantity, QUANTITIES, "Quantities"): (
-            arguments.not_negative(f"reference_error[{quantity!r}]", value)
+            arguments.not_negative(f"reference_error[{arguments.shown(quantity)}]", value)
         )
         for quantity, value in arguments.mapping("reference_error", reference_error).items()
     }
@@ -316,7 +316,8 @@ def _run(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
         return lambda rtol: _own(attrs.evolve(method, rtol=rtol, atol=rtol * ratio), *problem)
     if isinstance(method, type) or not callable(method):
         raise ArgumentError(
-            f"Method {name!r} must be a solver, Taylor() say, or a function of the tolerance; got {method!r}."
+            f"Method {arguments.shown(name)} must be a solver, Taylor() say, or a function of the tolerance; "
+            f"got {arguments.shown(method)}."
         )
     return method
 

@@ -97,12 +97,19 @@ class Newton:
     def begin(cls, shot: Shot, atol: float, free_period: bool) -> Newton:
         """From the first shot; sizes below the solver's absolute tolerance count as that."""
         scale = np.maximum(shot.magnitude, max(atol, np.finfo(float).tiny))
-        return cls(scale, scale, np.zeros_like(scale), free_period, shot.point.x, shot.field / scale)
+        with np.errstate(over="ignore"):  # a field of 1e300 beside a component of 1e-14
+            plane = shot.field / scale
+        return cls(scale, scale, np.zeros_like(scale), free_period, shot.point.x, plane)
 
     def advanced(self, shot: Shot, better: Shot) -> Newton:
         """After the step from a shot to a better one."""
         scale = np.maximum(self.scale, better.magnitude)
         return attrs.evolve(self, scale=scale, moved=better.point.x - shot.point.x)
+
+    def measurable(self, shot: Shot) -> bool:
+        """Whether the gap and its derivatives in units of the scale are within the range of floats."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return bool(np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot))))
 
     def step(self, shot: Shot, smallest: float | None = None) -> tuple[np.ndarray, float]:
         """Newton step of the state and of the period.

@@ -272,7 +272,7 @@ class _Shooting:
         """Newton's method from ``point``; the period may be unknown too."""
         shot, iterations = self.shoot(point), 0
         newton = Newton.begin(shot, self.solver.atol, free_period)
-        while iterations < max_iterations and shot.whole:
+        while iterations < max_iterations and shot.whole and newton.measurable(shot):
             if shot.closes(tolerance, FINEST_GAP * EPSILON * shot.magnitude):
                 break
             better = self._along(shot, newton)
@@ -368,7 +368,10 @@ class _Shooting:
     def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
         """The same orbit from the point of its arc, both sides of jumps included, nearest to the guess."""
         arc = orbit.arc(self.solver)
-        i = int(np.argmin(np.linalg.norm(arc.x - guess.x, axis=1)))
+        extent = np.ptp(arc.x, axis=0)
+        # Distances in units of the orbit, so that those of the states do not matter.
+        apart = (arc.x - guess.x) / np.where(extent > 0, extent, 1.0)
+        i = int(np.argmin(np.linalg.norm(apart, axis=1)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: Shot, iterations: int, status: Status) -> PeriodicOrbit:
@@ -456,7 +459,7 @@ class _Shooting:
         """
         if shot.end_mode != shot.mode:
             return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
-        if not shot.whole:
+        if not shot.whole or not newton.measurable(shot):
             return "the tangent vectors left the range of numbers"
         growth = shot.growth(newton.scale)
         if not growth * EPSILON < 1.0:

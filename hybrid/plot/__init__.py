@@ -39,7 +39,8 @@ def drawn(result: Any, **options: Any) -> Any:
     for name, draw in DATASETS.items():
         if name in getattr(result, "data_vars", ()):
             return draw(result, **options)
-    if callable(getattr(result, "plot", None)):
+    # A dataset has an attribute plot that only says that it cannot be called.
+    if callable(getattr(result, "plot", None)) and not hasattr(result, "data_vars"):
         return result.plot(**options)
     wanted = "be a system, an arc, a section, an orbit, a spectrum or a chart"
     raise arguments.refusal("result", wanted, result)

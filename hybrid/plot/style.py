@@ -23,7 +23,8 @@ def as_component(name: str, names: Sequence[str], component: object) -> int:
     if index is not None:
         if not -len(names) <= index < len(names):
             raise ArgumentError(
-                f"{name}: State component {component} does not exist; the state has {len(names)} components."
+                f"{name}: State component {arguments.shown(index)} does not exist; the state has "
+                f"{len(names)} components."
             )
         return index % len(names)
     return list(names).index(
@@ -50,7 +51,10 @@ def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) ->
 
         size = figsize or (7.0, 0.8 + 1.5 * count)
         return plt.subplots(count, 1, sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
-    axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
+    try:
+        axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
+    except Exception:  # whatever an object that is no array of axes raises when it is converted
+        axes = np.array([_as_axes(ax)], dtype=object)
     for each in axes:
         _as_axes(each)
     if len(axes) != count:

@@ -108,7 +108,9 @@ def _table_of_mappings(over: Sequence[Any]) -> Points:
                 f"over[{i}] must have the names of over[0], {', '.join(map(str, names))}; "
                 f"got {', '.join(map(str, row)) or 'none'}."
             )
-    columns = {name: _numbers(f"over: {name!r}", [row[name] for row in rows]) for name in names}
+    columns = {
+        name: _numbers(f"over: {arguments.shown(name)}", [row[name] for row in rows]) for name in names
+    }
     return _table(POINT, columns, {})
 
 
@@ -119,7 +121,9 @@ def _table_of_dataset(over: Any) -> Points:
             "Give the values of each axis as a mapping for a grid."
         )
     (dim,) = map(str, over.dims)
-    columns = {str(name): _numbers(f"over[{name!r}]", each) for name, each in over.data_vars.items()}
+    columns = {
+        str(name): _numbers(f"over[{arguments.shown(name)}]", each) for name, each in over.data_vars.items()
+    }
     if not columns:
         raise ArgumentError("over must have variables, which are what varies; this xarray.Dataset has none.")
     return _table(dim, columns, {str(name): dict(each.attrs) for name, each in over.data_vars.items()})

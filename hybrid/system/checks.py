@@ -118,7 +118,7 @@ def _check_period_function(variables: Variables, period: Callable[..., Any]) -> 
     title = "HybridSystem: period"
     value = _call(title, period, (variables.parameter_view(variables.defaults),), "p")
     if value is not None and not _is_number(value[0]):
-        raise ModelError(f"{title} must return a number; got {value[0]!r}.")
+        raise ModelError(f"{title} must return a number; got {arguments.shown(value[0])}.")
 
 
 def _check_period(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
@@ -177,12 +177,14 @@ def _check_value(variables: Variables, function: ModelFunction, value: Any) -> N
             if not _is_number(value):
                 raise ModelError(
                     f"{function.title} must return one number, positive where the guard may fire, or True or "
-                    f"False; got {value!r}."
+                    f"False; got {arguments.shown(value)}."
                 )
             return
         # A boolean has no zero crossing and no slope.
         if isinstance(value, bool | np.bool_) or not _is_number(value):
-            raise ModelError(f"{function.title} must return one number that changes sign; got {value!r}.")
+            raise ModelError(
+                f"{function.title} must return one number that changes sign; got {arguments.shown(value)}."
+            )
         return
     values = _as_sequence(function.title, value, f"one value per state ({_names(variables)})")
     if len(values) != function.size:
@@ -232,10 +234,12 @@ def _is_scalar(value: Any) -> bool:
 def _check_numbers(title: str, values: list[Any]) -> None:
     for i, value in enumerate(values):
         if not _is_number(value):
-            raise ModelError(f"{title}: value {i} is not a number: {value!r}.")
+            raise ModelError(f"{title}: value {i} is not a number: {arguments.shown(value)}.")
 
 
 def _is_number(value: Any) -> bool:
+    if np.ma.is_masked(value):
+        return False
     if isinstance(value, np.ndarray):
         return _is_scalar(value) and value.dtype.kind in "fiub"
     return isinstance(value, numbers.Real | np.bool_) and not isinstance(value, np.timedelta64)

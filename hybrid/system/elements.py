@@ -214,7 +214,10 @@ class Transition(Portable):
 
     @name.default
     def _default_name(self) -> str:
-        return f"{self.source}->{END if self.target is None else self.target}"
+        target = END if self.target is None else self.target
+        if not (isinstance(self.source, str) and isinstance(target, str)):
+            return ""  # their validators, which run later, say so
+        return f"{self.source}->{target}"
 
     @property
     def is_marker(self) -> bool:

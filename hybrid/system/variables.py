@@ -179,15 +179,19 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     """Names of the components of a state, or their number."""
     if isinstance(value, bool | str):
         raise ModelError(
-            f"HybridSystem: state must be a tuple of names or a number of components; got {value!r}. "
-            f"Write state=({value!r},) for one component."
+            "HybridSystem: state must be a tuple of names or a number of components; got "
+            f"{arguments.shown(value)}. Write state=({arguments.shown(value)},) for one component."
         )
     components = arguments.whole_number(value)
     if components is not None:
         if components < 1:
-            raise ModelError(f"HybridSystem: state needs at least one component; got {value}.")
+            shown = arguments.shown(components)
+            raise ModelError(f"HybridSystem: state needs at least one component; got {shown}.")
         if components > MOST_COMPONENTS:
-            raise ModelError(f"HybridSystem: state has at most {MOST_COMPONENTS} components; got {value}.")
+            raise ModelError(
+                f"HybridSystem: state has at most {MOST_COMPONENTS} components; got "
+                f"{arguments.shown(components)}."
+            )
         return components
     # A set has no order.
     if not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1):
@@ -212,8 +216,8 @@ def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
     for name in names:
         if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name[0] == "_":
             raise ModelError(
-                f"HybridSystem: {kind} name {name!r} cannot be written as an attribute. Use a Python "
-                "identifier that is not a keyword and does not begin with an underscore."
+                f"HybridSystem: {kind} name {arguments.shown(name)} cannot be written as an attribute. Use a "
+                "Python identifier that is not a keyword and does not begin with an underscore."
             )
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

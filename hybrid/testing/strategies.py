@@ -234,5 +234,5 @@ def _grid(centre: float, half: float) -> SearchStrategy[float]:
 def _time_span(t_span: Any) -> tuple[float, float]:
     begin, end = arguments.time_span("t_span", t_span)
     if not begin < end:
-        raise ArgumentError(f"t_span must be (t0, t1) with t0 < t1; got {t_span!r}.")
+        raise ArgumentError(f"t_span must be (t0, t1) with t0 < t1; got {arguments.shown(t_span)}.")
     return begin, end

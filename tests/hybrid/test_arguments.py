@@ -8,7 +8,9 @@ from decimal import Decimal
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
+import xarray as xr
 
 import hybrid
 import hybrid.plot
@@ -199,7 +201,32 @@ class Unwilling:
         raise ValueError("no items")
 
 
+class UnwillingFloat(float):
+    """A number that raises an error of its own when it is converted."""
+
+    def __float__(self):
+        raise RuntimeError("no number")
+
+
 ODDITIES = {
+    # Python refuses to write it in digits.
+    "long integer": -(10**5000),
+    "unwilling number": UnwillingFloat(0.5),
+    "largest": 1.7e308,
+    "large": -1e300,
+    "small": 1e-160,
+    "smallest": 5e-324,
+    "large pair": (-1e300, 1e308),
+    "half precision": np.float16(0.5),
+    "largest unsigned": np.uint64(2**64 - 1),
+    "empty points": np.zeros((0, 2)),
+    "column of objects": np.array([[0.5], [0.75]], object),
+    "zero-dimensional object": np.array(None),
+    "masked": np.ma.masked,
+    "dataset": xr.Dataset({"a": 1.0}),
+    "series": pd.Series({"q": 0.5, "v": 0.25}),
+    "missing": pd.NA,
+    "integer as a name": {10**5000: 1.0},
     "unwilling": Unwilling(),
     "object": object(),
     "int": int,

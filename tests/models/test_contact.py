@@ -1,6 +1,7 @@
 """Contact laws compared with an impact in closed form, and with each other where they must agree."""
 
 import math
+from fractions import Fraction
 
 import mpmath as mp
 import numpy as np
@@ -191,3 +192,28 @@ def test_hunt_crossley_contracts_half_as_much_again():
 def test_a_restitution_that_no_compliant_contact_has(e):
     with pytest.raises(hybrid.ArgumentError, match=r"^e must satisfy 0 < e <= 1 in a compliant.*; got"):
         matched_laws(K, MASS, SPEED, e)
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.longdouble, np.array, Fraction])
+def test_a_number_of_any_kind_is_computed_with_as_a_float(kind):
+    """In numbers of half or single precision the results would have three or seven digits."""
+    stiffness, part = 2.0**10, 0.75
+    assert hertz_stiffness(E=kind(stiffness), nu=kind(part)) == hertz_stiffness(E=stiffness, nu=part)
+    assert matched_laws(kind(stiffness), 3.0, 0.5, kind(part)) == matched_laws(stiffness, 3.0, 0.5, part)
+    assert type(Rigid(kind(part)).e) is float
+
+
+def test_the_stiffness_of_an_unsigned_integer_does_not_overflow():
+    assert Hertz(np.uint64(2**63)).duration(1.0, 1.0) == pytest.approx(Hertz(2.0**63).duration(1.0, 1.0))
+
+
+@pytest.mark.parametrize(("mass", "speed"), [(1e-3, 1e300), (1e300, 1e-300), (1e-300, 1e-200)])
+def test_the_duration_of_an_impact_whose_energy_is_beyond_the_range_of_floats(mass, speed):
+    exact = 1.6 * mp.sqrt(mp.pi) / 2 * mp.gamma(0.4) / mp.gamma(0.9)
+    exact *= (mp.mpf(5) * mass * mp.mpf(speed) ** 2 / (4 * mp.mpf(1e8))) ** mp.mpf(0.4) / speed
+    assert Hertz(1e8).duration(mass, speed) == pytest.approx(float(exact), rel=1e-12)
+
+
+def test_a_law_that_no_float_can_hold_says_so():
+    with pytest.raises(hybrid.ArgumentError, match="k is inf: the arguments are too large, too small"):
+        KelvinVoigt.from_restitution(0.8, 90.0, 1e-300)

@@ -150,3 +150,16 @@ def test_a_stop_ends_once(f, w, size, start):
     )
     assert arc.status.code is hybrid.StatusCode.SUCCESS
     assert len(set(arc.jumps.t)) == len(arc.jumps)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-160, 1e160, 1e300])
+def test_den_hartogs_amplitude_scales_with_the_forces(size):
+    """The squares of the amplitudes are beyond the range of floats."""
+    assert den_hartog_amplitude(0.5 * size, size, 0.8) == pytest.approx(
+        size * den_hartog_amplitude(0.5, 1.0, 0.8), rel=1e-14
+    )
+
+
+def test_a_forcing_too_slow_for_floats():
+    with pytest.raises(hybrid.ArgumentError, match="pi / w is inf"):
+        den_hartog_amplitude(0.5, 1.0, 5e-324)

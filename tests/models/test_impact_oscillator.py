@@ -2,13 +2,14 @@
 
 import math
 
+import mpmath as mp
 import numpy as np
 import pytest
 
 import hybrid
 import lyapunov
 from models import impact_oscillator
-from models.one_impact import one_impact_orbits
+from models.one_impact import _free_flow, one_impact_orbits
 from tests.reference.load import complex_pairs, reference
 
 REFERENCE = reference("impact_oscillator")
@@ -129,3 +130,39 @@ def test_near_grazing_an_orbit_listed_has_no_impact_on_its_way(beyond):
         after = (p["d"], -p["r"] * orbit.V)
         arc = hybrid.simulate(impact_oscillator(), after, (t, t + end + 1.0), parameters=p, solver=TIGHT)
         assert arc.jumps[0].t - t == pytest.approx(end, abs=1e-3), n
+
+
+@pytest.mark.parametrize("factor", [1e-9, 1e-3, 1e6])
+def test_orbits_with_one_impact_in_any_units_of_time(factor):
+    slow = one_impact_orbits(1.0, 0.1, 0.5, 0.8, 1.0, 0.7)
+    fast = one_impact_orbits(factor**2, 0.1 * factor, 0.5 * factor**2, 0.8 * factor, 1.0, 0.7)
+    assert len(slow) == len(fast) == 1
+    assert pytest.approx(factor * slow[0].V, rel=1e-12) == fast[0].V
+    np.testing.assert_allclose(fast[0].multipliers, slow[0].multipliers, rtol=1e-12)
+
+
+@pytest.mark.parametrize("c", [-3.0, 0.0, 2.0, 2.0000001, 3.0, 300.0])
+@pytest.mark.parametrize("k", [1.0, -1.0])
+def test_the_free_flow_is_the_exponential_of_its_matrix(k, c):
+    """With strong damping the hyperbolic functions alone are beyond the range of floats."""
+    exact = mp.expm(5 * mp.matrix([[0, 1], [-k, -c]]))
+    np.testing.assert_allclose(
+        _free_flow(k, c, 5.0), np.array(exact.tolist(), dtype=float), rtol=1e-11, atol=1e-13
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "why"),
+    [
+        ({"k": 0.0}, "singular"),
+        ({"c": 0.0, "w": 0.5}, "singular"),  # the free oscillator closes by itself
+        ({"c": 0.0, "w": 1.0}, "divide by zero"),
+        ({"A": 1e300}, "overflow"),
+        ({"k": -1e300}, "overflow"),
+        ({"d": 1e300}, "out of range"),
+    ],
+)
+def test_where_the_closed_form_fails_the_error_says_so(values, why):
+    given = {"k": 1.0, "c": 0.1, "A": 0.5, "w": 0.8, "d": 1.0, "r": 0.7, **values}
+    with pytest.raises(hybrid.ArgumentError, match=f"^one_impact_orbits: the closed form .*{why}"):
+        one_impact_orbits(**given)

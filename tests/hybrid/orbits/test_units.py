@@ -123,3 +123,23 @@ def test_multipliers_of_states_in_units_far_apart(far):
     orbit = hybrid.periodic_orbit(system, (0.0, 0.0), parameters={"far": far})
     assert orbit.status.ok
     np.testing.assert_allclose(orbit.multipliers, np.exp([-1.0, -2.0]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_the_point_of_an_orbit_nearest_to_the_guess_does_not_depend_on_units(unit):
+    """Van der Pol's oscillator with its velocity in other units."""
+
+    def found(unit):
+        system = HybridSystem(
+            state=("q", "v"),
+            parameters={"unit": unit},
+            modes=[
+                Mode("free", lambda t, x, p: (x.v / p.unit, (1 - x.q**2) * x.v - p.unit * x.q)),
+            ],
+        )
+        solver = hybrid.DOP853(rtol=1e-12, atol=1e-20)
+        return hybrid.periodic_orbit(system, (1.0, 1.5 * unit), period=6.6, solver=solver)
+
+    scaled = found(unit)
+    assert scaled.status.ok
+    np.testing.assert_allclose(scaled.x0 / (1.0, unit), found(1.0).x0, rtol=0.02)

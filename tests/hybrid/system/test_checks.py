@@ -169,3 +169,8 @@ def test_writing_into_the_state_is_told():
 
     with pytest.raises(ModelError, match="field writes into its argument, which is the state of the run"):
         HybridSystem(state=2, modes=[Mode("flight", field)])
+
+
+def test_a_masked_number_is_none():
+    """It is nan for NumPy, and was zero in the compiled functions."""
+    fails("Mode 'flight': field: value 1 is not a number: masked", field=lambda t, x, p: (x.v, np.ma.masked))

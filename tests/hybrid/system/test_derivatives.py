@@ -58,6 +58,13 @@ def test_a_wrong_entry_is_named_with_point_given_and_expected():
         oscillator(lambda t, x, p: ((0, 1, 0), (-3 * p.k * x.q**2, 0, 0)))
 
 
+@pytest.mark.parametrize("entry", [np.inf, -np.inf, np.nan])
+def test_an_entry_that_is_not_finite_where_the_function_is_smooth(entry):
+    """A guard with such a gradient was passed without a crossing."""
+    with pytest.raises(ModelError, match=f"entry D_q of v is {entry}"):
+        oscillator(lambda t, x, p: ((0, 1, 0), (entry, 0, -p.w * np.sin(p.w * t))))
+
+
 def test_the_complex_step_catches_the_eighth_digit():
     with pytest.raises(ModelError, match=r"entry D_v of q is 1\.00000001"):
         oscillator(lambda t, x, p: ((0, 1 + 1e-8, 0), (-3 * p.k * x.q**2, 0, -p.w * np.sin(p.w * t))))
