@@ -20,8 +20,6 @@ SAMPLE_TIME = np.float64(0.7548776662466927)
 # Multiples of an irrational number modulo 1 give every component another value, away from kinks and
 # symmetries.
 SAMPLE_STRIDE = 0.6180339887498949
-# Values for two types of numbers may differ by so much of the largest: their powers round differently.
-SAME_TYPES = 1e-6
 
 
 def check_functions(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
@@ -70,7 +68,6 @@ def _check_function(variables: Variables, function: ModelFunction) -> None:
     if value is not None:
         _check_value(variables, function, value[0])
         _check_pure(variables, function)
-        _check_types(variables, function)
     if function.derivative is not None:
         _check_derivative(variables, function, arguments)
 
@@ -85,24 +82,6 @@ def _check_pure(variables: Variables, function: ModelFunction) -> None:
                 f"{function.title} returned {first.tolist()} and, called again with the same arguments "
                 f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
                 "random numbers, no counters, no memory of earlier calls."
-            )
-
-
-def _check_types(variables: Variables, function: ModelFunction) -> None:
-    """Check that Python's numbers give the values that NumPy's give, up to rounding."""
-    if isinstance(variables.state, int):
-        return
-    values = variables.defaults
-    for t, x in sample_points(variables.dimension):
-        first = evaluate(variables, function.value, t, x, values)
-        other = evaluate(variables, function.value, t, x, values, plain=True)
-        if first is None or other is None or len(first) != len(other):
-            continue
-        if not np.allclose(first, other, rtol=SAME_TYPES, atol=SAME_TYPES * np.abs(first).max(initial=0.0)):
-            raise ModelError(
-                f"{function.title} returned {first.tolist()} for numbers of NumPy and, for the same numbers "
-                f"of Python (t = {t:.6g}, x = {x.tolist()}), {other.tolist()}. A model function must not "
-                "depend on the type of a number: compiled functions know only one."
             )
 
 

@@ -129,20 +129,16 @@ def evaluate(
     parameters: np.ndarray,
     *,
     finite: bool = True,
-    plain: bool = False,
 ) -> Any:
     """Values of a model function as a flat array, or None if the call fails or a value is not finite.
 
-    With ``finite=False`` values that are not finite are returned too. The function is called with numbers of
-    NumPy, or with Python's if ``plain``.
+    With ``finite=False`` values that are not finite are returned too.
     """
     assert function is not None
-    p = variables.parameter_view(parameters.tolist() if plain else parameters)
-    state = variables.state_view(x.tolist() if plain else x)
+    p = variables.parameter_view(parameters)
     try:
         with np.errstate(all="ignore"):
-            value = function(float(t) if plain else np.float64(t), state, p)
-            values = np.ravel(np.asarray(value, dtype=float))
+            values = np.ravel(np.asarray(function(np.float64(t), variables.state_view(x), p), dtype=float))
     except Exception:  # whatever the cause, the function has no value there
         return None
     return values if not finite or np.all(np.isfinite(values)) else None
