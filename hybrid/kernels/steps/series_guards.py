@@ -19,6 +19,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     size_of_time,
 )
+from hybrid.kernels.events.hidden import hidden_share
 from hybrid.kernels.events.onset import BY_STEP, has_just_fired
 from hybrid.kernels.events.path import time_at
 from hybrid.kernels.events.resolution import (
@@ -339,7 +340,11 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
         rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
         # The root of a guard that is zero without speed begins to grow like its variable, too.
         known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
-        if on_guard == BY_STEP:
+        noisy = on_guard == BY_STEP and kind != EXACT
+        if noisy:
+            # Where terms of the field cancel, the first powers are rounding.
+            known = 0
+        elif on_guard == BY_STEP:
             known = leading_power(series, column, order, h, known, size)
         size, power = beyond_known_roots(series, column, h, known, size)
         if on_guard > 0:
@@ -348,12 +353,14 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
             run.on_guard[transition] = 0
             if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
                 side = 0
-        # The second cheap proof: the leading powers keep to their side, even if the others are against it.
-        degree, rest = leading_powers(series, column, order, power, known, size, work.polynomial, h)
-        leading_to_bernstein(work.polynomial, degree, work.stack)
-        verdict, start, end, row = judge_leading(
-            degree, rest, order * rest, side, band, series[order + 1, column], work.stack
-        )
+        verdict, start, end, row, degree, rest, hidden = UNKNOWN, 0.0, 1.0, 0, 0, 0.0, 0.0
+        if not noisy:
+            # The second cheap proof: the leading powers keep to their side, whatever the others do.
+            degree, rest = leading_powers(series, column, order, power, known, size, work.polynomial, h)
+            leading_to_bernstein(work.polynomial, degree, work.stack)
+            verdict, start, end, row = judge_leading(
+                degree, rest, order * rest, side, band, series[order + 1, column], work.stack
+            )
         if verdict == CLEAR:
             continue
         if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
@@ -375,16 +382,23 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
             continue
         degree = powers_on_step(series, column, order, h, known, work.polynomial)
         to_bernstein(work.polynomial, degree)
+        if noisy:
+            value = series[order + 1, column]
+            hidden = hidden_share(work.polynomial, degree, rounding, band, value, work.stack)
         if stays(work.polynomial, degree, side, band):
             continue
         direction, before = model.direction[transition], side
         theta, end, row, side = bracket_crossing(work.polynomial, degree, side, direction, work.stack)
         if theta < end:
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, known, h, theta * h, end * h, *ends, -side) / h
+            start, end = hidden + theta * (1.0 - hidden), hidden + end * (1.0 - hidden)
+            theta = root_between(series, column, order, known, h, start * h, end * h, *ends, -side) / h
         if theta != NO_ROOT or side != before:
-            keep_passage(run, transition, direction, work.polynomial, degree, before, 0.0, work.stack)
-        note_touches(run, transition, degree, known, 0.0, theta, band, work)
+            keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
+        if noisy:
+            degree = powers_on_step(series, column, order, h, known, work.polynomial)
+            to_bernstein(work.polynomial, degree)
+        note_touches(run, transition, degree, known, hidden, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
         if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):

@@ -134,3 +134,41 @@ def test_a_body_at_rest_on_a_guard_fires_it_when_a_growing_force_takes_it_beyond
     # The gap is (t - 0.7)**3 / 6, and one within the tolerances is not told from zero by every method.
     assert distance((arc.jumps.t[0] - 0.7) ** 3 / 6) < 1e-10
     assert np.isclose(arc.x[-1, 0], 1.3**3 / 6, rtol=1e-9)
+
+
+@cache
+def cancelling(direction):
+    """A force that larger terms leave over, ``w t - sin(w t)``. The gap is positive forever."""
+    return HybridSystem(
+        state=("y", "v", "n"),
+        parameters={"a": 1.0, "w": 1.0},
+        modes=[Mode("flight", lambda t, x, p: (x.v, p.a * (p.w * t - np.sin(p.w * t)), 0.0))],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.y, direction),
+                Reset(lambda t, x, p: (x.y, x.v, x.n + 1)),
+                name="cross",
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize(("direction", "jumps"), [(-1, 0), (0, 0), (1, 1)])
+def test_rounding_of_terms_that_cancel_is_no_lift_off(direction, jumps):
+    """The first powers of the series are this rounding."""
+    random = np.random.default_rng(direction + 1)
+    for _ in range(40):
+        parameters = {"a": 10 ** random.uniform(-2, 9), "w": 10 ** random.uniform(-1, 1.5)}
+        end = 10 ** random.uniform(-3, 0.5) / parameters["w"]
+        arc = simulate(
+            cancelling(direction),
+            (0.0, 0.0, 0.0),
+            (0.0, end),
+            mode="flight",
+            solver=Taylor(atol=10 ** random.uniform(-25, -12)),
+            parameters=parameters,
+        )
+        assert arc.status.ok
+        assert arc.jumps.t.tolist() == [0.0] * jumps
