@@ -204,6 +204,8 @@ def test_the_kind_needs_no_forcing():
 def test_a_figure_of_each_kind(line, grid):
     above, below = plot_chart(line).axes
     assert above.get_shared_x_axes().joined(above, below)
+    # The first component, unless another one is asked for.
+    assert above.get_ylabel() == "x"
     # The map and its colour bar.
     assert len(plot_chart(grid).axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
