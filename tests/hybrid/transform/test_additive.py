@@ -77,7 +77,7 @@ def test_contacts_that_share_a_mass_matrix():
 
 
 def test_a_field_is_asked_for_on_the_surfaces_with_the_branches_of_their_sides():
-    """``x' = 1/2 - a``, ``y' = 1/4 - b`` and ``z' = 4 a + 8 b`` for sides ``a, b`` of the surfaces 3 and 5."""
+    """Of the sides ``a, b`` of two surfaces: ``x' = 1/2 - a``, ``y' = 1/4 - b`` and ``z' = 4 a + 8 b``."""
     asked = []
 
     def vertex_field(sides):
