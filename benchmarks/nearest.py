@@ -44,6 +44,7 @@ NEAREST = {
         "compiler/test_emit.py",
         "compiler/cache/test_folder.py",
         "compiler/test_cases.py",
+        "transform/test_splitter.py",
     ),
     "hybrid/compiler/llvm/lowering.py": ("compiler/llvm/test_lowering.py", "compiler/test_emit.py"),
     "hybrid/compiler/propagators/affine.py": (

@@ -74,3 +74,17 @@ def test_contacts_that_share_a_mass_matrix():
     assert arc.status.ok
     assert arc.x[-1, 2:] == pytest.approx([0.0, 0.0], abs=1e-14)
     assert "=0" in str(arc.mode[-1])
+
+
+def test_a_field_is_asked_for_on_the_surfaces_with_the_branches_of_their_sides():
+    """Of the sides ``a, b`` of two surfaces: ``x' = 1/2 - a``, ``y' = 1/4 - b`` and ``z' = 4 a + 8 b``."""
+    asked = []
+
+    def vertex_field(sides):
+        asked.append({**sides})
+        a, b = (sympy.Integer(sides[number] // 2) for number in (3, 5))
+        return [sympy.Rational(1, 2) - a, sympy.Rational(1, 4) - b, 4 * a + 8 * b]
+
+    gradients = [[sympy.Integer(int(i == k)) for i in range(4)] for k in (0, 1)]
+    assert sliding_field(vertex_field, [3, 5], gradients) == [0, 0, 4]
+    assert all(sides.keys() == {3, 5} and {*sides.values()} <= {-2, 2} for sides in asked)
