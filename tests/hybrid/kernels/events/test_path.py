@@ -47,6 +47,14 @@ def test_how_far_along_a_step_its_start_may_lie(scale, time_scale, clock, pace, 
     assert found == path.ROUNDING * EPSILON * place
 
 
+@pytest.mark.parametrize("clock", [0, 1])
+def test_a_clock_may_be_any_column(clock):
+    """It runs at the rate 1/2 or 4; the state is exact."""
+    series = np.array([[1.0, 2.0], [0.5, 4.0]])
+    found = kernels.rounding_of_start(series, 2, np.zeros(2), clock, 3.0, 77.0)
+    assert found == path.ROUNDING * EPSILON * 3.0 / series[1, clock]
+
+
 def test_components_at_rest_do_not_move_the_start():
     still = np.array([[1.0, 2.0], [0.0, 0.5]])
     assert (

@@ -38,6 +38,14 @@ def memory(field):
     )
 
 
+def test_the_noise_of_a_guard_is_that_of_the_state_at_one_time():
+    def guard(transition, t, x, parameters, out):
+        out[0] = 3.0 * t
+
+    model, work = SimpleNamespace(dimension=2, parameters=None, guard=guard), memory((2.0, -1.0))
+    assert kernels.value_and_noise(model, 1, 5.0, np.array([1.0, 3.0]), 0.5, work) == (16.5, 0.0)
+
+
 def test_directions_at_another_time():
     """The gradient is (t, 2, x) at the time 5 less a half."""
 
@@ -88,6 +96,17 @@ def test_a_jump_that_is_shifted_by_too_much_has_no_plane(steepness, found):
     assert kernels.plane_of_jump(model, 1, 0.0, np.array([1.0, 3.0]), 0.5, 5e-8, 1.0, work) == found
     expected = [0.5, 0.5 * steepness, 0.0] if found else [9.0] * 3
     np.testing.assert_allclose(work.gradient, expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(("offset", "turn"), [(0.0, 1), (0.5, 0), (-0.5, 0)])
+def test_a_jump_that_does_not_reach_across_zero(offset, turn):
+    """It jumps by 1/2, from 1/4 to 3/4 on either side, or across zero."""
+
+    def guard(transition, t, x, parameters, out):
+        out[0] = 0.25 * np.sign(x[0] - 1.0) + offset
+
+    model, work = SimpleNamespace(dimension=2, parameters=None, guard=guard), memory((2.0, -1.0))
+    assert kernels.jumps_across(model, 1, 0.0, np.array([1.0, 3.0]), 1e-7, 1e-9, work) == turn
 
 
 class TestBeside:

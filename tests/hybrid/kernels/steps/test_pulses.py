@@ -364,6 +364,13 @@ class TestFirstHidden:
         assert found == (2.0, 2.0, 0.0)
         assert asked == [(1.0, 1.0)]
 
+    def test_a_steady_forcing_without_a_tolerance_may_be_rounding(self):
+        """The forcing itself tells how much of it that is, not its parts."""
+        part = fixed(0.0, 1e9, 0.0, 1.0, 0.0, 0.0)
+        for size, unseen in ((3.0, math.inf), (1e9, 0.0)):
+            noisy = fixed(size - 1.0, size, -1.0, 1.0, size - 1.0, size)
+            assert self.hidden(noisy, part, tolerance=0.0)[0] == (1.0, 1.0, unseen)
+
     def test_one_evaluation_each_explains_pieces_on_which_it_is_monotone(self):
         """However far the bounds lie beyond the samples."""
         turning = lambda middle, half: (  # noqa: E731

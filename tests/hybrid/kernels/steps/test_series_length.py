@@ -76,3 +76,12 @@ def test_terms_before_the_last_that_suggest_another_step_are_not_regular():
     growing[21:25] *= 1e3
     growing[17:21] *= 1e-3
     assert not length_of(growing, order, 1, 0, 1e-10, False, regular=True)
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_at_rest_at_the_origin_one_of_the_first_terms_is_the_size(k):
+    """The floor is a thousandth of the relative tolerance, of the largest component."""
+    series, weights = np.zeros((6, 4)), np.full((1, 4), 9.0)
+    series[k], series[4:] = [0.5, -8.0, 2.0, 0.0], 1e9
+    KERNELS.weigh_state(series, 4, 1e-6, 7.0, True, weights)
+    np.testing.assert_allclose(weights[0], 1.0 / (1e-3 * 1e-6 * 8.0), rtol=1e-12)
