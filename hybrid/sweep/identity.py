@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dis
 import functools
+import importlib.util
 import json
 import platform
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
@@ -105,10 +108,47 @@ def _taken(task: Any) -> dict[str, Any]:
             found[f"{name!r}"] = cell.cell_contents
         except ValueError:  # not yet assigned
             continue
-    for name in sorted(_names_in(task.__code__)):
+    names = _names_in(task.__code__)
+    for name in sorted(names):
         value = task.__globals__.get(name)
-        if value is not None and not isinstance(value, ModuleType):
+        if isinstance(value, ModuleType):
+            found |= _taken_from_module(name, value, names, set())
+        elif value is not None:
             found[f"{name!r}"] = value
+    return found | _imported_inside(task.__code__)
+
+
+def _taken_from_module(title: str, module: ModuleType, names: set[str], seen: set[str]) -> dict[str, Any]:
+    """Values of the user's own modules, such as ``module.function``, for the names that a function uses."""
+    if _is_installed_module(module) or module.__name__ in seen:
+        return {}
+    seen = seen | {module.__name__}
+    found: dict[str, Any] = {}
+    for name in sorted(names & set(vars(module))):
+        value = getattr(module, name)
+        if isinstance(value, ModuleType):
+            found |= _taken_from_module(f"{title}.{name}", value, names, seen)
+        else:
+            found[f"'{title}.{name}'"] = value
+    return found
+
+
+def _imported_inside(code: CodeType) -> dict[str, str]:
+    """The user's own modules that a function imports in its body: a hash of each file.
+
+    The file counts as a whole, because the module may be imported only when the function runs.
+    """
+    found = {}
+    for step in dis.get_instructions(code):
+        if step.opname == "IMPORT_NAME" and isinstance(step.argval, str):
+            with suppress(ImportError, ValueError, AttributeError, OSError):
+                spec = importlib.util.find_spec(step.argval)
+                if spec is not None and spec.has_location and not _is_installed(str(spec.origin)):
+                    text = Path(str(spec.origin)).read_bytes()
+                    found[f"module {step.argval!r}"] = blake2b(text).hexdigest()[:DIGITS]
+    for inner in code.co_consts:
+        if isinstance(inner, CodeType):
+            found |= _imported_inside(inner)
     return found
 
 
@@ -160,8 +200,8 @@ def _described(value: Any, seen: set[int]) -> str:
         return _described_function(value, seen)
     if isinstance(value, MethodType):
         return _described((value.__func__, value.__self__), seen)
-    if isinstance(value, type) or callable(getattr(value, "__qualname__", None)):
-        return f"{value.__module__}.{value.__qualname__}"
+    if isinstance(value, type):
+        return _described_class(value, seen)
     if attrs.has(type(value)):
         return f"{type(value).__qualname__}{_described_fields(value, seen)}"
     return _described_object(value, seen)
@@ -197,6 +237,33 @@ def _described_function(function: FunctionType, seen: set[int]) -> str:
     return f"{function.__qualname__} {_hash(' '.join(parts))}"
 
 
+def _described_class(kind: type, seen: set[int]) -> str:
+    """A class: its name; of the user's own classes also the code of the methods, and plain values."""
+    name = f"{kind.__module__}.{kind.__qualname__}"
+    if _is_installed_module(sys.modules.get(kind.__module__)):
+        return name
+    parts = [_described_class(base, seen) for base in kind.__bases__]
+    for own, value in sorted(vars(kind).items()):
+        if isinstance(value, staticmethod | classmethod):
+            value = value.__func__
+        elif isinstance(value, property):
+            value = (value.fget, value.fset)
+        plain = isinstance(value, str | bytes | int | float | complex | tuple | list | dict | np.ndarray)
+        if isinstance(value, FunctionType) or (plain and not own.startswith("__")):
+            parts.append(f"{own}: {_described(value, seen)}")
+    return f"{name} {_hash(' '.join(parts))}"
+
+
+def _is_installed_module(module: ModuleType | None) -> bool:
+    """Whether a module is built in, installed, or of this library; one without a file is the user's own."""
+    if module is None:
+        return True
+    if module.__name__ == "__main__":
+        return False
+    places = [getattr(module, "__file__", None), *getattr(module, "__path__", ())]
+    return all(_is_installed(place) for place in places if place)
+
+
 def _is_installed(filename: str) -> bool:
     """Whether code belongs to an installed package or to this library, whose versions stand for it."""
     path = Path(filename)
@@ -208,7 +275,7 @@ def _is_installed(filename: str) -> bool:
 def _described_object(value: Any, seen: set[int]) -> str:
     """Another object: its class, and what it holds."""
     held = getattr(value, "__dict__", None)
-    kind = f"{type(value).__module__}.{type(value).__qualname__}"
+    kind = _described_class(type(value), seen)
     if held is None:
         name = getattr(value, "__qualname__", None) or getattr(value, "__name__", "")
         return f"{kind} {name}".rstrip()

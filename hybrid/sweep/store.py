@@ -15,6 +15,7 @@ import uuid
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     import xarray
 
 INSIDE, PARTS, MADE_BY, LATEST = ".sweep", "parts", "made_by.json", "latest.json"
+# The checksum of the zarr group, which has none of its own: a chunk that is lost reads as zeros.
+LAID_OUT = "laid_out"
 SUFFIX = ".part"
 # The file that makes a folder a zarr group.
 GROUP = "zarr.json"
@@ -72,9 +75,9 @@ class Store:
         try:
             (folder / PARTS).mkdir(parents=True, exist_ok=True)
             created = {"facts": self.facts, "date": date}
-            if not (folder / MADE_BY).exists():
+            if not (folder / MADE_BY).exists() and not any((folder / PARTS).glob(f"*{SUFFIX}")):
                 _write_new(folder / MADE_BY, json.dumps(created, indent=1).encode())
-            known = json.loads((folder / MADE_BY).read_text(encoding="utf-8"))
+            known = _made_by(self.path)
         except OSError as failure:
             raise _unwritable(self.path, failure) from failure
         self._compare(known["facts"])
@@ -168,7 +171,7 @@ class Store:
 
     def finish(self, found: xarray.Dataset, changed: bool) -> None:
         """Lay the dataset out as a zarr group, unless it is there already."""
-        if not changed and not self.is_new and (self.path / GROUP).exists():
+        if not changed and not self.is_new and _is_as_laid_out(self.path):
             return
         try:
             with _Lock(self.path / INSIDE / "lock"):
@@ -217,24 +220,55 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:
     where = as_path(path, "path")
     if where.is_file():
         return xarray.open_dataset(where)
-    if (where / GROUP).exists():
+    latest = _read(where / INSIDE / LATEST)
+    # A group without the parts is the copy of a store. Otherwise a damaged group, or one that another call
+    # is laying out, is made again from the parts.
+    if (where / GROUP).exists() and (not latest or _is_as_laid_out(where)):
         needed("zarr", "open")
         # A later call with another grid first removes the file that makes the folder a group.
         before, found = _read(where / GROUP), None
-        with suppress(FileNotFoundError, KeyError, ValueError):
+        try:
             found = xarray.open_zarr(where, chunks=None).load()
+        except Exception as failure:  # each codec has its own errors
+            if not latest:
+                raise HybridError(f"path: the zarr group {str(where)!r} is damaged: {failure}.") from failure
         if found is not None and before and before == _read(where / GROUP):
             last = [name for name in RESERVED if name in found.data_vars]
             return found[[name for name in found.data_vars if name not in RESERVED] + last]
-    latest = _read(where / INSIDE / LATEST)
     if not latest:
         raise ArgumentError(f"path must be the store of a sweep or a file; got {str(where)!r}.")
-    stored = json.loads(latest)
-    points = as_listed(stored["over"])
+    facts = _made_by(where)["facts"]
+    try:
+        stored = json.loads(latest)
+        points = as_listed(stored["over"])
+        labels, made_by = Labels.read(json.dumps(stored["labels"])), dict(stored["made_by"])
+        along = stored["over"]["along"]
+    except (ValueError, LookupError, TypeError, AttributeError) as failure:
+        raise _damaged(where / INSIDE / LATEST) from failure
     sheet = Sheet(points)
-    facts = json.loads((where / INSIDE / MADE_BY).read_text(encoding="utf-8"))["facts"]
-    Store(where, facts, points, stored["over"]["along"]).read_into(sheet)
-    return sheet.dataset(Labels.read(json.dumps(stored["labels"])), stored["made_by"])
+    Store(where, facts, points, along).read_into(sheet)
+    return sheet.dataset(labels, made_by)
+
+
+def _made_by(path: Path) -> dict[str, Any]:
+    """What the store says of the call that made it, or an error if the file is damaged."""
+    file = path / INSIDE / MADE_BY
+    try:
+        known = json.loads(file.read_text(encoding="utf-8"))
+        return {"facts": dict(known["facts"]), "date": str(known["date"])}
+    except FileNotFoundError:
+        raise _damaged(file) from None
+    except (ValueError, LookupError, TypeError) as failure:
+        raise _damaged(file) from failure
+
+
+def _damaged(file: Path) -> HybridError:
+    if file.name == LATEST:
+        return HybridError(f"store: the file {str(file)!r} is damaged. Repeat the call that made the store.")
+    return HybridError(
+        f"store: the file {str(file)!r} is damaged or missing, so it is not known what made the results. "
+        "Name another store."
+    )
 
 
 def as_path(path: object, name: str = "store") -> Path:
@@ -286,7 +320,7 @@ def _text(value: Any) -> str:
 def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
-    except OSError:
+    except (OSError, UnicodeDecodeError):
         return ""
 
 
@@ -363,8 +397,31 @@ def _lay_out(found: xarray.Dataset, path: Path) -> None:
                 os.replace(each, path / each.name)
         os.replace(new / GROUP, path / GROUP)
         _flush_folder(path)
+        _replace(path / INSIDE / LAID_OUT, _checksum(path).encode())
     finally:
         shutil.rmtree(new, ignore_errors=True)
+
+
+def _is_as_laid_out(path: Path) -> bool:
+    """Whether the zarr group holds what was laid out: all of its files, to the last bit."""
+    told = _read(path / INSIDE / LAID_OUT)
+    try:
+        return bool(told) and (path / GROUP).exists() and told == _checksum(path)
+    except OSError:  # another process is laying it out
+        return False
+
+
+def _checksum(path: Path) -> str:
+    """Hash of the names and contents of all files of the zarr group."""
+    digest = blake2b()
+    for folder, folders, files in os.walk(path):
+        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        for name in sorted(files):
+            file = Path(folder) / name
+            content = file.read_bytes()
+            digest.update(f"{file.relative_to(path).as_posix()}\0{len(content)}\0".encode())
+            digest.update(content)
+    return digest.hexdigest()
 
 
 class _Lock:

@@ -23,6 +23,7 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Transition
 from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
+from hybrid.testing.sizes import sizes_along
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
 # The run is repeated with tolerances looser by this factor, to estimate the error at its end.
@@ -103,7 +104,7 @@ class Run:
     error
         Change of the end state with looser tolerances, ``(n,)``.
     scale
-        Sizes of the components along the run, ``(n,)``.
+        Sizes of the components along the run, ``(n,)``, each in its own unit.
     """
 
     arc: HybridArc
@@ -268,8 +269,7 @@ class Case:
         other = self.simulate(t1, solver=self.looser)
         if not np.array_equal(other.jumps.transition_index, arc.jumps.transition_index):
             return "the events of the run depend on the tolerances"
-        size = np.abs(arc.x).max(axis=0)
-        scale = np.maximum(size, 1e-3 * size.max() if size.any() else 1.0)
+        scale = sizes_along(self, arc)
         error = np.abs(arc.x[-1] - other.x[-1])
         if not np.all(error <= SENSITIVE * scale):
             return "the end of the run depends on the tolerances"

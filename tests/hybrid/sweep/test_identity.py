@@ -1,6 +1,8 @@
 """Facts about a task change with everything that decides its results, and with nothing else."""
 
 import functools
+import importlib
+import sys
 
 import attrs
 import numpy as np
@@ -211,3 +213,50 @@ def test_a_dataset_says_the_facts_that_are_no_models():
         "span": "[0.0, 1.5]",
     }
     assert found["model_parameters"] == '{"g": 9.81, "e": 0.8}'
+
+
+HELPERS = """
+FACTOR = 2.0
+def scaled(v):
+    return FACTOR * v
+class Law:
+    LEVEL = 1.0
+    def __call__(self, v):
+        return 3.0 * v
+    @property
+    def half(self):
+        return 0.5
+"""
+
+
+@pytest.mark.parametrize("used", ["helpers.scaled(p)", "helpers.Law()(p)", "law(p)", "inside"])
+@pytest.mark.parametrize(
+    ("edit", "counts"),
+    [
+        (("2.0", "2.5"), ("helpers.scaled(p)", "inside")),
+        (("FACTOR * v", "-FACTOR * v"), ("helpers.scaled(p)", "inside")),
+        (("3.0 * v", "4.0 * v"), ("helpers.Law()(p)", "law(p)", "inside")),
+        (("0.5", "0.25"), ("helpers.Law()(p)", "law(p)", "inside")),
+        (("LEVEL = 1.0", "LEVEL = 1.5"), ("helpers.Law()(p)", "law(p)", "inside")),
+    ],
+    ids=["a number", "a function", "a method", "a property", "a value of a class"],
+)
+def test_an_edit_of_a_module_that_a_task_uses_counts(tmp_path, monkeypatch, used, edit, counts):
+    """A store gave back the results of the code before the edit."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+
+    def facts(text):
+        (tmp_path / "helpers.py").write_text(text)
+        monkeypatch.delitem(sys.modules, "helpers", raising=False)
+        importlib.invalidate_caches()
+        space = {"__name__": "__main__"}
+        if used == "inside":
+            exec("def task(p):\n    import helpers\n    return helpers.scaled(p)", space)
+        else:
+            exec(f"import helpers\nlaw = helpers.Law()\ndef task(p): return {used}", space)
+        return facts_of(space["task"])
+
+    before = facts(HELPERS)
+    assert facts(HELPERS) == before
+    assert (facts(HELPERS.replace(*edit)) != before) == (used in counts)

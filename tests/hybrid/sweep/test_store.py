@@ -1,6 +1,7 @@
 """Sweeps on disk: killed, full, shared, refused, extended; always the results of an uninterrupted run."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -382,3 +383,54 @@ def test_a_file_of_a_worker_goes_into_the_sheet(tmp_path, monkeypatch):
     kept.receive("part", np.array([4, 2]), sheet)
     assert asked == [tmp_path / store.INSIDE / store.PARTS / "part"]
     assert (kept.seen, put) == ({"part"}, [([4, 2], [0, 1])])
+
+
+def damaged(content, how):
+    if how == "half":
+        return content[: len(content) // 2]
+    if how == "other bits" and content:
+        middle = len(content) // 2
+        return content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :]
+    return {"empty": b"", "other bits": b"", "no text": b"\xff\xfe" + content, "another": b'{"a": 1}'}[how]
+
+
+@pytest.mark.parametrize("how", ["gone", "empty", "half", "other bits", "no text", "another"])
+def test_whatever_file_is_damaged_the_results_are_right_or_said_to_be_lost(tmp_path, how):
+    """The zarr group has no checksums of its own: a chunk that was lost read as zeros, status included."""
+    whole, path = tmp_path / "whole", tmp_path / "s"
+    grid = {"a": [1.0, 2.0], "b": [0.1]}
+    wanted = sweep(task, grid, store=whole, executor=1)
+    names = [each.relative_to(whole) for each in sorted(whole.rglob("*")) if each.is_file()]
+    assert len(names) > 8
+    for name in names:
+        shutil.copytree(whole, path)
+        content = (path / name).read_bytes()
+        (path / name).unlink()
+        if how != "gone":
+            (path / name).write_bytes(damaged(content, how))
+        for call in (lambda: hybrid.open(path), lambda: sweep(task, grid, store=path, executor=1)):
+            try:
+                found = call()
+            except HybridError:
+                continue
+            lost = found.status == StatusCode.NOT_RUN
+            assert (lost | (found.y == wanted.y) & (found.status == wanted.status)).all(), name
+        shutil.rmtree(path)
+
+
+def test_parts_without_what_made_them_are_not_taken(tmp_path):
+    sweep(task, GRID, store=tmp_path / "s", executor=1)
+    (tmp_path / "s" / store.INSIDE / store.MADE_BY).unlink()
+    with pytest.raises(
+        HybridError, match=r"made_by.json' is damaged or missing, so it is not known what made"
+    ):
+        sweep(task, GRID, store=tmp_path / "s", executor=1)
+
+
+def test_a_copy_of_the_zarr_group_alone_is_read_or_said_to_be_damaged(tmp_path):
+    wanted = sweep(task, GRID, store=tmp_path / "s", executor=1)
+    shutil.rmtree(tmp_path / "s" / store.INSIDE)
+    assert (hybrid.open(tmp_path / "s").y == wanted.y)[:2].all()
+    next(each for each in (tmp_path / "s/y/c").rglob("0") if each.is_file()).write_bytes(b"nothing")
+    with pytest.raises(HybridError, match=r"the zarr group .* is damaged"):
+        hybrid.open(tmp_path / "s")

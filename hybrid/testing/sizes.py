@@ -1,0 +1,55 @@
+"""Sizes of the components along a run, each in its own unit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid.system.derivatives import evaluate
+from hybrid.system.functions import ModelFunction, field_function, reset_function
+
+if TYPE_CHECKING:
+    from hybrid.simulation.arc import HybridArc
+    from hybrid.testing.case import Case
+
+# A component that stays small is given this share of what the others make of it.
+SHARE = 1e-3
+
+
+def sizes_along(case: Case, arc: HybridArc) -> np.ndarray:
+    """The largest absolute value ``(n,)`` of each component, or a share of what the others make of it.
+
+    Rounding of the others reaches a component that stays near zero: by a reset, or by the field in the time
+    in which the state changes by its size, at most that of the run. A share of the largest component would
+    depend on the units.
+    """
+    system, size = case.system, np.abs(arc.x).max(axis=0)
+    made = np.zeros_like(size)
+    duration = float(arc.t[-1] - arc.t[0])
+    places = [(str(arc.mode[0]), float(arc.t[0]), arc.x[0])]
+    for jump in arc.jumps:
+        places.append((jump.source, jump.t, jump.x_minus))
+        reset = reset_function(case.transition(jump), system.dimension)
+        if reset is not None:
+            index = system.transition_index(jump.transition)
+            made = np.maximum(made, _slopes(case, reset, index, jump.t, jump.x_minus) @ size)
+    for mode, t, x in places:
+        index = system.mode_index(mode)
+        function = field_function(system.modes[index], system.dimension)
+        slopes = _slopes(case, function, index, t, x)
+        values = evaluate(system.variables, function.value, t, x, case.values)
+        speeds = np.zeros_like(size) if values is None else np.abs(values)
+        # The spectral radius, unlike a norm, does not depend on the units of the components.
+        rate = float(np.abs(np.linalg.eigvals(slopes)).max())
+        time = min(duration, 1.0 / rate) if rate > 0.0 else duration
+        made = np.maximum(made, time * (slopes @ size + speeds))
+    found = np.maximum(size, SHARE * made)
+    # A component that is zero, and stays so, has no size.
+    return np.where(found > 0.0, found, 1.0)
+
+
+def _slopes(case: Case, function: ModelFunction, index: int, t: float, x: np.ndarray) -> np.ndarray:
+    """Absolute values ``(n, n)`` of a derivative in the state, zero where it is not finite."""
+    slopes = np.abs(case.engine.derivative(case.system, function, index, t, x, case.values)[:, :-1])
+    return np.where(np.isfinite(slopes), slopes, 0.0)
