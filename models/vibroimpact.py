@@ -103,10 +103,9 @@ def hertz_stiffness(
     if not abs(nu) < 1:
         raise arguments.refusal("nu", "lie between -1 and 1", nu)
     # E / (1 - nu^2) = 1 / (pi d), and the sum of two curvatures may be too large for a float.
-    curvature = 2 * np.sqrt(A / 4 + B / 4)
-    with np.errstate(over="ignore", under="ignore"):
-        stiffness = 2 / 3 * np.pi * q * (E / ((1 - nu) * (1 + nu))) / curvature
-    return arguments.result("hertz_stiffness", float(stiffness))
+    curvature = 2 * (A / 4 + B / 4) ** 0.5
+    stiffness = 2 / 3 * np.pi * q * (E / ((1 - nu) * (1 + nu))) / curvature
+    return arguments.result("hertz_stiffness", stiffness)
 
 
 def _field(t, x, p, Fcon):

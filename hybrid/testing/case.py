@@ -269,7 +269,14 @@ class Case:
         other = self.simulate(t1, solver=self.looser)
         if not np.array_equal(other.jumps.transition_index, arc.jumps.transition_index):
             return "the events of the run depend on the tolerances"
-        scale = sizes_along(self, arc)
+        scale = sizes_along(
+            self.system,
+            self.values,
+            arc,
+            lambda function, index, t, x: self.engine.derivative(
+                self.system, function, index, t, x, self.values
+            ),
+        )
         error = np.abs(arc.x[-1] - other.x[-1])
         if not np.all(error <= SENSITIVE * scale):
             return "the end of the run depends on the tolerances"

@@ -2,44 +2,47 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
+from hybrid.simulation.arc import HybridArc
 from hybrid.system.derivatives import evaluate
 from hybrid.system.functions import ModelFunction, field_function, reset_function
+from hybrid.system.graph import HybridSystem
 
-if TYPE_CHECKING:
-    from hybrid.simulation.arc import HybridArc
-    from hybrid.testing.case import Case
+# Derivative ``(n, n + 1)`` of the function of a mode or transition of that index.
+Derivative = Callable[[ModelFunction, int, float, np.ndarray], np.ndarray]
 
 # A component that stays small is given this share of what the others make of it.
 SHARE = 1e-3
 
 
-def sizes_along(case: Case, arc: HybridArc) -> np.ndarray:
+def sizes_along(
+    system: HybridSystem, values: np.ndarray, arc: HybridArc, derivative: Derivative
+) -> np.ndarray:
     """The largest absolute value ``(n,)`` of each component, or a share of what the others make of it.
 
     Rounding of the others reaches a component that stays near zero: by a reset, or by the field in the time
     in which the state changes by its size, at most that of the run. A share of the largest component would
     depend on the units.
     """
-    system, size = case.system, np.abs(arc.x).max(axis=0)
+    size = np.abs(arc.x).max(axis=0)
     made = np.zeros_like(size)
     duration = float(arc.t[-1] - arc.t[0])
     places = [(str(arc.mode[0]), float(arc.t[0]), arc.x[0])]
     for jump in arc.jumps:
         places.append((jump.source, jump.t, jump.x_minus))
-        reset = reset_function(case.transition(jump), system.dimension)
+        index = system.transition_index(jump.transition)
+        reset = reset_function(system.transitions[index], system.dimension)
         if reset is not None:
-            index = system.transition_index(jump.transition)
-            made = np.maximum(made, _slopes(case, reset, index, jump.t, jump.x_minus) @ size)
+            made = np.maximum(made, _absolute(derivative(reset, index, jump.t, jump.x_minus)) @ size)
     for mode, t, x in places:
         index = system.mode_index(mode)
         function = field_function(system.modes[index], system.dimension)
-        slopes = _slopes(case, function, index, t, x)
-        values = evaluate(system.variables, function.value, t, x, case.values)
-        speeds = np.zeros_like(size) if values is None else np.abs(values)
+        slopes = _absolute(derivative(function, index, t, x))
+        rates = evaluate(system.variables, function.value, t, x, values)
+        speeds = np.zeros_like(size) if rates is None else np.abs(rates)
         # The spectral radius, unlike a norm, does not depend on the units of the components.
         rate = float(np.abs(np.linalg.eigvals(slopes)).max())
         time = min(duration, 1.0 / rate) if rate > 0.0 else duration
@@ -49,7 +52,7 @@ def sizes_along(case: Case, arc: HybridArc) -> np.ndarray:
     return np.where(found > 0.0, found, 1.0)
 
 
-def _slopes(case: Case, function: ModelFunction, index: int, t: float, x: np.ndarray) -> np.ndarray:
+def _absolute(derivative: np.ndarray) -> np.ndarray:
     """Absolute values ``(n, n)`` of a derivative in the state, zero where it is not finite."""
-    slopes = np.abs(case.engine.derivative(case.system, function, index, t, x, case.values)[:, :-1])
+    slopes = np.abs(derivative[:, :-1])
     return np.where(np.isfinite(slopes), slopes, 0.0)

@@ -120,8 +120,8 @@ class TestAlong:
 class TestNewton:
     """Each step halves the state."""
 
-    def newton(self, monkeypatch, x, most, *, stuck=0.0, **changes):
-        begun = SimpleNamespace(advanced=lambda shot, better: begun)
+    def newton(self, monkeypatch, x, most, *, stuck=0.0, measurable=True, **changes):
+        begun = SimpleNamespace(advanced=lambda shot, better: begun, measurable=lambda shot: measurable)
         monkeypatch.setattr(module.Newton, "begin", lambda *given: asked.append(given) or begun)
         asked, shooting = [], Shooting()
         shooting.changes = changes
@@ -153,6 +153,9 @@ class TestNewton:
     def test_until_no_step_helps(self, monkeypatch):
         """The attempt counts."""
         assert self.newton(monkeypatch, 8.0, 9, stuck=2.0) == (2.0, 3)
+
+    def test_not_from_numbers_whose_sizes_cannot_be_measured(self, monkeypatch):
+        assert self.newton(monkeypatch, 8.0, 9, measurable=False) == (8.0, 0)
 
     def test_only_from_runs_that_reach_their_end(self, monkeypatch):
         assert self.newton(monkeypatch, 8.0, 9, whole=False) == (8.0, 0)

@@ -13,16 +13,19 @@ def told(name):
 
 
 def test_datasets_are_drawn_by_a_variable_that_they_have(monkeypatch):
-    """The first that is registered decides; other objects draw themselves."""
+    """The first that is registered decides; objects that are no datasets draw themselves."""
     for name in list(DATASETS):
         monkeypatch.delitem(DATASETS, name)
     monkeypatch.setitem(DATASETS, "one", told("first"))
     monkeypatch.setitem(DATASETS, "two", told("second"))
     own = SimpleNamespace(plot=lambda **options: ("own", options))
-    for variables, wanted in (("two", "second"), ("two one", "first"), ("three", "own"), ("", "own")):
+    for variables, wanted in (("two", "second"), ("two one", "first")):
         data = SimpleNamespace(data_vars=variables.split(), plot=own.plot)
         assert drawn(data, ax=3) == (wanted, {"ax": 3})
     assert plot(own, x="q") == ("own", {"x": "q"})
+    for variables in ([], ["three"]):
+        with pytest.raises(ArgumentError, match="result must be"):
+            drawn(SimpleNamespace(data_vars=variables, plot=own.plot))
 
 
 @pytest.mark.parametrize("result", [3, SimpleNamespace(plot="no function"), SimpleNamespace(data_vars=["?"])])

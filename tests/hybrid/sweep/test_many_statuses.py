@@ -194,10 +194,10 @@ CASES = {
     "stuck": Case(facing(), (-1.0,), 3.0, StatusCode.STUCK, "left->right", {"mode": "left"}),
     "refused": Case(ball(), (-1.0, 0.0), 1.0, StatusCode.FAILED, "is allowed in no mode"),
 }
-# Only with tangent vectors; of results that are no runs; and of Ctrl-C.
+# Only with tangent vectors; of results that are no runs; of Ctrl-C; and of steps that are kept.
 NEVER = {
     *(StatusCode.SINGULAR_SALTATION, StatusCode.DISCONTINUOUS_FIELD, StatusCode.INDISTINCT_TANGENTS),
-    *(StatusCode.NOT_CONVERGED, StatusCode.NOT_RUN, StatusCode.INTERRUPTED),
+    *(StatusCode.NOT_CONVERGED, StatusCode.NOT_RUN, StatusCode.INTERRUPTED, StatusCode.OUT_OF_MEMORY),
 }
 
 

@@ -114,10 +114,16 @@ class TestExplainedSeries:
     def step(self, follows, *, explains=lambda h: h, clock=-1, finite=True, unresolved=0, length=1.0):
         asked = []
 
-        def longest(model, method, run, path, order, told, nodes, timed, swings, h, work):
-            assert (path, order, told, nodes, timed, swings) == ("series", 5, clock, "nodes", True, True)
+        def longest(model, method, run, path, order, told, nodes, timed, swings, seen, h, work):
+            assert (path, order, told, nodes, timed) == ("series", 5, clock, "nodes", True)
+            # A pulse in the state is looked for if an argument changes enough on this very step.
+            assert (swings, seen) == (h > 0.3, False)
             asked.append(h)
             return explains(h)
+
+        def change(model, mode, path, order, told, start, h, work):
+            assert (mode, path, order, told, start) == (1, "series", 5, clock, 3.0)
+            return h > 0.3
 
         def follow(model, method, run, tangents, order, told, h, noisy, work):
             assert (tangents, order, told) == (2, 5, clock)
@@ -127,10 +133,11 @@ class TestExplainedSeries:
             forcing,
             _is_finite=lambda *given: finite,
             _longest_explained=longest,
+            _arguments_change=change,
             _follows_field=follow,
             measured_time=lambda model, run, mode: 4.0,
         )
-        self.asked, self.run = asked, SimpleNamespace(mode=1, unresolved=unresolved)
+        self.asked, self.run = asked, SimpleNamespace(mode=1, phase=3.0, unresolved=unresolved)
         method, work = SimpleNamespace(series_nodes="nodes"), SimpleNamespace(series="series")
         return tested.explained_series(None, method, self.run, 2, 5, clock, length, work)
 
