@@ -89,10 +89,12 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
             if was_on and before != 0:
                 return before, JUMPING
             return 1 if value > 0.0 else -1, JUMPING
-        trend, order = speed_sign(model, run, transition, mode, t, x, speed, work), BY_SPEED
+        # In the middle of a jump, where a sign is zero, the speed a moment later is that beside the jump.
+        jumps, order = speed == 0.0 and may_jump(model, run, transition, t, x, work), BY_SPEED
+        trend = 0.0 if jumps else speed_sign(model, run, transition, mode, t, x, speed, work)
         if trend == 0.0:
-            if may_jump(model, run, transition, t, x, work):
-                # The state is in the middle of the jump, on neither side.
+            if jumps or may_jump(model, run, transition, t, x, work):
+                # The state is on neither side.
                 if was_on and before != 0:
                     return before, JUMPING
                 order = BY_STEP

@@ -218,3 +218,47 @@ def test_a_start_at_the_edge_of_a_stair_at_zero_has_not_crossed(stair, solver):
         arc = simulate(system, (way, 0.0), (0.0, 1.4), mode="go", solver=solver)
         assert arc.status.ok
         np.testing.assert_allclose(arc.jumps.t, [width], rtol=0, atol=1e-14)
+
+
+AMID = {
+    "larger": lambda t, x, p: np.maximum(np.sign(x.q - p.b), x.v * p.a - 0.6),
+    "smaller": lambda t, x, p: np.minimum(np.sign(x.q - 0.4 * np.sin(1.3 * t) - p.b), x.v + 0.3),
+    "larger of three": lambda t, x, p: np.maximum(
+        np.sign(2 * x.v / (1 + x.v * x.v) - p.b), np.abs(x.q + 0.4 * np.sin(1.3 * t)) - 0.9
+    ),
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
+@pytest.mark.parametrize("guard", AMID.values(), ids=AMID)
+def test_a_guard_that_is_zero_amid_its_jump_fires_once(guard, solver):
+    """A landing where the sign is zero: the slope beside the jump says nothing of the side after it.
+
+    Another guard ends a step soon after.
+    """
+    other = Guard(lambda t, x, p: (x.q - 0.3) * (x.v + 0.1))
+    count = Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0))
+    system = both_ways(guard)
+    system = HybridSystem(
+        state=system.state,
+        parameters=system.parameters,
+        modes=system.modes,
+        transitions=[*system.transitions, Transition("swing", "swing", other, count, name="other")],
+    )
+    rng, compared = np.random.default_rng(8), 0
+    for _ in range(40):
+        a, b = float(rng.uniform(0.6, 1.4)), float(rng.uniform(-0.8, 0.8))
+        start = tuple(map(float, rng.uniform(-1.2, 1.2, 2)))
+        wanted = changes(guard, a, b, start)
+        if wanted is None:
+            continue
+        arc = simulate(
+            system, (*start, 0.0), (0.0, END), mode="swing", parameters={"a": a, "b": b}, solver=solver
+        )
+        assert arc.status.ok
+        for name, times in zip(("up", "down"), wanted, strict=True):
+            found = [jump.t for jump in arc.jumps if jump.transition == name]
+            assert len(found) == len(times), (a, b, start, name)
+            np.testing.assert_allclose(found, times, rtol=0, atol=2e-4)
+        compared += 1
+    assert compared > 10
