@@ -7,7 +7,20 @@ import pytest
 
 from lyapunov.study import kernels
 from lyapunov.study.ode23s import scratch
-from lyapunov.study.places import ACCEPTED, DFDT, DONE, EVALUATIONS, F0, F1, F2, NEW, RECORD_FULL, REJECTED
+from lyapunov.study.places import (
+    ACCEPTED,
+    DFDT,
+    DONE,
+    EVALUATIONS,
+    F0,
+    F1,
+    F2,
+    NEW,
+    RECORD_FULL,
+    REJECTED,
+    STEP_TOO_SMALL,
+    THRESHOLDS,
+)
 from tests.hybrid.kernels.plain import plain
 
 PLAIN = plain(kernels)
@@ -22,7 +35,7 @@ def attempted(field, y, h, *, t=0.0, slope=0.0, dfdt=0.0, threshold=1e-3):
     field(t, y, (), work[F0])
     work[DFDT] = dfdt
     arrays = np.zeros((n, n)), np.zeros(n, dtype=np.int64), slope * np.eye(n)
-    error = PLAIN.attempt(field, t, y, (), h, 1.0, threshold, work, *arrays)
+    error = PLAIN.attempt(field, t, y, (), h, 0.5, 0.5 * threshold, work, *arrays)
     return work[NEW].tolist(), error, work
 
 
@@ -59,14 +72,13 @@ class TestAttempt:
         [new], *_ = attempted(field, [2.0], 0.25, slope=z / 0.25)
         assert new == pytest.approx(2.0 * (1.0 + (1.0 - 2.0 * D) * z) / (1.0 - D * z) ** 2, rel=1e-9)
 
-    def test_the_estimate_is_of_the_third_order(self):
-        """A step that is half as long has an eighth of the error."""
-
+    def test_the_estimate_is_the_error_of_a_short_step(self):
         def field(t, y, p, out):
             out[0] = -y[0]
 
-        errors = [attempted(field, [1.0], h, slope=-1.0)[1] for h in (0.02, 0.01)]
-        assert errors[0] / errors[1] == pytest.approx(8.0, rel=0.05)
+        for h in (0.02, 0.01):
+            [new], error, _ = attempted(field, [1.0], h, slope=-1.0)
+            assert error == pytest.approx(abs(new - math.exp(-h)), rel=3.0 * h)
 
     @pytest.mark.parametrize(
         ("y", "threshold", "weight"), [(-8.0, 1.0, 8.0), (0.0, 1.0, 2.25), (0.0, 5.0, 5.0), (-2.25, 5.0, 5.0)]
@@ -111,21 +123,22 @@ def integrated(field, y, span, rows=100, rtol=1e-3):
 
 
 def steady(t, y, p, out):
-    out[0] = 1.0
+    out[0], out[1] = 1.0, -2.0
 
 
 class TestIntegrate:
     @pytest.mark.parametrize("start", [-5.0, 0.0, 3.0, 1000.0])
     def test_the_longest_step_is_a_tenth_of_the_run_wherever_it_starts(self, start):
         """A field that is constant needs no shorter steps."""
-        code, y, record, counters = integrated(steady, [1e6], (start, start + 2.0))
+        code, y, record, counters = integrated(steady, [1e6, 2e6], (start, start + 2.0))
         assert (code, counters[ACCEPTED], counters[REJECTED]) == (DONE, 10, 0)
         np.testing.assert_allclose(record[:, 0], start + 0.2 * np.arange(1, 11), rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(record[:, 1], 1e6 + 0.2 * np.arange(1, 11), rtol=1e-12)
-        assert record[-1].tolist() == [start + 2.0, y[0]]
+        np.testing.assert_allclose(record[:, 2], 2e6 - 0.4 * np.arange(1, 11), rtol=1e-12)
+        assert record[-1].tolist() == [start + 2.0, *y]
         # The field and the first step at the start; per step the Jacobian, the rate in time and the attempt.
-        # The first two Jacobians are tried with a wider difference too, since nothing changes.
-        assert counters[EVALUATIONS] == 2 + 10 * (1 + 1 + 2) + 2
+        # The first two Jacobians are tried with wider differences too, since nothing changes.
+        assert counters[EVALUATIONS] == 2 + 10 * (2 + 1 + 2) + 2 * 2
 
     def test_steps_of_a_decay_do_not_depend_on_the_clock(self):
         def field(t, y, p, out):
@@ -140,11 +153,61 @@ class TestIntegrate:
 
     @pytest.mark.parametrize(("rows", "code"), [(9, RECORD_FULL), (10, DONE)])
     def test_a_record_with_too_few_rows(self, rows, code):
-        found, _, record, _ = integrated(steady, [1e6], (3.0, 5.0), rows=rows)
+        found, _, record, _ = integrated(steady, [1e6, 2e6], (3.0, 5.0), rows=rows)
         assert found == code
         np.testing.assert_allclose(record[:rows, 1], 1e6 + 0.2 * np.arange(1, rows + 1), rtol=1e-12)
 
     def test_no_rows_no_record(self):
-        code, y, _, counters = integrated(steady, [1e6], (3.0, 5.0), rows=0)
+        code, y, _, counters = integrated(steady, [1e6, 2e6], (3.0, 5.0), rows=0)
         assert (code, counters[ACCEPTED]) == (DONE, 10)
         assert y[0] == pytest.approx(1e6 + 2.0, rel=1e-14)
+
+
+class TestControl:
+    """Steps that are tried where the errors, in units of the tolerance, are given."""
+
+    def tried(self, span, first, errors):
+        steps, jacobians, errors = [], [], iter(errors)
+
+        def first_step(field, t, y, p, length, rtol, work, jacobian, counters):
+            assert length == span[1] - span[0]
+            # Nothing is known yet: the new state counts as the threshold atol / rtol.
+            assert (work[NEW, 0], work[THRESHOLDS, 0]) == (pytest.approx(1e-2), 1e-5)
+            return first
+
+        def attempt(field, t, y, p, h, rtol, *rest):
+            steps.append(h)
+            return next(errors, math.inf) * rtol
+
+        replaced = {
+            "first_step": first_step,
+            "attempt": attempt,
+            "difference_quotients": lambda *arguments: jacobians.append(len(steps)),
+            "time_derivative": lambda *arguments: None,
+        }
+        work, counters = scratch(2)
+        record = np.zeros((0, 3))
+        integrate = plain(kernels, **replaced).integrate
+        code = integrate(steady, (), *span, np.zeros(2), 1e-3, 1e-5, record, work, counters)
+        return code, steps, jacobians, counters
+
+    def test_steps_shrink_and_grow_with_the_cube_root_of_the_error(self):
+        """By 0.8 times the root, within 0.1 and 5; no step grows that follows a rejected one."""
+        errors = [8.0, 1.0 / 8.0, 1.0 / 8.0, 0.0, 1e-9, 1e9, math.nan, 1.0, 1.0, 1.0 / 64.0]
+        code, steps, jacobians, counters = self.tried((1.0, 101.0), 0.01, errors)
+        wanted = [0.01, 0.004, 0.004, 0.0064, 0.032, 0.16, 0.016, 0.0016, 0.0016, 0.00128, 0.004096]
+        np.testing.assert_allclose(steps[:11], wanted, rtol=1e-9)
+        assert counters[ACCEPTED] == 7
+        # A rejected step is tried again with the same Jacobian.
+        assert jacobians == [0, 2, 3, 4, 5, 8, 9, 10]
+        # Then no step is good enough, down to sixteen units of rounding of the time.
+        assert code == STEP_TOO_SMALL
+        assert steps[-1] == pytest.approx(16.0 * 2.0**-52, rel=0.05)
+        assert steps[-2] > steps[-1]
+        assert counters[REJECTED] == len(steps) - counters[ACCEPTED]
+
+    def test_a_last_step_that_is_rejected_is_not_the_last(self):
+        errors = [0.0] * 9 + [8.0] + [0.0] * 3
+        code, steps, _, counters = self.tried((0.0, 1.0), 0.5, errors)
+        np.testing.assert_allclose(steps, [0.1] * 10 + [0.04, 0.04, 0.02], rtol=1e-9)
+        assert (code, counters[ACCEPTED], counters[REJECTED]) == (DONE, 12, 1)
