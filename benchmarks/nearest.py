@@ -390,7 +390,10 @@ NEAREST = {
     "hybrid/transform/surface.py": ("transform/test_filippov.py", "transform/test_two_folds.py"),
     "lyapunov/kernels.py": ("../lyapunov/test_spectrum.py", "../lyapunov/test_two_orbit.py"),
     "lyapunov/spectrum.py": ("../lyapunov/test_spectrum_rules.py",),
-    "lyapunov/study/kernels.py": ("../lyapunov/study/test_ode23s.py",),
+    "lyapunov/study/kernels.py": (
+        "../lyapunov/study/test_kernels_rules.py",
+        "../lyapunov/study/test_ode23s.py",
+    ),
     "lyapunov/study/regimes.py": ("../lyapunov/study/test_figures.py",),
     "lyapunov/study/report.py": ("../lyapunov/test_main.py",),
     "lyapunov/study/tangents.py": ("../lyapunov/test_main.py",),

@@ -63,7 +63,7 @@ def test_the_bifurcation_diagram_has_every_point(line):
     across, up = points.get_offsets().T
     np.testing.assert_array_equal(across, np.repeat([1.0, 0.5, 0.8, -1.0], 3))
     np.testing.assert_array_equal(up, line.section.values[:, :, 1].ravel())
-    assert ax.get_ylabel() == "v"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("d", "v")
 
 
 def test_a_map_is_white_at_zero_and_grey_where_nothing_is_known(grid):
@@ -225,6 +225,10 @@ def test_lines_and_maps_want_their_kind_of_chart(line, grid):
     ax = plt.figure().subplots()
     with pytest.raises(ArgumentError, match="over one parameter; this one is over r and d"):
         plot_exponents(grid, ax=ax)
+    with pytest.raises(ArgumentError, match="over one parameter; this one is over r and d"):
+        plot_bifurcation(grid, ax=ax)
+    with pytest.raises(ArgumentError, match=r"chart must be a dataset made with lyapunov\.chart"):
+        plot_bifurcation(line.drop_vars("exponents"), ax=ax)
     with pytest.raises(ArgumentError, match="chart must be over two parameters"):
         plot_map(line, ax=ax)
 

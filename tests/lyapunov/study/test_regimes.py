@@ -34,6 +34,11 @@ def test_each_panel_has_an_orbit_a_section_and_a_history(arc):
     assert axes[2, 0].get_ylim() == (-0.25, 0.75)
     assert axes[2, 1].get_ylim() == (-2.0, 2.0)
     assert [ax.get_legend() for ax in axes[2]] == [None, None]
+    # The dashed line is at zero, the first exponent of a torus.
+    for ax, history in zip(axes[2], histories, strict=True):
+        zero, line = ax.lines
+        assert zero.get_ydata() == [0.0, 0.0]
+        np.testing.assert_array_equal(line.get_ydata(), history)
     # A fixed point is in the middle, as a large dot; each axis reaches to a fifth of its value.
     np.testing.assert_allclose(axes[1, 1].get_xlim(), [-2.4, -1.6], rtol=1e-6)
     np.testing.assert_allclose(axes[1, 1].get_ylim(), [0.4, 0.6], rtol=1e-12)
