@@ -70,6 +70,9 @@ def filippov(
 
     Notes
     -----
+    Where both fields are tangent to the surface (a two-fold), a solution may not be unique. A start exactly
+    there follows a field that leaves the surface, if there is one; sliding may be another solution.
+
     Sliding is not stabilised: ``h`` is an invariant of ``f_s``. It is kept to rounding if ``h`` is affine in
     the state, and to the solver's tolerance otherwise. The transitions out of the sliding mode project the
     state onto the surface.

@@ -11,6 +11,8 @@ The sum over ``2 m`` rounds is that over ``m`` rounds and ``D^m`` times the same
 thousand million rounds.
 """
 
+import math
+
 from numba import njit
 
 from hybrid.kernels.events.derivatives import speed_rounding
@@ -141,7 +143,8 @@ def follow_doubling(model, run, turn, start, before, work):
             sum_of_moves[i] += work.error[i]
             work.settled[i] = start[i] + (0.0 if endless else sum_of_moves[i])
             hidden = rounds * ROUNDING_OF_STATE * EPSILON * abs(work.settled[i])
-            moves = moves or not (endless or abs(work.error[i]) <= hidden)
+            # A component that grows beyond all numbers has an infinite band, and no limit.
+            moves = moves or not (endless or abs(work.error[i]) <= hidden < math.inf)
         if not fires_in_turn(model, run, turn, work.settled, max(rounds, before), work):
             return 0.0
         if not moves:

@@ -201,3 +201,9 @@ class TestDoubling:
         rounds, asked, _ = self.followed(1.0 + 1e-12, 1.0)
         assert rounds == 0.0
         assert len(asked) == 1 + collapse.MOST_DOUBLINGS
+
+    def test_a_component_that_grows_beyond_all_numbers_has_none_either(self):
+        """Its rounding is then infinite, too."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            for ratio in (1.0 + 1e-6, 2.0):
+                assert self.followed(ratio, 1.0)[0] == 0.0
