@@ -264,6 +264,7 @@ NEAREST = {
         "solvers/test_pace.py",
     ),
     "hybrid/kernels/steps/pulses.py": (
+        "kernels/steps/test_pulses_seen_rules.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),

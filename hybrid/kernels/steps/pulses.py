@@ -77,6 +77,13 @@ def is_steady(model, program, path, order, clock, start, h, negligible, work):
     return True, widths[last]
 
 
+@njit(**INLINE)
+def _bound_at_stage(model, program, t, row, work):
+    """Bounds of all rows at the time and the state of one stage, a row of ``work.places``; the last row."""
+    place = work.places[row : row + 1]
+    return model.bound(model.programs, program, place, 0, -1, t, 1.0, 0.0, 0.0, work.registers)
+
+
 @njit(**KERNEL)
 def _take_samples(model, program, path, order, clock, start, nodes, h, seen, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
@@ -89,18 +96,7 @@ def _take_samples(model, program, path, order, clock, start, nodes, h, seen, wor
     for j in range(len(nodes)):
         place = nodes[j] * h
         if seen:
-            last = model.bound(
-                model.programs,
-                program,
-                work.places[j : j + 1],
-                0,
-                -1,
-                start + place,
-                1.0,
-                0.0,
-                0.0,
-                work.registers,
-            )
+            last = _bound_at_stage(model, program, start + place, j, work)
         else:
             last = model.bound(
                 model.programs, program, path, order, clock, start, 1.0, place, 0.0, work.registers
@@ -185,18 +181,7 @@ def _hidden_from_stages(model, program, start, nodes, h, negligible, tolerance, 
     """
     for k in range(len(nodes), work.places.shape[0]):
         place = work.places[k, model.dimension] * h
-        last = model.bound(
-            model.programs,
-            program,
-            work.places[k : k + 1],
-            0,
-            -1,
-            start + place,
-            1.0,
-            0.0,
-            0.0,
-            work.registers,
-        )
+        last = _bound_at_stage(model, program, start + place, k, work)
         j = 0
         while nodes[j + 1] * h < place:
             j += 1
