@@ -210,7 +210,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             fired = parts.arrived(task)
             if fired == NO_TRANSITION:
                 return DONE
-            run.pending = parts.first_in_order(task, fired)
+            run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)
             continue
         if is_full(task.record):
             return RECORD_FULL
@@ -235,4 +235,4 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
         if fired != NO_TRANSITION:
-            run.pending = parts.first_in_order(task, fired)
+            run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)

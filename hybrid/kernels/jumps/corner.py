@@ -14,6 +14,7 @@ from hybrid.kernels.events.guards import (
     was_left_behind,
     widen_scale,
 )
+from hybrid.kernels.events.landing import land_beyond
 from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
 from hybrid.kernels.events.resolution import NOT_KNOWN, leads_to_guard, stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
@@ -31,7 +32,7 @@ from hybrid.kernels.types.codes import (
     NO_TRANSITION,
     STALE,
 )
-from hybrid.kernels.types.kinds import INTEGER, TRUTH
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.layout import Model, Run, Task, Work
 from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.task import task_of
@@ -174,39 +175,46 @@ def turns_back(model, run, transition, before, work):
     return acceleration * before > acceleration_rounding(model, run, transition, mode, t, run.y, work)
 
 
-@exported(INTEGER, Task, INTEGER)
-def first_in_order(task, fired):
+@exported(INTEGER, Task, INTEGER, INTEGER, REAL)
+def first_in_order(task, fired, stop_cycle, stop_phase):
     """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
 
-    Notes whether order matters. None if ``fired`` may not fire or has only touched, and no other is due: the
+    The run lands beyond the guards of all that are due. Notes whether order matters. None if ``fired`` may not fire or has only touched, and no other is due: the
     run then goes on from this point. What comes before the guard there, and what after it, may differ by
     rounding alone, so its side is left to the next step: the crossing is behind, and cannot be found where it
     was refused.
     """
     _, model, _, run, record, work = task_of(task)
-    mode, t = run.mode, run.phase
+    mode = run.mode
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
         if run.rehearsal[3, other] != 0:
             # It crosses here or later on the step; it may have changed sides before.
             run.side[other] = run.rehearsal[3, other] if run.rehearsal[3, other] != NOT_KNOWN else 0
             run.rehearsal[3, other] = 0
-    before = run.side[fired]
+    before, direction = run.side[fired], model.direction[fired]
+    beyond = direction if direction != 0 else -before
+    land_beyond(model, run, fired, beyond, stop_cycle, stop_phase, work)
+    t = run.phase
     take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
-    direction = model.direction[fired]
     # For a guard that is not affine, the change of sign is proved.
     touched = (
         model.affine_guard[fired] == 1
-        and turns_back(model, run, fired, -direction if direction != 0 else before, work)
+        and turns_back(model, run, fired, -beyond, work)
         and allowed(model, fired, t, run.y, work.scalar)
     )
-    run.side[fired] = direction if direction != 0 else -before
+    run.side[fired] = beyond
     if run.on_guard[fired] == 0:
         run.on_guard[fired] = order_passed(model, fired)
     run.due[fired] = 0 if touched else 1
     if touched:
         value = guard_value(model, fired, t, run.y, work.scalar)
         keep_grazing(model, run, record, fired, t, run.y, value, work)
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if run.due[other] == 1 and other != fired:
+            land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
+    t = run.phase
     chosen, first, together, matters = NO_TRANSITION, NO_TRANSITION, 0, False
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]

@@ -424,7 +424,7 @@ class Parts(Structure):
     finish_chatter: function(TRUTH, Task, INTEGER, REAL)
     complete: INTEGER
     rest: function(None, Task, INTEGER)
-    first_in_order: function(INTEGER, Task, INTEGER)
+    first_in_order: function(INTEGER, Task, INTEGER, INTEGER, REAL)
 
 
 # The driver itself comes as an argument to those who call it, for the same reason.

@@ -1,0 +1,90 @@
+"""An event lands on the far side: beyond its guard, by more than the rounding of the guard there.
+
+The root of a guard on a step is known up to rounding, on this side of zero or on that. A reset, a condition or
+another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a comparison. Each of them must find
+the crossing made. So the state of an event is the first on the flow at which the guard has the far sign by more
+than its rounding, or, where the guard or a force jumps, at which it has jumped.
+"""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
+from hybrid.kernels.events.derivatives import moment_of_rounding
+from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_speed, guard_value, may_jump, rounding_band
+from hybrid.kernels.types.options import KERNEL
+
+# The guard of an event is this share of its rounding band beyond zero: four units in the last place.
+BEYOND = 0.25
+# Places that are tried, each at least twice as far as the last: a jump is that close to where it was found.
+MOST_PLACES = 12
+# The flow goes on through the guard if its speed keeps this share on the way.
+KEPT = 0.5
+
+
+@njit(**KERNEL)
+def _is_beyond(model, run, transition, side, x, work):
+    """Whether a guard at ``x`` has the sign ``side`` by more than its rounding, or after its jump."""
+    t = run.phase
+    value = guard_value(model, transition, t, x, work.scalar) * side
+    if not value > 0.0:
+        return False
+    if may_jump(model, run, transition, t, x, work):
+        return True
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    return value >= BEYOND * rounding_band(model, run, transition, t, x, work)
+
+
+@njit(**KERNEL)
+def _way_beyond(model, run, transition, side, work):
+    """A guard's time to get from its value to beyond its rounding at its speed; 0 if that does not lead there.
+
+    ``work.field`` is current.
+    """
+    t = run.phase
+    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
+    value = guard_value(model, transition, t, run.y, work.scalar) * side
+    # A little farther than needed: the place is rounded, too.
+    distance = 2.0 * BEYOND * rounding_band(model, run, transition, t, run.y, work) - value
+    return distance / speed if 0.0 < speed < math.inf and 0.0 < distance < math.inf else 0.0
+
+
+@njit(**KERNEL)
+def _goes_on(model, transition, mode, t, x, side, speed, work):
+    """Whether a guard keeps its ``speed`` up to ``x``, as at a crossing deeper than its rounding."""
+    model.field(mode, t, x, model.parameters, work.field_after)
+    return guard_speed(model, transition, t, x, work.field_after, work.gradient) * side >= KEPT * speed
+
+
+@njit(**KERNEL)
+def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
+    """Move a run along the flow until the guard that it has reached has the sign ``side``.
+
+    Nothing is moved where the guard dips to that side by less than its rounding. The clock does not pass the
+    stop of the run. Tangent vectors stay: they change by rounding.
+    """
+    if side == 0 or _is_beyond(model, run, transition, side, run.y, work):
+        return
+    n, mode = model.dimension, run.mode
+    model.field(mode, run.phase, run.y, model.parameters, work.field)
+    speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient) * side
+    least = moment_of_rounding(model, run, run.phase, work)
+    span = max(least, _way_beyond(model, run, transition, side, work))
+    cycle, phase, low = run.cycle, run.phase, run.phase_low
+    for _ in range(MOST_PLACES):
+        for i in range(n):
+            work.state[i] = run.y[i] + span * work.field[i]
+        forward(run, model.period, span)
+        if time_left(model, run, stop_cycle, stop_phase) < 0.0:
+            set_clock(run, stop_cycle, stop_phase)
+        if _is_beyond(model, run, transition, side, work.state, work):
+            if speed > 0.0 and not _goes_on(model, transition, mode, run.phase, work.state, side, speed, work):
+                break
+            for i in range(n):
+                run.y[i] = work.state[i]
+            run.since_entry += span
+            return
+        run.cycle, run.phase, run.phase_low = cycle, phase, low
+        span *= 2.0
+    run.cycle, run.phase, run.phase_low = cycle, phase, low
