@@ -325,7 +325,8 @@ def spread_by_rounding(programs, transition, t, clock, x, scale, share, register
     """How far a guard may be from its value at ``(t, x)`` when each argument is off by its rounding.
 
     A component of the state may be off by ``share`` times its size in ``scale (n,)``, the time by ``share``
-    times ``clock``. The returned distance is negative if the guard may jump within this rounding.
+    times ``clock``. The returned distance is negative if the guard may jump across zero within this rounding.
+    It is zero for a jump on one side of zero: the guard is on that side, however large the jump is.
     """
     first = programs.first[transition]
     for place in range(first, programs.first[transition + 1]):
@@ -340,7 +341,7 @@ def spread_by_rounding(programs, transition, t, clock, x, scale, share, register
         else:
             _constant_leaf(programs, place, row)
     last = registers[_run(programs, transition, registers, FAR)]
-    low, high = last[LOW] - last[HIGH_MIDDLE], last[HIGH] - last[LOW_MIDDLE]
-    jumps = not last[MOST_SLOPE] - last[LEAST_SLOPE] < math.inf
-    distance = max(abs(low), abs(high))
-    return -distance if jumps else distance
+    distance = max(last[HIGH_MIDDLE] - last[LOW], last[HIGH] - last[LOW_MIDDLE])
+    if last[MOST_SLOPE] - last[LEAST_SLOPE] < math.inf:
+        return distance
+    return 0.0 if last[LOW] > 0.0 or last[HIGH] < 0.0 else -distance
