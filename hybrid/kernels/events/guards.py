@@ -116,6 +116,24 @@ def gradient_band(model, run, t, gradient):
     return ROUNDING_OF_STATE * EPSILON * size
 
 
+@njit(**KERNEL)
+def carry_rounding(model, run, transition, t, x, after, jacobian, sizes):
+    """Carry the sizes by which rounding is judged through a reset from ``x (n,)`` to ``after (n,)``.
+
+    A reset moves the rounding ``r`` of the state to ``abs(D_x R) r``, and rounds its own result.
+    ``jacobian (n, n + 1)`` and ``sizes (n,)`` are scratch.
+    """
+    n = model.dimension
+    model.reset_jacobian(transition, t, x, model.parameters, jacobian)
+    for i in range(n):
+        size = 0.0
+        for j in range(n):
+            size += abs(jacobian[i, j]) * run.scale[j]
+        sizes[i] = max(size, abs(after[i])) if size < math.inf else abs(after[i])
+    for i in range(n):
+        run.scale[i] = sizes[i]
+
+
 @njit(**INLINE)
 def displace(model, x, distance, gradient, out):
     """Write the state beside ``x (n,)`` where a guard is larger by ``distance`` into ``out``.

@@ -12,13 +12,16 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.derivatives import moment_of_rounding
-from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_speed, guard_value, may_jump, rounding_band
+from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band, size_of_time
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
-# The guard of an event is this share of its rounding band beyond zero: four units in the last place.
-BEYOND = 0.25
-# Places that are tried, each at least twice as far as the last: a jump is that close to where it was found.
-MOST_PLACES = 12
+# The guard of an event is beyond zero by this share of its rounding band, two units in the last place, or more.
+BEYOND = 0.125
+# The next number beyond a guard that is exactly zero, and so has no rounding.
+NEXT_TO_ZERO = 1e-200
+# A jump lies no farther from where it was found than the state moves in so many times its rounding.
+FARTHEST = 64.0
 # The flow goes on through the guard if its speed keeps this share on the way.
 KEPT = 0.5
 
@@ -46,7 +49,7 @@ def _way_beyond(model, run, transition, side, work):
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
     value = guard_value(model, transition, t, run.y, work.scalar) * side
     # A little farther than needed: the place is rounded, too.
-    distance = 2.0 * BEYOND * rounding_band(model, run, transition, t, run.y, work) - value
+    distance = 1.5 * BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
     return distance / speed if 0.0 < speed < math.inf and 0.0 < distance < math.inf else 0.0
 
 
@@ -58,33 +61,53 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
-    """Move a run along the flow until the guard that it has reached has the sign ``side``.
-
-    Nothing is moved where the guard dips to that side by less than its rounding. The clock does not pass the
-    stop of the run. Tangent vectors stay: they change by rounding.
-    """
-    if side == 0 or _is_beyond(model, run, transition, side, run.y, work):
-        return
+def _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, work):
+    """``land_beyond`` with ``run.scale`` as the sizes of the state itself, at most the time ``farthest`` on."""
     n, mode = model.dimension, run.mode
-    model.field(mode, run.phase, run.y, model.parameters, work.field)
+    if _is_beyond(model, run, transition, side, run.y, work):
+        return
     speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient) * side
-    least = moment_of_rounding(model, run, run.phase, work)
-    span = max(least, _way_beyond(model, run, transition, side, work))
+    span = _way_beyond(model, run, transition, side, work)
+    farthest = max(2.0 * span, farthest)
+    if span == 0.0:
+        # The guard jumps, or is flat.
+        span = EPSILON * max(size_of_time(model, run.phase), farthest)
     cycle, phase, low = run.cycle, run.phase, run.phase_low
-    for _ in range(MOST_PLACES):
+    while span <= farthest:
         for i in range(n):
             work.state[i] = run.y[i] + span * work.field[i]
         forward(run, model.period, span)
         if time_left(model, run, stop_cycle, stop_phase) < 0.0:
             set_clock(run, stop_cycle, stop_phase)
         if _is_beyond(model, run, transition, side, work.state, work):
-            if speed > 0.0 and not _goes_on(model, transition, mode, run.phase, work.state, side, speed, work):
-                break
-            for i in range(n):
-                run.y[i] = work.state[i]
-            run.since_entry += span
-            return
+            if not speed > 0.0 or _goes_on(
+                model, transition, mode, run.phase, work.state, side, speed, work
+            ):
+                for i in range(n):
+                    run.y[i] = work.state[i]
+                run.since_entry += span
+                return
+            break
         run.cycle, run.phase, run.phase_low = cycle, phase, low
         span *= 2.0
     run.cycle, run.phase, run.phase_low = cycle, phase, low
+
+
+@njit(**KERNEL)
+def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
+    """Move a run along the flow until the guard that it has reached has the sign ``side``.
+
+    The rounding that counts is that of the guard at this state, not that of the way there. Nothing is moved
+    where the guard dips to that side by less than its rounding. The clock does not pass the stop of the run.
+    Tangent vectors stay: they change by rounding.
+    """
+    if side == 0:
+        return
+    n = model.dimension
+    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
+    farthest = FARTHEST * moment_of_rounding(model, run, run.phase, work)
+    for i in range(n):
+        work.error[i], run.scale[i] = run.scale[i], abs(run.y[i])
+    _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, work)
+    for i in range(n):
+        run.scale[i] = work.error[i]

@@ -6,6 +6,7 @@ from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.events.derivatives import acceleration_rounding, speed_rounding
 from hybrid.kernels.events.guards import (
     allowed,
+    carry_rounding,
     guard_acceleration,
     guard_speed,
     guard_value,
@@ -125,9 +126,9 @@ def settle(model, run, first, out, work):
     for _ in range(MOST_JUMPS):
         due[fired] = 0
         model.reset(fired, t, out, model.parameters, work.state)
+        carry_rounding(model, run, fired, t, out, work.state, work.reset_jacobian, work.settled)
         for i in range(n):
             out[i] = work.state[i]
-            run.scale[i] = max(run.scale[i], abs(out[i]))
         left, mode = mode, model.target[fired]
         if mode == NO_MODE:
             break

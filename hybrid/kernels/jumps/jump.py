@@ -12,6 +12,7 @@ from hybrid.kernels.arithmetic.tangent import (
     strain,
 )
 from hybrid.kernels.events.guards import (
+    carry_rounding,
     error_band,
     guard_acceleration,
     guard_speed,
@@ -207,6 +208,8 @@ def leave(model, run, transition, transversality, work):
     mode, target = run.mode, model.target[transition]
     if mode == target and model.marker[transition] == 0:
         remember_impulse(model, run, transition, transversality, work)
+    if target != NO_MODE:
+        carry_rounding(model, run, transition, run.phase, run.y, work.new, work.reset_jacobian, work.state)
     move(model, run, transition, mode if target == NO_MODE else target, work.new)
 
 
