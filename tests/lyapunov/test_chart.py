@@ -284,7 +284,7 @@ def test_a_chart_is_stored_taken_up_and_refused_by_name(tmp_path):
     assert first.identical(lyapunov.chart(system, **call, store=path))
     finer = {**call, "over": {"A": [1.0, 1.05, 1.1]}}
     assert_same(lyapunov.chart(system, **finer, store=path), lyapunov.chart(system, **finer))
-    assert_same(hybrid.open(path), lyapunov.chart(system, **finer))
+    assert_same(hybrid.open_store(path), lyapunov.chart(system, **finer))
     for change, message in (
         ({"intervals": 61}, "intervals was '60', and is now '61'"),
         ({"parameters": {"c": 0.2}}, r"parameter_c was '\(none\)', and is now '0.2'"),
