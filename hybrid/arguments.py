@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Set
 from math import inf, isfinite
 from numbers import Real
 from typing import Any, TypeVar
+from unicodedata import normalize
 
 import numpy as np
 
@@ -187,6 +188,10 @@ def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
     """A name that exists; in the error text ``what`` comes first and ``kind`` heads the list of names."""
     names = list(allowed)
     if not isinstance(value, str) or value not in names:
+        # Python reads names in source text in this form.
+        plain = normalize("NFKC", value) if isinstance(value, str) else None
+        if plain in names:
+            return str(plain)
         raise ArgumentError(unknown_name(what, value, names, kind))
     return value
 

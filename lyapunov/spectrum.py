@@ -128,7 +128,7 @@ class LyapunovSpectrum:
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.standard_error, strict=True)
         values = ", ".join(f"{value:.8g} +- {error:.1g}" for value, error in pairs)
-        return f"<LyapunovSpectrum [{values}] of {self.intervals} intervals, {self.status.code.name}>"
+        return f"<LyapunovSpectrum [{values}] of {self.intervals} intervals, {self.status.brief}>"
 
 
 @growing

@@ -331,13 +331,13 @@ class _Writer:
 
     def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
         shape = () if function.size is None else (function.size,)
-        name = self._opaque_name(function.title, function.value, reason, shape)
+        name = self._opaque_name(function.title, function.function, reason, shape, function.completed is not None)
         return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
 
     def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
         shape = () if function.size is None else (function.size,)
         name, columns = (
-            self._opaque_name(function.title, function.value, reason, shape),
+            self._opaque_name(function.title, function.function, reason, shape, function.completed is not None),
             self.system.dimension + 1,
         )
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
@@ -378,7 +378,12 @@ class _Writer:
         return [f"out[{i}, {j}]" for i in range(function.size) for j in columns]
 
     def _opaque_name(
-        self, title: str, function: Callable[..., Any], reason: ModelError, shape: tuple[int, ...]
+        self,
+        title: str,
+        function: Callable[..., Any],
+        reason: ModelError,
+        shape: tuple[int, ...],
+        completed: bool = False,
     ) -> str:
         for name, known in self.opaque.items():
             if known.function is function and known.shape == shape:
@@ -386,7 +391,9 @@ class _Writer:
         check_plain(title, function)
         name, names = f"model_{len(self.opaque)}", tuple(self.system.parameters)
         why = str(reason).rstrip(".")
-        self.opaque[name] = OpaqueFunction(title, function, why, self.system.state, names, shape)
+        self.opaque[name] = OpaqueFunction(
+            title, function, why, self.system.state, names, shape, completed=completed
+        )
         return name
 
 
@@ -397,7 +404,7 @@ def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
 
 
 def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> Written:
-    function = reset_function(system.transitions[index], system.dimension)
+    function = reset_function(system.transitions[index], system.state)
     return writer.identity() if function is None else writer.write(function)
 
 

@@ -217,11 +217,18 @@ def _replace_rounding(statement, function):
 
 
 class WholeNumberCompiler(CompilerBase):
-    """Numba's passes and one more, which replaces arithmetic on whole numbers."""
+    """Numba's passes and one more, which replaces arithmetic on whole numbers.
+
+    A subclass may name another one, which comes before it.
+    """
+
+    first_pass = None
 
     def define_pipelines(self):
         """The one pipeline."""
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.add_pass_after(_CheckWholeNumbers, IRProcessing)
+        if self.first_pass is not None:
+            pipeline.add_pass_after(self.first_pass, IRProcessing)
         pipeline.finalize()
         return [pipeline]

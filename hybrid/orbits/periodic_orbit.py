@@ -109,7 +109,7 @@ class PeriodicOrbit:
     def __repr__(self) -> str:
         return (
             f"<PeriodicOrbit period {self.period:.9g}, largest multiplier {abs(self.multipliers[0]):.6g}, "
-            f"residual {self.residual:.1e}, {self.status.code.name}>"
+            f"residual {self.residual:.1e}, {self.status.brief}>"
         )
 
     def to_xarray(self) -> xarray.Dataset:
@@ -254,6 +254,7 @@ class _Shooting:
             magnitude,
             status_of(trajectory, code),
             hidden,
+            trajectory.beyond,
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -311,6 +312,9 @@ class _Shooting:
             trial = self.shoot(attrs.evolve(shot.point, x=shot.point.x + part * change, period=period))
         except ArgumentError:
             # No mode allows the point.
+            return best
+        if set(trial.beyond) - set(shot.beyond):
+            # The step went through a guard, so the shot follows other events.
             return best
         return trial if trial.size(newton.scale) < best.size(newton.scale) else best
 

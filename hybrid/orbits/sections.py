@@ -84,7 +84,7 @@ class Section:
         )
 
     def __repr__(self) -> str:
-        return f"<Section of {len(self)} points, {self.status.code.name}>"
+        return f"<Section of {len(self)} points, {self.status.brief}>"
 
 
 @growing

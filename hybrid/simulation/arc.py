@@ -354,7 +354,7 @@ class HybridArc:
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
-        return f"<HybridArc {span}, {len(self.jumps)} jumps, {self.status.code.name}>"
+        return f"<HybridArc {span}, {len(self.jumps)} jumps, {self.status.brief}>"
 
     def __getitem__(self, component: str) -> np.ndarray:
         """A component of the state at the points of the arc, ``(N,)``.

@@ -47,11 +47,14 @@ def simulate(
     system
         The model.
     x0
-        State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``.
+        State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``. A Series of pandas or a
+        DataArray of xarray that is labelled with the names is read by these, in any order.
     t_span
         ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
     mode
-        Mode to start in; by default the only one, or the only one whose guards allow ``x0``.
+        Mode to start in; by default the only one, or the ``start`` of the system, or the only one whose guards
+        allow ``x0``. In a mode that is known so, a guard that ``x0`` lies beyond counts as crossed, and the
+        status says so.
     parameters
         Values that override the system's.
     solver

@@ -79,6 +79,9 @@ class HybridSystem(Portable):
         Default values by name; any call may override them.
     modes, transitions
         Nodes and edges. If guards are crossed at the same time, the transition listed first fires.
+    start
+        Name of the mode that a run starts in if the call names none. In a system that has been split it may
+        be a mode from before: the run starts in the part that the state lies in.
     period
         Forcing period, a number or a function of ``p``. Every model function must have this period in
         ``t``, which is checked. Time is then stored as a number of whole periods and a phase.
@@ -100,6 +103,7 @@ class HybridSystem(Portable):
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
+    start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
@@ -149,6 +153,8 @@ class HybridSystem(Portable):
             f"parameters: {parameters or 'none'}",
             f"modes: {', '.join(self.mode_names)}",
         ]
+        if self.start is not None:
+            lines.append(f"start: {self.start}")
         if self.period is not None:
             period = "a function of the parameters" if callable(self.period) else f"{self.period:.6g}"
             lines.append(f"period: {period}")
@@ -244,6 +250,21 @@ class HybridSystem(Portable):
         parts = [i for i, mode in enumerate(self.modes) if name in (mode.name, mode.part_of)]
         return parts or [self.mode_index(name)]
 
+    def check_mode(self, name: object, what: str = "Mode") -> None:
+        """ModelError unless a run may start in a mode of that name; ``what`` begins the text."""
+        names = [*self.mode_names, *(mode.part_of for mode in self.modes if mode.part_of)]
+        if self.growth is not None:
+            # No part of a mode may have been made yet.
+            names += self.growth.original.mode_names
+        if not isinstance(name, str) or name not in names:
+            raise ModelError(unknown_name(what, name, dict.fromkeys(names), "Modes"))
+
+    def starting_mode(self, mode: str | None) -> str | None:
+        """The mode that a call names, or the only one, or ``start``; None if the guards choose it."""
+        if mode is not None:
+            return mode
+        return self.mode_names[0] if len(self.modes) == 1 and self.is_whole else self.start
+
     def copies_of(self, name: str) -> list[int]:
         """Indices of the transitions that are copies of a transition, or of the one of that name."""
         copies = []
@@ -294,6 +315,8 @@ class HybridSystem(Portable):
                 if name is not None and name not in self.mode_names:
                     what = f"Transition {transition.name!r}: {end} mode"
                     raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
+        if self.start is not None:
+            self.check_mode(self.start, "HybridSystem: start mode")
         if self.is_whole:
             # The modes between those of a stage may not have been made yet.
             self._check_reachable()
@@ -314,7 +337,7 @@ class HybridSystem(Portable):
 
 def functions_of(system: HybridSystem) -> Iterator[tuple[int, ModelFunction]]:
     """Every model function with the index of its mode or transition, fields first."""
-    return functions_in(system.modes, system.transitions, system.dimension)
+    return functions_in(system.modes, system.transitions, system.state)
 
 
 def as_system(name: str, value: object) -> HybridSystem:

@@ -18,6 +18,7 @@ def filippov(
     above: Function,
     switching: Function,
     *,
+    start: str | None = None,
     period: float | Function | None = None,
     name: str = "",
     units: Mapping[str, str] | None = None,
@@ -51,7 +52,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    period, name, units
+    start, period, name, units
         As for `HybridSystem`.
 
     Returns
@@ -135,6 +136,7 @@ def filippov(
         parameters=parameters,
         modes=modes,
         transitions=transitions,
+        start=start,
         period=period,
         name=name,
         units={} if units is None else units,

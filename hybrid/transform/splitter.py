@@ -22,6 +22,7 @@ from hybrid.symbolic.switches import Resolved, Surfaces, Switches
 from hybrid.symbolic.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
+from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
 from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
@@ -234,7 +235,8 @@ class Splitter:
         if transition.reset is None:
             return [*self.symbols.x]
         try:
-            return trace(transition.reset.function, self.variables.state, self.variables.parameter_names)
+            reset = WholeReset(transition.reset.function, self.variables.state)
+            return trace(reset, self.variables.state, self.variables.parameter_names)
         except TraceError:
             return None
 

@@ -192,7 +192,7 @@ CASES = {
         ball(), (1.0, 0.0), 9.0, StatusCode.ACCUMULATION, "rests on its guard", {"parameters": {"e": 0.0}}
     ),
     "stuck": Case(facing(), (-1.0,), 3.0, StatusCode.STUCK, "left->right", {"mode": "left"}),
-    "refused": Case(ball(), (-1.0, 0.0), 1.0, StatusCode.FAILED, "is allowed in no mode"),
+    "beyond": Case(ball(), (-1.0, 0.0), 1.0, StatusCode.SUCCESS, "lies beyond the guard of"),
 }
 # Only with tangent vectors; of results that are no runs; of Ctrl-C; and of steps that are kept.
 NEVER = {
