@@ -125,7 +125,7 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         StatusCode.OUT_OF_MEMORY: (
             f"The steps and jumps that the run keeps fill a third of this machine's memory {where}.",
             "The result holds everything up to that time. Ask for the states at given times with samples=: "
-            "then the steps are not kept.",
+            "then neither the steps nor, without keep_jumps=True, the jumps are kept.",
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",

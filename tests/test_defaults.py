@@ -27,15 +27,15 @@ DEFAULTS = {
     hybrid.Mode: {"jacobian": None, "part_of": None},
     hybrid.Reset: {"jacobian": None},
     hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},
-    hybrid.HybridSystem: {"transitions": (), "period": None, "name": "", "notes": (), "growth": None},
+    hybrid.HybridSystem: {"transitions": (), "start": None, "period": None, "name": "", "notes": (), "growth": None},
     hybrid.Answer: {
         **{"times": None, "saltation": None, "fundamental": None, "exponents": None},
         **{"steps": None, "seconds": None},
     },
-    hybrid.filippov: {"period": None, "name": "", "units": None},
+    hybrid.filippov: {"start": None, "period": None, "name": "", "units": None},
     hybrid.from_equations: PLAIN,
     hybrid.global_error: {**RUN, "max_jumps": 100_000},
-    hybrid.simulate: {**RUN, "tangent": None, "samples": None, "max_jumps": 100_000},
+    hybrid.simulate: {**RUN, "tangent": None, "samples": None, "keep_jumps": None, "max_jumps": 100_000},
     hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None},
     hybrid.periodic_orbit: {
         **RUN,

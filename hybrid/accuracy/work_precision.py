@@ -340,6 +340,7 @@ def _own(
         solver=solver,
         tangent=tangent,
         samples=[t_span[1]],
+        keep_jumps=True,
     )
     if arc.status.code == StatusCode.INTERRUPTED:
         raise KeyboardInterrupt

@@ -229,7 +229,7 @@ class _OneByOne:
             reached = found.times[found.times <= arc.t[-1]]
             found.states[i, : len(reached)] = arc(reached)
             found.states[i, -1], found.t_end[i] = arc.x[-1], arc.t[-1]
-            found.mode[i], found.jumps[i] = str(arc.mode[-1]), len(arc.jumps)
+            found.mode[i], found.jumps[i] = str(arc.mode[-1]), arc.jump_count
             found.tell(i, arc.status)
 
 
