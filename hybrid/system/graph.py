@@ -21,6 +21,7 @@ from hybrid.system.growth import Growth, grows
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
+from hybrid.system.watched import Watched
 from hybrid.system.variables import Variables, as_parameters, as_state
 
 if TYPE_CHECKING:
@@ -111,6 +112,8 @@ class HybridSystem(Portable):
     notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_notes, repr=False)
     # What makes further modes, for a system that is made in stages.
     growth: Growth | None = attrs.field(default=None, kw_only=True, validator=_growth, repr=False)
+    # What the functions read that this system was derived from.
+    derived_from: Watched = attrs.field(factory=Watched, kw_only=True, eq=False, repr=False)
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 

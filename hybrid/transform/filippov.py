@@ -8,6 +8,7 @@ from hybrid.errors import ModelError, shown
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.watched import Watched
 from hybrid.transform.surface import SwitchingSurface
 
 
@@ -140,6 +141,7 @@ def filippov(
         period=period,
         name=name,
         units={} if units is None else units,
+        derived_from=Watched([below, above, switching]),
     )
 
 

@@ -23,7 +23,8 @@ from hybrid.symbolic.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, functions_of
+from hybrid.system.watched import Watched
 from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.naming import Names
@@ -60,6 +61,8 @@ class Splitter:
 
     def __init__(self, system: HybridSystem) -> None:
         self.original = system
+        functions = [function for _, function in functions_of(system)]
+        self.watched = Watched([*(f.function for f in functions), *(f.derivative for f in functions)])
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
         self.heights: dict[int, Function] = {}
@@ -198,7 +201,14 @@ class Splitter:
         modes = [self.known[cell][0] for cell in self.made]
         notes = (*self.original.notes, *self.names.notes)
         growth = self if self.frontier else None
-        return attrs.evolve(self.original, modes=modes, transitions=transitions, notes=notes, growth=growth)
+        return attrs.evolve(
+            self.original,
+            modes=modes,
+            transitions=transitions,
+            notes=notes,
+            growth=growth,
+            derived_from=self.watched,
+        )
 
     def name_of(self, cell: Cell) -> str:
         """Name of the mode of a cell."""
