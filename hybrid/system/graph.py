@@ -154,13 +154,12 @@ class HybridSystem(Portable):
             f"HybridSystem {self.name}".rstrip(),
             f"state: {state}",
             f"parameters: {parameters or 'none'}",
-            f"modes: {', '.join(self.mode_names)}",
+            f"modes: {', '.join(map(repr, self.mode_names))}",
         ]
         if self.start is not None:
-            lines.append(f"start: {self.start}")
+            lines.append(f"start: {self.start!r}")
         if self.period is not None:
-            period = "a function of the parameters" if callable(self.period) else f"{self.period:.6g}"
-            lines.append(f"period: {period}")
+            lines.append(f"period: {self._period_told()}")
         if self.switching:
             inside = "; ".join(f"{', '.join(names)} in mode {mode}" for mode, names in self.switching.items())
             lines.append(f"kinks or jumps inside of modes: {inside} (hybrid.split makes modes of them)")
@@ -168,6 +167,14 @@ class HybridSystem(Portable):
         if not self.is_whole:
             lines.append("A run adds the modes that it needs.")
         return lines
+
+    def _period_told(self) -> str:
+        """The period at the default parameters, if it has one there."""
+        try:
+            period = f"{self.forcing_period():.6g}"
+        except (ArithmeticError, ValueError):
+            return "a function of the parameters"
+        return f"{period}, a function of the parameters" if callable(self.period) else period
 
     def _transition_rows(self) -> list[list[str]]:
         return [

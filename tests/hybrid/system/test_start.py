@@ -45,7 +45,7 @@ def test_an_unknown_start_is_refused():
 
 def test_the_start_survives_changes_copies_and_pickling():
     system = two_springs(start="stiff")
-    assert "start: stiff" in repr(system)
+    assert "start: 'stiff'" in repr(system)
     assert attrs.evolve(system, name="springs").start == "stiff"
     # The functions of this system cannot be pickled, so it is made of some that can.
     plain = HybridSystem(state=1, modes=[Mode("a", identity), Mode("b", identity)], start="b",
