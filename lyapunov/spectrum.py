@@ -132,9 +132,7 @@ class LyapunovSpectrum:
         values = ", ".join(f"{value:.8g} +- {error:.1g}" for value, error in pairs)
         if not self.intervals:
             return f"<LyapunovSpectrum without a complete interval, {self.status}>"
-        return (
-            f"<LyapunovSpectrum [{values}] of {counted(self.intervals, 'interval')}, {self.status.brief}>"
-        )
+        return f"<LyapunovSpectrum [{values}] of {counted(self.intervals, 'interval')}, {self.status.brief}>"
 
     def _repr_html_(self) -> str:
         """The exponents as a table for a notebook, with the sum rule and the status."""

@@ -14,8 +14,7 @@ from models.rocking_block import rocking_block
 from models.simplest_walker import simplest_walker
 from models.slip_hopper import slip_hopper
 from models.solvable_oscillator import solvable_oscillator
-from models.stick_slip import coulomb_stick_slip
-from models.stick_slip import stick_slip
+from models.stick_slip import coulomb_stick_slip, stick_slip
 from models.stop_oscillator import stop_oscillator
 from models.switched_arrival import switched_arrival
 from models.three_disk_billiard import three_disk_billiard

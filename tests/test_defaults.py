@@ -27,7 +27,14 @@ DEFAULTS = {
     hybrid.Mode: {"jacobian": None, "part_of": None},
     hybrid.Reset: {"jacobian": None},
     hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},
-    hybrid.HybridSystem: {"transitions": (), "start": None, "period": None, "name": "", "notes": (), "growth": None},
+    hybrid.HybridSystem: {
+        "transitions": (),
+        "start": None,
+        "period": None,
+        "name": "",
+        "notes": (),
+        "growth": None,
+    },
     hybrid.Answer: {
         **{"times": None, "saltation": None, "fundamental": None, "exponents": None},
         **{"steps": None, "seconds": None},

@@ -22,8 +22,8 @@ def test_an_orbit_shows_its_transitions_and_the_sign_of_its_multiplier():
         models.simplest_walker(), (0.2003, 0.4006, -0.1998, -0.0158), mode="behind", period=3.88
     )
     assert sorted(orbit.transitions) == ["heelstrike", "passing"]
-    shown = "<PeriodicOrbit period 3.88246375 from 'behind' through 'heelstrike', 'passing', largest multiplier 1,"
-    assert repr(orbit).startswith(shown)
+    shown = "<PeriodicOrbit period 3.88246375 from 'behind' through 'heelstrike', 'passing', largest "
+    assert repr(orbit).startswith(f"{shown}multiplier 1,")
     pair = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
     assert re.search(r"through 'impact', largest multiplier -0\.584295 \+- 0\.0056\d*i,", repr(pair))
     flipped = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0), parameters={"r": 0.3})

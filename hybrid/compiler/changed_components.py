@@ -38,7 +38,9 @@ class _CompleteChanges(FunctionPass):
         for block in func_ir.blocks.values():
             body: list[object] = []
             for statement in block.body:
-                is_dict = isinstance(statement, ir.Assign) and getattr(statement.value, "op", "") == "build_map"
+                is_dict = (
+                    isinstance(statement, ir.Assign) and getattr(statement.value, "op", "") == "build_map"
+                )
                 if is_dict and statement.target.name in returned:
                     _complete(func_ir, statement, body, state.pipeline.components)
                     changed = True

@@ -350,8 +350,8 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     """Trace, differentiate and compile a model; repeated calls return the first result.
 
     Values that model functions take from globals, closures, objects and tables, also through functions that
-    they call, belong to what is compiled: after a change of one of them the model is compiled again. Parameters
-    are the quick way to change a value.
+    they call, belong to what is compiled: after a change of one of them the model is compiled again.
+    Parameters are the quick way to change a value.
 
     Raises
     ------
@@ -387,9 +387,9 @@ def _watched(system: HybridSystem) -> Watched:
     """What the functions of a system read now."""
     if not system.derived_from.holds():
         raise ModelError(
-            f"{system.name or 'The system'} was derived from model functions that read a global, a closure or "
-            "a table which has changed since. Derive the system again (split, from_equations, filippov), or "
-            "make the value a parameter."
+            f"{system.name or 'The system'} was derived from model functions that read a global, a closure "
+            "or a table which has changed since. Derive the system again (split, from_equations, filippov), "
+            "or make the value a parameter."
         )
     # A field is looked at once for jumps, which may be others now.
     with suppress(AttributeError):

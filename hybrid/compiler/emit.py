@@ -331,13 +331,17 @@ class _Writer:
 
     def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
         shape = () if function.size is None else (function.size,)
-        name = self._opaque_name(function.title, function.function, reason, shape, function.completed is not None)
+        name = self._opaque_name(
+            function.title, function.function, reason, shape, function.completed is not None
+        )
         return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
 
     def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
         shape = () if function.size is None else (function.size,)
         name, columns = (
-            self._opaque_name(function.title, function.function, reason, shape, function.completed is not None),
+            self._opaque_name(
+                function.title, function.function, reason, shape, function.completed is not None
+            ),
             self.system.dimension + 1,
         )
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)

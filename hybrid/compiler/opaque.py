@@ -219,7 +219,9 @@ def _short(error: Exception) -> str:
     lines = [line.strip(" |>") for line in str(error).splitlines()]
     empty = ("Failed in", "During", "File", "There are", "Overload", "- Of", "raised from", "<source", "^")
     telling = [line for line in lines if line and not line.startswith(empty)]
-    text = (telling or lines or ["it gives no reason"])[0].rstrip(".")
+    if not lines:
+        return f"it failed with {type(error).__name__}"
+    text = (telling or lines)[0].rstrip(".")
     if text.endswith("signature:") and len(telling) > 1:
         text = f"{text} {telling[1]}"
     text = text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]} ..."

@@ -29,4 +29,8 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
         "iterations": orbit.iterations,
     }
     made_by = attributes("periodic orbit", orbit.status, orbit.system, orbit.parameters)
-    return xarray.Dataset(variables, names.coords(), {**made_by, "signature": list(orbit.signature), "transitions": list(orbit.transitions)})
+    return xarray.Dataset(
+        variables,
+        names.coords(),
+        {**made_by, "signature": list(orbit.signature), "transitions": list(orbit.transitions)},
+    )

@@ -33,8 +33,8 @@ class Shot:
     """What one integration over the period gives.
 
     ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``hidden
-    (n,)`` is the part of the gap that is lost in the rounding of components that hardly move. ``beyond`` names
-    the transitions whose guards the start lies beyond.
+    (n,)`` is the part of the gap that is lost in the rounding of components that hardly move. ``beyond``
+    names the transitions whose guards the start lies beyond.
     """
 
     point: Point

@@ -113,7 +113,8 @@ class PeriodicOrbit:
         through = f" through {', '.join(map(repr, self.transitions))}" if self.transitions else ""
         return (
             f"<PeriodicOrbit period {self.period:.9g} from {self.mode!r}{through}, "
-            f"largest multiplier {_written(self.multipliers[0])}, residual {self.residual:.1e}, {self.status.brief}>"
+            f"largest multiplier {_written(self.multipliers[0])}, residual {self.residual:.1e}, "
+            f"{self.status.brief}>"
         )
 
     def to_xarray(self) -> xarray.Dataset:

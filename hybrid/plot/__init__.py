@@ -84,7 +84,7 @@ def plot(result: Any, **options: Any) -> Any:
 
 
 class _Plot(ModuleType):
-    """This module, which draws what it is called with."""
+    """The class of this module, which draws what it is called with."""
 
     def __call__(self, result: Any, **options: Any) -> Any:
         """As :func:`plot`."""

@@ -381,7 +381,8 @@ class HybridArc:
         """The points of the arc over time: ``x`` (axes ``t`` and ``state``), ``j``, ``mode``.
 
         Without ``samples`` a time occurs twice at each jump, with both states; ``arc.jumps.to_xarray()``
-        has the jumps. ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open_store` reads it.
+        has the jumps. ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open_store` reads
+        it.
         """
         import xarray
 

@@ -54,9 +54,9 @@ def simulate(
     t_span
         ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
     mode
-        Mode to start in; by default the only one, or the ``start`` of the system, or the only one whose guards
-        allow ``x0``. In a mode that is known so, a guard that ``x0`` lies beyond counts as crossed, and the
-        status says so.
+        Mode to start in; by default the only one, or the ``start`` of the system, or the only one whose
+        guards allow ``x0``. In a mode that is known so, a guard that ``x0`` lies beyond counts as crossed,
+        and the status says so.
     parameters
         Values that override the system's.
     solver
@@ -99,7 +99,9 @@ def simulate(
     if keep_jumps is None:
         keep_jumps = times is None
     elif not arguments.flag("keep_jumps", keep_jumps) and times is None:
-        raise ArgumentError("keep_jumps=False needs samples=: the points of an arc are made of its jumps too.")
+        raise ArgumentError(
+            "keep_jumps=False needs samples=: the points of an arc are made of its jumps too."
+        )
     trajectory = start(
         system,
         x0,

@@ -40,7 +40,8 @@ def start(
 ) -> Trajectory:
     """A trajectory at its start, everything about the call checked.
 
-    Without a ``mode`` the system says where a run starts; the guards do if it does not, or with ``by_guards``.
+    Without a ``mode`` the system says where a run starts. The guards do if it does not, or with
+    ``by_guards``.
 
     ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
     name of the argument that ``t0`` comes from, ``horizon`` how long the run takes, 0 if that is not known,

@@ -40,6 +40,7 @@ BLOCKS_PER_THREAD = 8
 STARTS = "be states of shape (N, n), or map each component to a number or to N of them"
 
 
+@arguments.without_tolerances
 def simulate_many(
     system: HybridSystem,
     x0: ArrayLike | Mapping[str, ArrayLike],

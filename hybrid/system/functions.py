@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from hybrid.errors import ModelError, shown, unknown_name
+from hybrid.errors import ModelError, unknown_name
 from hybrid.system.elements import Mode, Transition
 from hybrid.system.labels import plain_name
 from hybrid.system.variables import STATE

@@ -21,8 +21,8 @@ from hybrid.system.growth import Growth, grows
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
-from hybrid.system.watched import Watched
 from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
     import networkx as nx

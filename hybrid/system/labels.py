@@ -1,4 +1,4 @@
-"""Names of a model in arguments: normalised as Python normalises its source, and read from labelled values."""
+"""Names of a model in arguments: normalised as in Python's source, and read from labelled values."""
 
 from __future__ import annotations
 
@@ -68,7 +68,5 @@ def _labels_of(value: Any) -> list[list[Any] | None] | None:
     if pandas is not None and isinstance(value, (pandas.Series, pandas.DataFrame)):
         return [axis.tolist() for axis in value.axes]
     if xarray is not None and isinstance(value, xarray.DataArray):
-        return [
-            value.coords[dim].values.tolist() if dim in value.coords else None for dim in value.dims
-        ]
+        return [value.coords[dim].values.tolist() if dim in value.coords else None for dim in value.dims]
     return None

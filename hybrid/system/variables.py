@@ -94,8 +94,8 @@ class Variables:
         both = [name for name in self.state_names if name in self.parameters]
         if both:
             raise ModelError(
-                f"HybridSystem: {', '.join(map(repr, both))} is the name of a state and of a parameter. A name "
-                "means one thing; rename one of the two."
+                f"HybridSystem: {', '.join(map(repr, both))} is the name of a state and of a parameter. A "
+                "name means one thing; rename one of the two."
             )
 
     @property

@@ -188,9 +188,7 @@ class TestSamples:
 
     def test_exactly_at_events(self, ride):
         times = ride.jumps.t
-        arc = simulate(
-            OSCILLATOR, (0.0, 0.0), (0.0, 60.0), samples=times, keep_jumps=True, solver=TIGHT
-        )
+        arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), samples=times, keep_jumps=True, solver=TIGHT)
         np.testing.assert_allclose(arc.x, ride.jumps.x_plus, atol=1e-14)
         np.testing.assert_array_equal(arc.j, np.arange(1, len(times) + 1))
         np.testing.assert_array_equal(arc.jumps.t, times)

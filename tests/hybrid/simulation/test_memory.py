@@ -154,7 +154,9 @@ class TestRecordsThatFillTheMemory:
         np.testing.assert_allclose(arc.x[:, 0], np.sin([1.0, end]), rtol=0, atol=1e-8)
 
     def test_jumps_count_too(self, small):
-        arc = hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing", samples=[1e6], keep_jumps=True)
+        arc = hybrid.simulate(
+            self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing", samples=[1e6], keep_jumps=True
+        )
         assert arc.status.code == hybrid.StatusCode.OUT_OF_MEMORY
         assert len(arc.jumps) == int(arc.jumps[-1].t / (2 * np.pi) + 0.5)
 
@@ -167,7 +169,7 @@ class TestRecordsThatFillTheMemory:
         assert arc.jump_count == int(end / (2 * np.pi))
         assert not arc.keeps_jumps
         assert repr(arc) == f"<HybridArc t = 1 to 200000, {arc.jump_count} jumps, SUCCESS>"
-        with pytest.raises(hybrid.ArgumentError, match="did not keep its jumps.*keep_jumps=True"):
+        with pytest.raises(hybrid.ArgumentError, match=r"did not keep its jumps.*keep_jumps=True"):
             len(arc.jumps)
 
     def test_the_jumps_of_a_whole_arc_belong_to_its_points(self):

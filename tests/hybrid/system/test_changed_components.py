@@ -13,7 +13,9 @@ def ball(reset, state=("q", "v"), **options):
         parameters={"g": 9.81, "e": 0.8},
         modes=[Mode("flight", lambda t, x, p: (x[1], -p.g))],
         transitions=[
-            Transition("flight", "flight", Guard(lambda t, x, p: x[0], -1), Reset(reset, **options), name="hit")
+            Transition(
+                "flight", "flight", Guard(lambda t, x, p: x[0], -1), Reset(reset, **options), name="hit"
+            )
         ],
     )
 
@@ -61,9 +63,13 @@ def test_a_split_system_keeps_it():
     system = HybridSystem(
         state=("q", "v"),
         modes=[Mode("m", lambda t, x, p: (x.v, -1.0 - 0.1 * np.sign(x.v)))],
-        transitions=[Transition("m", "m", Guard(lambda t, x, p: x.q, -1), Reset(lambda t, x, p: {"v": -x.v}))],
+        transitions=[
+            Transition("m", "m", Guard(lambda t, x, p: x.q, -1), Reset(lambda t, x, p: {"v": -x.v}))
+        ],
     )
-    [jump] = [each for each in simulate(split(system), (0.5, 0.0), (0.0, 1.5)).jumps if each.x_minus[1] < -0.1]
+    [jump] = [
+        each for each in simulate(split(system), (0.5, 0.0), (0.0, 1.5)).jumps if each.x_minus[1] < -0.1
+    ]
     assert jump.x_plus[1] == -jump.x_minus[1]
 
 
@@ -75,7 +81,10 @@ def test_it_has_the_properties_of_every_system():
 @pytest.mark.parametrize(
     ("reset", "text"),
     [
-        (lambda t, x, p: {"w": 1.0}, "'hit': reset: State component 'w' does not exist. State components: q, v"),
+        (
+            lambda t, x, p: {"w": 1.0},
+            "'hit': reset: State component 'w' does not exist. State components: q, v",
+        ),
         (lambda t, x, p: {"vv": 1.0}, "Did you mean 'v'"),
         (lambda t, x, p: {1: 1.0}, "State component 1 does not exist"),
         (lambda t, x, p: {"v": "fast"}, "value 1 is not a number: 'fast'"),

@@ -39,7 +39,9 @@ def test_a_run_without_a_name_starts_where_the_system_says():
 
 
 def test_an_unknown_start_is_refused():
-    with pytest.raises(ModelError, match="start mode 'stif' does not exist. Modes: soft, stiff. Did you mean"):
+    with pytest.raises(
+        ModelError, match=r"start mode 'stif' does not exist. Modes: soft, stiff. Did you mean"
+    ):
         two_springs(start="stif")
 
 
@@ -48,8 +50,12 @@ def test_the_start_survives_changes_copies_and_pickling():
     assert "start: 'stiff'" in repr(system)
     assert attrs.evolve(system, name="springs").start == "stiff"
     # The functions of this system cannot be pickled, so it is made of some that can.
-    plain = HybridSystem(state=1, modes=[Mode("a", identity), Mode("b", identity)], start="b",
-                         transitions=[Transition("a", "b", Guard(first, +1)), Transition("b", "a", Guard(first, -1))])
+    plain = HybridSystem(
+        state=1,
+        modes=[Mode("a", identity), Mode("b", identity)],
+        start="b",
+        transitions=[Transition("a", "b", Guard(first, +1)), Transition("b", "a", Guard(first, -1))],
+    )
     assert pickle.loads(pickle.dumps(plain)).start == "b"
 
 
