@@ -80,10 +80,10 @@ def _complete(func_ir, statement, body, components):
     changed = {}
     for key, value in statement.value.items:
         definitions = func_ir._definitions.get(key.name, [])
-        names = {getattr(each, "value", None) for each in definitions}
-        if len(names) != 1:
+        keys = {getattr(each, "value", None) for each in definitions}
+        if len(keys) != 1:
             raise ModelError("the names in the dict that a reset returns must be written as they are")
-        changed[plain_name(names.pop())] = value
+        changed[plain_name(keys.pop())] = value
 
     def new(what, value):
         var = ir.Var(scope, f"$changed.{what}.{len(body)}.{place.line}.{id(statement)}", place)
@@ -108,8 +108,6 @@ def compiler_for(components):
     if components is None:
         return WholeNumberCompiler
 
-    class _Completing(WholeNumberCompiler):
-        first_pass = _CompleteChanges
-
-    _Completing.components = components
-    return _Completing
+    return type(
+        "Completing", (WholeNumberCompiler,), {"first_pass": _CompleteChanges, "components": components}
+    )

@@ -24,7 +24,7 @@ from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
 from hybrid.system.functions import CONDITION, ModelFunction
-from hybrid.system.graph import HybridSystem, as_system, functions_of
+from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
 from hybrid.system.watched import Watched
 
@@ -394,9 +394,7 @@ def _watched(system: HybridSystem) -> Watched:
     # A field is looked at once for jumps, which may be others now.
     with suppress(AttributeError):
         object.__delattr__(system, "switching")
-    functions = [function for _, function in functions_of(system)]
-    period = system.period if callable(system.period) else None
-    return Watched([*(f.function for f in functions), *(f.derivative for f in functions), period])
+    return watched_by(system)
 
 
 def emitted_of(system: HybridSystem) -> Emitted:

@@ -330,20 +330,11 @@ class _Writer:
         return Written(value, self._complex_step(function, reason))
 
     def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
-        shape = () if function.size is None else (function.size,)
-        name = self._opaque_name(
-            function.title, function.function, reason, shape, function.completed is not None
-        )
+        name = self._opaque_values(function, reason)
         return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
 
     def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
-        shape = () if function.size is None else (function.size,)
-        name, columns = (
-            self._opaque_name(
-                function.title, function.function, reason, shape, function.completed is not None
-            ),
-            self.system.dimension + 1,
-        )
+        name, columns = self._opaque_values(function, reason), self.system.dimension + 1
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
         lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
         cells = iter(self._cells(function))
@@ -380,6 +371,11 @@ class _Writer:
         if function.size is None:
             return [f"out[{j}]" for j in columns]
         return [f"out[{i}, {j}]" for i in range(function.size) for j in columns]
+
+    def _opaque_values(self, function: ModelFunction, reason: ModelError) -> str:
+        shape = () if function.size is None else (function.size,)
+        completed = function.completed is not None
+        return self._opaque_name(function.title, function.function, reason, shape, completed)
 
     def _opaque_name(
         self,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import operator
+from typing import Any
 
 from numba.core import ir, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -222,7 +223,7 @@ class WholeNumberCompiler(CompilerBase):
     A subclass may name another one, which comes before it.
     """
 
-    first_pass = None
+    first_pass: Any = None
 
     def define_pipelines(self):
         """The one pipeline."""

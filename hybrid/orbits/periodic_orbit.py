@@ -15,7 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.hidden import FINEST_GAP, SAMPLES, hidden_gap
-from hybrid.orbits.labelled import labelled_orbit
+from hybrid.orbits.labelled import described_orbit, labelled_orbit
 from hybrid.orbits.newton import EPSILON, ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.simulation.arc import HybridArc, Jump
@@ -110,12 +110,7 @@ class PeriodicOrbit:
     status: Status
 
     def __repr__(self) -> str:
-        through = f" through {', '.join(map(repr, self.transitions))}" if self.transitions else ""
-        return (
-            f"<PeriodicOrbit period {self.period:.9g} from {self.mode!r}{through}, "
-            f"largest multiplier {_written(self.multipliers[0])}, residual {self.residual:.1e}, "
-            f"{self.status.brief}>"
-        )
+        return described_orbit(self)
 
     def to_xarray(self) -> xarray.Dataset:
         """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
@@ -125,13 +120,6 @@ class PeriodicOrbit:
         """The orbit over one period, with the jumps at both ends if it jumps at its point."""
         span = (self.t0, self.t0 + self.period)
         return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
-
-
-def _written(multiplier: complex) -> str:
-    """A multiplier with its sign, or one of a complex pair."""
-    if not multiplier.imag:
-        return f"{multiplier.real:.6g}"
-    return f"{multiplier.real:.6g} +- {abs(multiplier.imag):.6g}i"
 
 
 @growing

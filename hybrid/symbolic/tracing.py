@@ -55,8 +55,8 @@ def _told(error: Exception) -> str:
         if str(frame.f_globals.get("__name__")).startswith("numpy.linalg"):
             return (
                 f"np.linalg.{frame.f_code.co_name} of numbers that depend on the state cannot be traced: "
-                "write the solution out (Cramer's rule for two or three unknowns), or multiply by the inverse "
-                "if the matrix is constant"
+                "write the solution out (Cramer's rule for two or three unknowns), or multiply by the "
+                "inverse if the matrix is constant"
             )
     return f"{type(error).__name__}: {error}"
 

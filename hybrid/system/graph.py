@@ -350,6 +350,13 @@ def functions_of(system: HybridSystem) -> Iterator[tuple[int, ModelFunction]]:
     return functions_in(system.modes, system.transitions, system.state)
 
 
+def watched_by(system: HybridSystem) -> Watched:
+    """The values that the functions of a system read now from elsewhere."""
+    functions = [function for _, function in functions_of(system)]
+    period = system.period if callable(system.period) else None
+    return Watched([*(each.function for each in functions), *(each.derivative for each in functions), period])
+
+
 def as_system(name: str, value: object) -> HybridSystem:
     """A system, or an ArgumentError that begins with the name of the argument."""
     return arguments.instance(name, value, HybridSystem, "Call the model's factory first.")

@@ -23,11 +23,10 @@ from hybrid.symbolic.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
-from hybrid.system.graph import HybridSystem, functions_of
-from hybrid.system.watched import Watched
+from hybrid.system.graph import HybridSystem, watched_by
 from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
-from hybrid.transform.naming import Names
+from hybrid.transform.naming import Names, copy_name
 
 # Parts may differ from the field by so much of its largest value: other orders of the same sums.
 AGREEMENT = 1e-9
@@ -61,8 +60,7 @@ class Splitter:
 
     def __init__(self, system: HybridSystem) -> None:
         self.original = system
-        functions = [function for _, function in functions_of(system)]
-        self.watched = Watched([*(f.function for f in functions), *(f.derivative for f in functions)])
+        self.watched = watched_by(system)
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
         self.heights: dict[int, Function] = {}
@@ -394,7 +392,9 @@ class Splitter:
         }
         guard = self._smooth_guard(cell, outgoing)
         if transition.target is None:
-            yield Edge(attrs.evolve(transition, guard=guard, name=_copy_name(transition, own), **new), None)
+            yield Edge(
+                attrs.evolve(transition, guard=guard, name=copy_name(transition.name, own), **new), None
+            )
             return
         asked = [] if guard.when is None else [self._truth(guard.when)]
         limit = self._limit(cell, transition)
@@ -413,7 +413,7 @@ class Splitter:
                 target=self.name_of(landing.cell),
                 guard=attrs.evolve(guard, when=when),
                 reset=transition.reset if after == outgoing.reset else Reset(expressed(after or ())),
-                name=_copy_name(transition, own, to if len(landings) > 1 else ""),
+                name=copy_name(transition.name, own, to if len(landings) > 1 else ""),
                 **new,
             )
             yield Edge(copy, landing.cell, limit)
@@ -494,12 +494,6 @@ def _begun(system: HybridSystem) -> Splitter:
     splitter = Splitter(system)
     splitter.begin()
     return splitter
-
-
-def _copy_name(transition: Transition, own: str, to: str = "") -> str:
-    """Name of the copy of a user's transition that leaves some sides, and leads to others if they matter."""
-    sides = f"{own}->{to}" if own and to else own or (to and f"->{to}")
-    return f"{transition.name} ({sides})" if sides else transition.name
 
 
 def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:
