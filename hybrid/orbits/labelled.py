@@ -37,7 +37,7 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
 
 
 def described_orbit(orbit: Any) -> str:
-    """A :class:`hybrid.PeriodicOrbit` in one line: where it goes, and its largest multiplier with its sign."""
+    """A :class:`hybrid.PeriodicOrbit` in one line: where it goes, its largest multiplier with its sign."""
     through = f" through {', '.join(map(repr, orbit.transitions))}" if orbit.transitions else ""
     largest = orbit.multipliers[0]
     pair = f" +- {abs(largest.imag):.6g}i" if largest.imag else ""

@@ -313,10 +313,9 @@ class _Shooting:
         except ArgumentError:
             # No mode allows the point.
             return best
-        if set(trial.beyond) - set(shot.beyond):
-            # The step went through a guard, so the shot follows other events.
-            return best
-        return trial if trial.size(newton.scale) < best.size(newton.scale) else best
+        # A step through a guard leads to other events.
+        crossed = set(trial.beyond) - set(shot.beyond)
+        return best if crossed or not trial.size(newton.scale) < best.size(newton.scale) else trial
 
     def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.

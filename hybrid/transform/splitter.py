@@ -199,14 +199,8 @@ class Splitter:
         modes = [self.known[cell][0] for cell in self.made]
         notes = (*self.original.notes, *self.names.notes)
         growth = self if self.frontier else None
-        return attrs.evolve(
-            self.original,
-            modes=modes,
-            transitions=transitions,
-            notes=notes,
-            growth=growth,
-            derived_from=self.watched,
-        )
+        made: dict[str, Any] = {"modes": modes, "transitions": transitions, "notes": notes, "growth": growth}
+        return attrs.evolve(self.original, **made, derived_from=self.watched)
 
     def name_of(self, cell: Cell) -> str:
         """Name of the mode of a cell."""
