@@ -86,7 +86,7 @@ def chains(turns: int) -> list[list[str]]:
             theirs = heyoka_chain(masses, x0, t_end, gap, tol)
             apart = np.abs(ours().x[-1] - theirs()).max()
             one, other = least([ours, theirs], turns)
-            cells = [str(2 * masses), f"{t_end:g}", str(len(ours().jumps)), f"{tol:.0e}"]
+            cells = [str(2 * masses), f"{t_end:g}", str(ours().jump_count), f"{tol:.0e}"]
             rows.append(
                 [*cells, f"{1e3 * one:.3f}", f"{1e3 * other:.3f}", f"{other / one:.2f}", f"{apart:.0e}"]
             )

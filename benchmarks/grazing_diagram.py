@@ -73,7 +73,9 @@ def point(beyond: float, transient: int = 20_000, intervals: int = 1000, shown: 
     # The transient is run without tangent vectors.
     settled = stroboscopic_section(SYSTEM, START, periods=shown, transient=transient, **run)
     x0 = settled.x[-1]
-    jumps = simulate(SYSTEM, x0, (0.0, shown * PERIOD), samples=[shown * PERIOD], **run).jumps
+    jumps = simulate(
+        SYSTEM, x0, (0.0, shown * PERIOD), samples=[shown * PERIOD], keep_jumps=True, **run
+    ).jumps
     spectrum = lyapunov_spectrum(SYSTEM, x0, k=1, intervals=intervals, transient=50, **run)
     exact, pair = exact_exponent(beyond, jumps.t), math.nan
     if math.isnan(exact):

@@ -168,7 +168,7 @@ def memory(side: int) -> None:
         path = folder / "run.zarr"
         clock, processor = times(lambda: hybrid.sweep(task, {"a": values, "b": values}, store=path))
         after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        opened = min(times(lambda: hybrid.open(path))[0] for _ in range(3))
+        opened = min(times(lambda: hybrid.open_store(path))[0] for _ in range(3))
         files = sum(1 for each in path.rglob("*") if each.is_file())
         size = sum(each.stat().st_size for each in path.rglob("*") if each.is_file())
     print(
@@ -206,9 +206,9 @@ def opening(side: int) -> None:
             part = made(points.values, range(first, min(first + 20_000, len(points))))
             store.write(part)
             sheet.put(part)
-        running = times(lambda: hybrid.open(path))[0]
+        running = times(lambda: hybrid.open_store(path))[0]
         store.finish(sheet.dataset(Labels(), made_by), True)
-        finished = min(times(lambda: hybrid.open(path))[0] for _ in range(3))
+        finished = min(times(lambda: hybrid.open_store(path))[0] for _ in range(3))
         again = times(lambda: hybrid.sweep(task, {"a": values, "b": values}, store=path))[0]
     print(
         f"Opened while the sweep runs in {running:.2f} s, when it has ended in {finished:.2f} s; the same "

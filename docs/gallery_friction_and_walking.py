@@ -56,7 +56,15 @@ def largest_displacement(system: HybridSystem, parameters: Mapping[str, float]) 
     """Largest displacement of the settled motion, at which the mass turns or stops."""
     period = system.forcing_period(parameters)
     t_end = 25 * period
-    arc = simulate(system, (0.0, 1.0), (0.0, t_end), parameters=parameters, solver=LOOSE, samples=[t_end])
+    arc = simulate(
+        system,
+        (0.0, 1.0),
+        (0.0, t_end),
+        parameters=parameters,
+        solver=LOOSE,
+        samples=[t_end],
+        keep_jumps=True,
+    )
     return float(np.abs(arc.jumps.x_minus[arc.jumps.t > t_end - 2 * period, 0]).max())
 
 
@@ -77,7 +85,14 @@ def simplest_walker(ax: Axes) -> None:
     for gamma in np.linspace(0.0135, 0.019, 100):
         parameters = {"gamma": float(gamma)}
         arc = simulate(
-            system, x0, (0.0, t_end), mode=mode, parameters=parameters, solver=LOOSE, samples=[t_end]
+            system,
+            x0,
+            (0.0, t_end),
+            mode=mode,
+            parameters=parameters,
+            solver=LOOSE,
+            samples=[t_end],
+            keep_jumps=True,
         )
         heelstrikes = arc.jumps.x_plus[[jump.transition == "heelstrike" for jump in arc.jumps]]
         angles = heelstrikes[-70:, 0]

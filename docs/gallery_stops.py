@@ -28,7 +28,14 @@ def bouncing_table(ax: Axes) -> None:
         for periods in (60, 60):  # the first run is a transient
             end = periods * period
             arc = simulate(
-                system, x, (0.0, end), mode=mode, parameters=parameters, samples=[end], solver=COARSE
+                system,
+                x,
+                (0.0, end),
+                mode=mode,
+                parameters=parameters,
+                samples=[end],
+                keep_jumps=True,
+                solver=COARSE,
             )
             x, mode = arc.x[-1], str(arc.mode[-1])
         speeds = -arc.jumps.x_minus[:, 1]
@@ -41,7 +48,9 @@ def impact_pair(ax: Axes) -> None:
     system = models.impact_pair()
     parameters = {"d": 1.0}
     end = 5000 * system.forcing_period()
-    arc = simulate(system, (0.1, 1.0), (0.0, end), parameters=parameters, samples=[end], solver=COARSE)
+    arc = simulate(
+        system, (0.1, 1.0), (0.0, end), parameters=parameters, samples=[end], keep_jumps=True, solver=COARSE
+    )
     right = arc.jumps.x_minus[:, 1] > 0
     ax.plot(arc.jumps.t[right] / (2 * np.pi) % 1, arc.jumps.x_minus[right, 1], **DOTS)
     ax.set_xlabel("phase of the impact on the right wall")

@@ -69,7 +69,7 @@ def main() -> None:
 
 def draw(store: Path) -> None:
     """The largest exponent and the kinds of motion, with the paper's regimes as points."""
-    swept = hybrid.open(store)
+    swept = hybrid.open_store(store)
     # Lines that are not complete yet are left out.
     swept = swept.isel(D=(swept.status != hybrid.StatusCode.NOT_RUN).all("omega").values)
     with style():

@@ -5,7 +5,7 @@ imported and runs only when a call first needs it.
 """
 
 from importlib import import_module
-from types import ModuleType
+from typing import Any
 
 from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
@@ -20,7 +20,7 @@ from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Solver, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.many import simulate_many
-from hybrid.sweep.store import open
+from hybrid.sweep.store import open_store
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
@@ -58,7 +58,7 @@ __all__ = [
     "filippov",
     "from_equations",
     "global_error",
-    "open",
+    "open_store",
     "periodic_orbit",
     "poincare_section",
     "saltation_matrix",
@@ -75,7 +75,7 @@ __all__ = [
 ON_DEMAND = ("plot", "testing")
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> Any:
     if name in ON_DEMAND:
         return import_module(f"hybrid.{name}")
     raise AttributeError(f"module 'hybrid' has no attribute {name!r}")

@@ -6,10 +6,13 @@ booleans and complex numbers are not accepted as numbers.
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Set
 from math import inf, isfinite
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
+from unicodedata import normalize
 
 import numpy as np
 
@@ -17,6 +20,8 @@ from hybrid.errors import ArgumentError, unknown_name
 from hybrid.errors import shown as shown
 
 Kind = TypeVar("Kind")
+Given = ParamSpec("Given")
+SOLVER_OPTIONS = ("rtol", "atol", "max_step", "max_steps")
 # Of these a list is known to hold real numbers, without looking at each.
 _PLAIN = {float, int}
 LARGEST_COUNT = int(np.iinfo(np.int64).max)
@@ -187,8 +192,29 @@ def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
     """A name that exists; in the error text ``what`` comes first and ``kind`` heads the list of names."""
     names = list(allowed)
     if not isinstance(value, str) or value not in names:
+        # Python reads names in source text in this form.
+        plain = normalize("NFKC", value) if isinstance(value, str) else None
+        if plain in names:
+            return str(plain)
         raise ArgumentError(unknown_name(what, value, names, kind))
     return value
+
+
+def without_tolerances(function: Callable[Given, Kind]) -> Callable[Given, Kind]:
+    """A function that says where tolerances belong if it is given some: to the solver."""
+    names = inspect.signature(function).parameters
+
+    @functools.wraps(function)
+    def call(*args: Given.args, **kwargs: Given.kwargs) -> Kind:
+        for name in SOLVER_OPTIONS:
+            if name in kwargs and name not in names:
+                raise ArgumentError(
+                    f"{function.__name__}: {name}= is an option of the solver. Write "
+                    f"solver=Taylor({name}={shown(kwargs[name])}), or another solver such as DOP853."
+                )
+        return function(*args, **kwargs)
+
+    return call
 
 
 def _as_float(value: object) -> float | None:

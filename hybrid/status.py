@@ -13,6 +13,8 @@ from hybrid.kernels.types import codes
 if TYPE_CHECKING:
     from hybrid.system.elements import Transition
 
+PLAIN = "Reached the end."
+
 
 class StatusCode(IntEnum):
     """Why a run ended."""
@@ -55,6 +57,14 @@ class Status:
         """Whether the result is complete and valid."""
         return self.code == StatusCode.SUCCESS
 
+    @property
+    def brief(self) -> str:
+        """The code, and the first sentence of what a complete run has to say besides having ended."""
+        said = self.message.removeprefix(f"{PLAIN} ")
+        if not self.ok or said == PLAIN:
+            return self.code.name
+        return f"{self.code.name}: {said.partition('. ')[0].removesuffix('.')}"
+
     def __str__(self) -> str:
         text = f"{self.code.name}: {self.message}"
         return f"{text} {self.remedy}" if self.remedy else text
@@ -67,7 +77,7 @@ DECLARE_PERIOD = (
     "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase of the forcing "
     "then keeps all its digits."
 )
-SUCCESS = Status(StatusCode.SUCCESS, "Reached the end.")
+SUCCESS = Status(StatusCode.SUCCESS, PLAIN)
 
 
 def run_status(code: int, where: str, transition: str | None, *, bare_time: bool) -> Status:
@@ -115,7 +125,7 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         StatusCode.OUT_OF_MEMORY: (
             f"The steps and jumps that the run keeps fill a third of this machine's memory {where}.",
             "The result holds everything up to that time. Ask for the states at given times with samples=: "
-            "then the steps are not kept.",
+            "then neither the steps nor, without keep_jumps=True, the jumps are kept.",
         ),
         StatusCode.TERMINAL: (
             f"Ended by {last} {where}.",

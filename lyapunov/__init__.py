@@ -1,6 +1,6 @@
 """Lyapunov and Floquet exponents of hybrid systems."""
 
-from lyapunov import plot
+from lyapunov import plot as plot
 from lyapunov.chart import chart
 from lyapunov.compare import ModelComparison, compare_models
 from lyapunov.floquet import floquet_exponents
@@ -15,6 +15,5 @@ __all__ = [
     "compare_models",
     "floquet_exponents",
     "lyapunov_spectrum",
-    "plot",
     "two_orbit_exponents",
 ]

@@ -35,6 +35,7 @@ DIMS = {
 RESULTS = ("exponents", "standard_error", "sum_rule", "jumps_per_interval", "x_end", "mode_end", "section")
 
 
+@arguments.without_tolerances
 def chart(
     system: HybridSystem,
     over: Any,

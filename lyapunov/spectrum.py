@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cache
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
+from hybrid.display.tables import counted, html_table
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
@@ -128,7 +130,19 @@ class LyapunovSpectrum:
     def __repr__(self) -> str:
         pairs = zip(self.exponents, self.standard_error, strict=True)
         values = ", ".join(f"{value:.8g} +- {error:.1g}" for value, error in pairs)
-        return f"<LyapunovSpectrum [{values}] of {self.intervals} intervals, {self.status.code.name}>"
+        if not self.intervals:
+            return f"<LyapunovSpectrum without a complete interval, {self.status}>"
+        return f"<LyapunovSpectrum [{values}] of {counted(self.intervals, 'interval')}, {self.status.brief}>"
+
+    def _repr_html_(self) -> str:
+        """The exponents as a table for a notebook, with the sum rule and the status."""
+        unit = self.names.rate.get("units", "")
+        names = ("", f"exponent {unit}".rstrip(), "standard error")
+        pairs = zip(self.exponents, self.standard_error, strict=True)
+        rows = [[str(i), f"{value:.8g}", f"{error:.1g}"] for i, (value, error) in enumerate(pairs, start=1)]
+        rows.append(["sum rule", f"{self.sum_rule:.8g}", ""])
+        told = f"{counted(self.intervals, 'interval')} of {self.interval:.6g}. {self.status}"
+        return f"{html_table(names, rows)}\n<p>{escape(told)}</p>"
 
 
 @growing
@@ -161,7 +175,8 @@ def lyapunov_spectrum(
         Number of exponents, 1 to n; all by default.
     intervals, interval
         Number of intervals to average over, and their length; by default the forcing period, or for an
-        autonomous system the time scale of its field at the start (see ``time_scale``).
+        autonomous system the time scale of its field at the start: the reciprocal of the spectral radius of
+        ``abs(D_x f)`` there.
     transient
         Number of intervals to run first, with tangent vectors, and discard.
     t0

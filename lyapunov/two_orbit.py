@@ -123,7 +123,7 @@ class TwoOrbitExponents:
 
     def __repr__(self) -> str:
         value = f"{self.renormalised_exponent:.8g}"
-        return f"<TwoOrbitExponents {value} of {self.intervals} intervals, {self.status.code.name}>"
+        return f"<TwoOrbitExponents {value} of {self.intervals} intervals, {self.status.brief}>"
 
 
 @growing
@@ -281,7 +281,7 @@ def _companion(
     """A trajectory that starts beside the current point of the reference, at exactly the same time."""
     place = (reference.system, reference.x + offset, reference.t)
     try:
-        companion = start(*place, parameters=parameters, solver=solver)
+        companion = start(*place, parameters=parameters, solver=solver, by_guards=True)
     except ArgumentError:
         companion = start(*place, mode=reference.mode, parameters=parameters, solver=solver)
     if companion.mode == reference.mode:

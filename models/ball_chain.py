@@ -38,29 +38,44 @@ def ball_chain() -> HybridSystem:
     S. McNamara, W. R. Young, "Inelastic collapse and clumping in a one-dimensional granular medium",
     Physics of Fluids A 4, 496-504, 1992. doi:10.1063/1.858323
     """
-
-    def left(t, x, p):
-        v1, v2 = collided(p.m1, x.v1, p.m2, x.v2, p.e)
-        return x.q1, x.q2, x.q3, v1, v2, x.v3
-
-    def right(t, x, p):
-        v2, v3 = collided(p.m2, x.v2, p.m3, x.v3, p.e)
-        return x.q1, x.q2, x.q3, x.v1, v2, v3
-
-    def collided(m, v, M, V, e):
-        change = (1 + e) * (v - V) / (m + M)
-        return v - M * change, V + m * change
-
-    def transition(name, gap, collision):
-        return Transition("flight", "flight", Guard(gap, direction=-1), Reset(collision), name=name)
-
     return HybridSystem(
         name="three balls in a line",
         state=("q1", "q2", "q3", "v1", "v2", "v3"),
         parameters={"m1": 1.0, "m2": 1.0, "m3": 1.0, "e": 1.0},
-        modes=[Mode("flight", lambda t, x, p: (x.v1, x.v2, x.v3, 0.0, 0.0, 0.0))],
+        modes=[Mode("flight", _flight)],
         transitions=[
-            transition("left", lambda t, x, p: x.q2 - x.q1, left),
-            transition("right", lambda t, x, p: x.q3 - x.q2, right),
+            _collision("left", _left_gap, _left),
+            _collision("right", _right_gap, _right),
         ],
     )
+
+
+def _collision(name, gap, reset):
+    return Transition("flight", "flight", Guard(gap, direction=-1), Reset(reset), name=name)
+
+
+def _flight(t, x, p):
+    return x.v1, x.v2, x.v3, 0.0, 0.0, 0.0
+
+
+def _left_gap(t, x, p):
+    return x.q2 - x.q1
+
+
+def _right_gap(t, x, p):
+    return x.q3 - x.q2
+
+
+def _left(t, x, p):
+    v1, v2 = _collided(p.m1, x.v1, p.m2, x.v2, p.e)
+    return x.q1, x.q2, x.q3, v1, v2, x.v3
+
+
+def _right(t, x, p):
+    v2, v3 = _collided(p.m2, x.v2, p.m3, x.v3, p.e)
+    return x.q1, x.q2, x.q3, x.v1, v2, v3
+
+
+def _collided(m, v, M, V, e):
+    change = (1 + e) * (v - V) / (m + M)
+    return v - M * change, V + m * change

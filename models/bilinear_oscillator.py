@@ -37,18 +37,34 @@ def bilinear_oscillator() -> HybridSystem:
     S. W. Shaw, P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and
     Vibration 90(1), 129-155, 1983. doi:10.1016/0022-460X(83)90407-8
     """
-
-    def field(stiffness):
-        return lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - p.c * x.v - stiffness(p) * x.x)
-
     return HybridSystem(
         name="bilinear oscillator",
         state=("x", "v"),
         parameters={"k1": 1.0, "k2": 10.0, "c": 0.1, "A": 1.0, "w": 1.0},
-        modes=[Mode("soft", field(lambda p: p.k1)), Mode("stiff", field(lambda p: p.k2))],
+        modes=[Mode("soft", _soft), Mode("stiff", _stiff)],
         transitions=[
-            Transition("soft", "stiff", Guard(lambda t, x, p: x.x, direction=+1), name="touch"),
-            Transition("stiff", "soft", Guard(lambda t, x, p: x.x, direction=-1), name="leave"),
+            Transition("soft", "stiff", Guard(_displacement, direction=+1), name="touch"),
+            Transition("stiff", "soft", Guard(_displacement, direction=-1), name="leave"),
         ],
-        period=lambda p: 2 * np.pi / p.w,
+        period=_forcing_period,
     )
+
+
+def _soft(t, x, p):
+    return _field(t, x, p, p.k1)
+
+
+def _stiff(t, x, p):
+    return _field(t, x, p, p.k2)
+
+
+def _field(t, x, p, k):
+    return x.v, p.A * np.cos(p.w * t) - p.c * x.v - k * x.x
+
+
+def _displacement(t, x, p):
+    return x.x
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

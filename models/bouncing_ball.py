@@ -37,14 +37,26 @@ def bouncing_ball() -> HybridSystem:
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.8},
         units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2"},
-        modes=[Mode("flight", lambda t, x, p: (x.v, -p.g))],
+        modes=[Mode("flight", _flight)],
         transitions=[
             Transition(
                 "flight",
                 "flight",
-                Guard(lambda t, x, p: x.q, direction=-1),
-                Reset(lambda t, x, p: (0.0, -p.e * x.v)),
+                Guard(_height, direction=-1),
+                Reset(_bounce),
                 name="bounce",
             )
         ],
     )
+
+
+def _flight(t, x, p):
+    return x.v, -p.g
+
+
+def _height(t, x, p):
+    return x.q
+
+
+def _bounce(t, x, p):
+    return 0.0, -p.e * x.v

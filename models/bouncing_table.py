@@ -43,36 +43,57 @@ def bouncing_table() -> HybridSystem:
     Vibration 84(2), 173-189, 1982. J. M. Luck, A. Mehta, "Bouncing ball with a finite restitution:
     Chattering, locking, and chaos", Physical Review E 48(5), 3988-3997, 1993. doi:10.1103/PhysRevE.48.3988
     """
-
-    def weight(t, x, p):
-        return p.g - p.A * p.w**2 * np.sin(p.w * t)
-
     return HybridSystem(
         name="bouncing ball on a vibrating table",
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.5, "A": 0.01, "w": 36.0},
         units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2", "A": "m", "w": "rad/s"},
         modes=[
-            Mode("flight", lambda t, x, p: (x.v, -weight(t, x, p))),
-            Mode("rest", lambda t, x, p: (0.0, 0.0)),
+            Mode("flight", _flight),
+            Mode("rest", _rest),
         ],
         transitions=[
             Transition(
                 "flight",
                 "flight",
-                Guard(lambda t, x, p: x.q, direction=-1),
-                Reset(lambda t, x, p: (0.0, -p.e * x.v)),
+                Guard(_height, direction=-1),
+                Reset(_bounce),
                 accumulates_to="rest",
                 name="bounce",
             ),
             Transition(
                 "rest",
                 "flight",
-                Guard(weight, direction=-1),
+                Guard(_weight, direction=-1),
                 # At the limit of chatter the ball is on the table up to rounding, which must not bounce.
-                Reset(lambda t, x, p: (0.0, 0.0)),
+                Reset(_rest),
                 name="liftoff",
             ),
         ],
-        period=lambda p: 2 * np.pi / p.w,
+        period=_forcing_period,
     )
+
+
+def _weight(t, x, p):
+    """The force of the table on a ball at rest, per mass."""
+    return p.g - p.A * p.w**2 * np.sin(p.w * t)
+
+
+def _flight(t, x, p):
+    return x.v, -_weight(t, x, p)
+
+
+def _rest(t, x, p):
+    return 0.0, 0.0
+
+
+def _height(t, x, p):
+    return x.q
+
+
+def _bounce(t, x, p):
+    return 0.0, -p.e * x.v
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

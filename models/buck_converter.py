@@ -40,22 +40,9 @@ def buck_converter() -> HybridSystem:
     E. Fossas, G. Olivar, "Study of chaos in the buck converter", IEEE Transactions on Circuits and Systems I
     43(1), 13-25, 1996. doi:10.1109/81.481457
     """
-
-    def field(s):
-        return lambda t, x, p: ((x.i - x.v / p.R) / p.C, (s * p.E - x.v) / p.L, 1 / p.T)
-
-    def control(x, p):
-        return p.a * (x.v - p.V_ref)
-
-    def excess(t, x, p):
-        return control(x, p) - p.V_L - (p.V_U - p.V_L) * x.tau
-
-    def ramp_ends(when=None):
-        return Guard(lambda t, x, p: x.tau - 1, direction=+1, when=when)
-
-    above = ramp_ends(when=lambda t, x, p: control(x, p) - p.V_L)
-    below = ramp_ends(when=lambda t, x, p: p.V_L - control(x, p))
-    restart = Reset(lambda t, x, p: (x.v, x.i, 0.0))
+    above = Guard(_ramp_end, direction=+1, when=_above_start)
+    below = Guard(_ramp_end, direction=+1, when=_below_start)
+    restart = Reset(_restart)
     return HybridSystem(
         name="buck converter",
         state=("v", "i", "tau"),
@@ -67,12 +54,48 @@ def buck_converter() -> HybridSystem:
             "v": "V", "i": "A", "t": "s", "E": "V", "L": "H", "C": "F", "R": "Ohm", "T": "s",
             "V_L": "V", "V_U": "V", "V_ref": "V",
         },
-        modes=[Mode("off", field(0.0)), Mode("on", field(1.0))],
+        modes=[Mode("off", _off), Mode("on", _on)],
         transitions=[
-            Transition("off", "on", Guard(excess, direction=-1), name="close"),
-            Transition("on", "off", Guard(excess, direction=+1), name="open"),
+            Transition("off", "on", Guard(_excess, direction=-1), name="close"),
+            Transition("on", "off", Guard(_excess, direction=+1), name="open"),
             Transition("on", "off", above, restart, name="reopen"),
             Transition("on", "on", below, restart, name="saturate"),
-            Transition("off", "off", ramp_ends(), restart, name="skip"),
+            Transition("off", "off", Guard(_ramp_end, direction=+1), restart, name="skip"),
         ],
     )  # fmt: skip
+
+
+def _off(t, x, p):
+    return _field(x, p, 0.0)
+
+
+def _on(t, x, p):
+    return _field(x, p, 1.0)
+
+
+def _field(x, p, s):
+    return (x.i - x.v / p.R) / p.C, (s * p.E - x.v) / p.L, 1 / p.T
+
+
+def _control(x, p):
+    return p.a * (x.v - p.V_ref)
+
+
+def _excess(t, x, p):
+    return _control(x, p) - p.V_L - (p.V_U - p.V_L) * x.tau
+
+
+def _ramp_end(t, x, p):
+    return x.tau - 1
+
+
+def _above_start(t, x, p):
+    return _control(x, p) - p.V_L
+
+
+def _below_start(t, x, p):
+    return p.V_L - _control(x, p)
+
+
+def _restart(t, x, p):
+    return x.v, x.i, 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from hybrid import Guard, HybridSystem, Mode, Transition
 
 
@@ -38,27 +40,33 @@ def chua_circuit() -> HybridSystem:
     32(8), 797-818, 1985. doi:10.1109/TCS.1985.1085791; J. C. Sprott, Chaos and Time-Series Analysis, Oxford
     University Press 2003, appendix A.
     """
-
-    def region(side):
-        def field(t, x, p):
-            # In each mode the resistor is linear; in the outer modes its line starts at x = side.
-            resistor = p.m1 * x.x + (p.m0 - p.m1) * (side if side else x.x)
-            return p.alpha * (x.y - x.x - resistor), x.x - x.y + x.z, -p.beta * x.y
-
-        return field
-
-    def breakpoint_at(side, direction):
-        return Guard(lambda t, x, p: x.x - side, direction=direction)
-
     return HybridSystem(
         name="Chua's circuit",
         state=("x", "y", "z"),
         parameters={"alpha": 9.0, "beta": 100 / 7, "m0": -8 / 7, "m1": -5 / 7},
-        modes=[Mode("left", region(-1.0)), Mode("inner", region(0.0)), Mode("right", region(1.0))],
+        modes=[
+            Mode("left", partial(_field, -1.0)),
+            Mode("inner", partial(_field, 0.0)),
+            Mode("right", partial(_field, 1.0)),
+        ],
         transitions=[
-            Transition("left", "inner", breakpoint_at(-1.0, +1)),
-            Transition("inner", "left", breakpoint_at(-1.0, -1)),
-            Transition("inner", "right", breakpoint_at(1.0, +1)),
-            Transition("right", "inner", breakpoint_at(1.0, -1)),
+            Transition("left", "inner", _breakpoint_at(-1.0, +1)),
+            Transition("inner", "left", _breakpoint_at(-1.0, -1)),
+            Transition("inner", "right", _breakpoint_at(1.0, +1)),
+            Transition("right", "inner", _breakpoint_at(1.0, -1)),
         ],
     )
+
+
+def _field(side, t, x, p):
+    # In each mode the resistor is linear; in the outer modes its line starts at x = side.
+    resistor = p.m1 * x.x + (p.m0 - p.m1) * (side if side else x.x)
+    return p.alpha * (x.y - x.x - resistor), x.x - x.y + x.z, -p.beta * x.y
+
+
+def _breakpoint_at(side, direction):
+    return Guard(partial(_beyond, side), direction=direction)
+
+
+def _beyond(side, t, x, p):
+    return x.x - side

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from math import cos, cosh, exp, expm1, gamma, log1p, pi, sin, sinh, sqrt, tan, tanh
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -93,7 +94,7 @@ class Rigid:
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact``."""
-        collision = Reset(lambda t, x, p: bodies.collided(t, x, p, p.e))
+        collision = Reset(partial(_collided, bodies))
         return [Transition("free", "free", Guard(bodies.penetration, +1), collision, name="impact")]
 
 
@@ -122,7 +123,7 @@ class Hertz:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free`` and ``contact``."""
-        return [_free(bodies), _pushed(bodies, lambda delta, rate, p: _hertz_force(delta, p))]
+        return [_free(bodies), _pushed(bodies, _hertz_force)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
@@ -221,7 +222,7 @@ class HuntCrossley:
         """``free`` and ``contact``."""
         return [
             _free(bodies),
-            _pushed(bodies, lambda delta, rate, p: _hertz_force(delta, p) * (1 + 1.5 * p.alpha * rate)),
+            _pushed(bodies, _hunt_crossley_force),
         ]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
@@ -297,15 +298,12 @@ class KelvinVoigt:
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free``, ``contact`` and ``recovery``."""
         free = _free(bodies)
-        contact = _pushed(bodies, lambda delta, rate, p: p.k * delta + p.c * rate)
+        contact = _pushed(bodies, _kelvin_voigt_force)
         return [free, contact, Mode("recovery", free.field)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact``, ``release``, ``parting`` and ``return``."""
-
-        def force(t, x, p):
-            return p.k * bodies.penetration(t, x, p) + p.c * bodies.rate(t, x, p)
-
+        force = partial(_force_between, bodies, _kelvin_voigt_force)
         return [
             Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
             Transition("contact", "recovery", Guard(force, -1), name="release"),
@@ -357,15 +355,28 @@ def after_collision(m1: float, m2: float, v1: Any, v2: Any, e: Any) -> tuple[Any
 
 
 def _free(bodies: Bodies) -> Mode:
-    return Mode("free", lambda t, x, p: bodies.field(t, x, p, 0.0))
+    return Mode("free", partial(_apart, bodies))
 
 
 def _pushed(bodies: Bodies, force: Callable[..., Any]) -> Mode:
     """The mode ``contact`` under a force of ``(penetration, rate, p)``."""
-    return Mode(
-        "contact",
-        lambda t, x, p: bodies.field(t, x, p, force(bodies.penetration(t, x, p), bodies.rate(t, x, p), p)),
-    )
+    return Mode("contact", partial(_pushed_apart, bodies, force))
+
+
+def _apart(bodies, t, x, p):
+    return bodies.field(t, x, p, 0.0)
+
+
+def _pushed_apart(bodies, force, t, x, p):
+    return bodies.field(t, x, p, _force_between(bodies, force, t, x, p))
+
+
+def _force_between(bodies, force, t, x, p):
+    return force(bodies.penetration(t, x, p), bodies.rate(t, x, p), p)
+
+
+def _collided(bodies, t, x, p):
+    return bodies.collided(t, x, p, p.e)
 
 
 def _in_and_out(bodies: Bodies) -> list[Transition]:
@@ -375,9 +386,17 @@ def _in_and_out(bodies: Bodies) -> list[Transition]:
     ]
 
 
-def _hertz_force(penetration: Any, p: Any) -> Any:
+def _hertz_force(penetration: Any, rate: Any, p: Any) -> Any:
     # A step may evaluate a point slightly outside the contact, where the power is undefined.
     return p.K * np.maximum(penetration, 0.0) ** 1.5
+
+
+def _hunt_crossley_force(penetration: Any, rate: Any, p: Any) -> Any:
+    return _hertz_force(penetration, rate, p) * (1 + 1.5 * p.alpha * rate)
+
+
+def _kelvin_voigt_force(penetration: Any, rate: Any, p: Any) -> Any:
+    return p.k * penetration + p.c * rate
 
 
 def _restitution(e: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hybrid import ArgumentError, HybridSystem, arguments, filippov
@@ -39,18 +41,14 @@ def dry_friction_oscillator() -> HybridSystem:
     S. W. Shaw, "On the dynamic response of a system with dry friction", Journal of Sound and Vibration
     108(2), 305-325, 1986. doi:10.1016/S0022-460X(86)80058-X
     """
-
-    def field(sign):
-        return lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - x.x - p.c * x.v - sign * p.f)
-
     return filippov(
         name="dry-friction oscillator",
         state=("x", "v"),
         parameters={"c": 0.0, "f": 0.5, "A": 1.0, "w": 0.8},
-        below=field(-1),
-        above=field(+1),
-        switching=lambda t, x, p: x.v,
-        period=lambda p: 2 * np.pi / p.w,
+        below=partial(_field, -1),
+        above=partial(_field, +1),
+        switching=_velocity,
+        period=_forcing_period,
     )
 
 
@@ -86,3 +84,15 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
     s = np.linspace(0.0, np.pi / w, 4001)[1:-1]
     v = f * np.sin(s) + D * (np.cos(s) - np.cos(w * s)) - X * w * np.sin(w * s)
     return float(X) if v.max() < 0 else np.nan
+
+
+def _field(sign, t, x, p):
+    return x.v, p.A * np.cos(p.w * t) - x.x - p.c * x.v - sign * p.f
+
+
+def _velocity(t, x, p):
+    return x.v
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

@@ -39,15 +39,31 @@ def impact_oscillator() -> HybridSystem:
         name="impact oscillator",
         state=("x", "v"),
         parameters={"k": 1.0, "c": 0.1, "A": 1.0, "w": 1.0, "d": 1.0, "r": 0.8},
-        modes=[Mode("flight", lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - p.c * x.v - p.k * x.x))],
+        modes=[Mode("flight", _flight)],
         transitions=[
             Transition(
                 "flight",
                 "flight",
-                Guard(lambda t, x, p: x.x - p.d, direction=+1),
-                Reset(lambda t, x, p: (p.d, -p.r * x.v)),
+                Guard(_overlap, direction=+1),
+                Reset(_rebound),
                 name="impact",
             )
         ],
-        period=lambda p: 2 * np.pi / p.w,
+        period=_forcing_period,
     )
+
+
+def _flight(t, x, p):
+    return x.v, p.A * np.cos(p.w * t) - p.c * x.v - p.k * x.x
+
+
+def _overlap(t, x, p):
+    return x.x - p.d
+
+
+def _rebound(t, x, p):
+    return p.d, -p.r * x.v
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

@@ -43,19 +43,35 @@ def impact_pair() -> HybridSystem:
     C. N. Bapat, N. Popplewell, K. McLachlan, "Stable periodic motions of an impact-pair", Journal of Sound
     and Vibration 87(1), 19-40, 1983.
     """
-    rebound = Reset(lambda t, x, p: (x.x, -p.r * x.v))
+    rebound = Reset(_rebound)
     return HybridSystem(
         name="impact pair",
         state=("x", "v"),
         parameters={"A": 1.0, "w": 1.0, "d": 4.0, "r": 0.8},
-        modes=[Mode("flight", lambda t, x, p: (x.v, p.A * p.w**2 * np.cos(p.w * t)))],
+        modes=[Mode("flight", _flight)],
         transitions=[
-            Transition(
-                "flight", "flight", Guard(lambda t, x, p: x.x + p.d / 2, direction=-1), rebound, name="left"
-            ),
-            Transition(
-                "flight", "flight", Guard(lambda t, x, p: x.x - p.d / 2, direction=+1), rebound, name="right"
-            ),
+            Transition("flight", "flight", Guard(_from_left, direction=-1), rebound, name="left"),
+            Transition("flight", "flight", Guard(_from_right, direction=+1), rebound, name="right"),
         ],
-        period=lambda p: 2 * np.pi / p.w,
+        period=_forcing_period,
     )
+
+
+def _flight(t, x, p):
+    return x.v, p.A * p.w**2 * np.cos(p.w * t)
+
+
+def _from_left(t, x, p):
+    return x.x + p.d / 2
+
+
+def _from_right(t, x, p):
+    return x.x - p.d / 2
+
+
+def _rebound(t, x, p):
+    return x.x, -p.r * x.v
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
@@ -39,10 +41,6 @@ def rimless_wheel() -> HybridSystem:
     T. McGeer, "Passive dynamic walking", International Journal of Robotics Research 9(2), 62-82, 1990.
     doi:10.1177/027836499000900206
     """
-
-    def onto(side: int) -> Reset:
-        return Reset(lambda t, x, p: (p.gamma - side * p.alpha, np.cos(2 * p.alpha) * x.omega))
-
     return HybridSystem(
         name="rimless wheel",
         state=("theta", "omega"),
@@ -56,21 +54,33 @@ def rimless_wheel() -> HybridSystem:
             "alpha": "rad",
             "gamma": "rad",
         },
-        modes=[Mode("stance", lambda t, x, p: (x.omega, p.g / p.l * np.sin(x.theta)))],
+        modes=[Mode("stance", _stance)],
         transitions=[
             Transition(
                 "stance",
                 "stance",
-                Guard(lambda t, x, p: x.theta - p.gamma - p.alpha, direction=+1),
-                onto(+1),
+                Guard(partial(_beyond_spoke, +1), direction=+1),
+                Reset(partial(_onto, +1)),
                 name="step",
             ),
             Transition(
                 "stance",
                 "stance",
-                Guard(lambda t, x, p: x.theta - p.gamma + p.alpha, direction=-1),
-                onto(-1),
+                Guard(partial(_beyond_spoke, -1), direction=-1),
+                Reset(partial(_onto, -1)),
                 name="step back",
             ),
         ],
     )
+
+
+def _stance(t, x, p):
+    return x.omega, p.g / p.l * np.sin(x.theta)
+
+
+def _beyond_spoke(side, t, x, p):
+    return x.theta - p.gamma - side * p.alpha
+
+
+def _onto(side, t, x, p):
+    return p.gamma - side * p.alpha, np.cos(2 * p.alpha) * x.omega

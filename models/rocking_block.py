@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
@@ -44,27 +46,33 @@ def rocking_block() -> HybridSystem:
     due to harmonic shaking", Journal of Engineering Mechanics 110(11), 1627-1642, 1984.
     doi:10.1061/(ASCE)0733-9399(1984)110:11(1627)
     """
-
-    def about(side):
-        def field(t, x, p):
-            angle = p.alpha - side * x.theta
-            return x.omega, -(p.p**2) * (side * np.sin(angle) + p.A * np.cos(p.w * t) * np.cos(angle))
-
-        return field
-
-    def upright(t, x, p):
-        return x.theta
-
-    loss = Reset(lambda t, x, p: (0.0, p.e * x.omega))
+    loss = Reset(_impact)
     return HybridSystem(
         name="rocking block",
         state=("theta", "omega"),
         parameters={"alpha": 0.25, "p": 2.0, "e": 0.9, "A": 0.0, "w": 2 * np.pi},
         units={"theta": "rad", "omega": "rad/s", "t": "s", "alpha": "rad", "p": "rad/s", "w": "rad/s"},
-        modes=[Mode("right", about(+1)), Mode("left", about(-1))],
+        modes=[Mode("right", partial(_about, +1)), Mode("left", partial(_about, -1))],
         transitions=[
-            Transition("right", "left", Guard(upright, direction=-1), loss, name="impact left"),
-            Transition("left", "right", Guard(upright, direction=+1), loss, name="impact right"),
+            Transition("right", "left", Guard(_tilt, direction=-1), loss, name="impact left"),
+            Transition("left", "right", Guard(_tilt, direction=+1), loss, name="impact right"),
         ],
-        period=lambda p: 2 * np.pi / p.w,
+        period=_forcing_period,
     )
+
+
+def _about(side, t, x, p):
+    angle = p.alpha - side * x.theta
+    return x.omega, -(p.p**2) * (side * np.sin(angle) + p.A * np.cos(p.w * t) * np.cos(angle))
+
+
+def _tilt(t, x, p):
+    return x.theta
+
+
+def _impact(t, x, p):
+    return 0.0, p.e * x.omega
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

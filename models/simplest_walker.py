@@ -48,25 +48,27 @@ def simplest_walker() -> HybridSystem:
     scaling", Journal of Biomechanical Engineering 120(2), 281-288, 1998, equations 1 to 4.
     doi:10.1115/1.2798313
     """
-
-    def swing(t, x, p):
-        turn = np.sin(x.theta - p.gamma)
-        return x.dtheta, x.dphi, turn, turn + (x.dtheta**2 - np.cos(x.theta - p.gamma)) * np.sin(x.phi)
-
-    def height(t, x, p):
-        return x.phi - 2 * x.theta
-
-    def exchange(t, x, p):
-        c = np.cos(2 * x.theta)
-        return -x.theta, -2 * x.theta, c * x.dtheta, c * (1 - c) * x.dtheta
-
     return HybridSystem(
         name="simplest walker",
         state=("theta", "phi", "dtheta", "dphi"),
         parameters={"gamma": 0.009},
-        modes=[Mode("behind", swing), Mode("ahead", swing)],
+        modes=[Mode("behind", _swing), Mode("ahead", _swing)],
         transitions=[
-            Transition("behind", "ahead", Guard(height, direction=-1), name="passing"),
-            Transition("ahead", "behind", Guard(height, direction=+1), Reset(exchange), name="heelstrike"),
+            Transition("behind", "ahead", Guard(_height, direction=-1), name="passing"),
+            Transition("ahead", "behind", Guard(_height, direction=+1), Reset(_exchange), name="heelstrike"),
         ],
     )
+
+
+def _swing(t, x, p):
+    turn = np.sin(x.theta - p.gamma)
+    return x.dtheta, x.dphi, turn, turn + (x.dtheta**2 - np.cos(x.theta - p.gamma)) * np.sin(x.phi)
+
+
+def _height(t, x, p):
+    return x.phi - 2 * x.theta
+
+
+def _exchange(t, x, p):
+    c = np.cos(2 * x.theta)
+    return -x.theta, -2 * x.theta, c * x.dtheta, c * (1 - c) * x.dtheta

@@ -44,14 +44,6 @@ def slip_hopper() -> HybridSystem:
     A. Seyfarth, H. Geyer, M. Günther, R. Blickhan, "A movement criterion for running", Journal of
     Biomechanics 35(5), 649-655, 2002. doi:10.1016/S0021-9290(01)00245-7
     """
-
-    def flight(t, x, p):
-        return x.vx, x.vy, 0.0, -p.g
-
-    def stance(t, x, p):
-        push = p.k / p.m * (p.l0 / np.hypot(x.x, x.y) - 1)
-        return x.vx, x.vy, push * x.x, push * x.y - p.g
-
     return HybridSystem(
         name="SLIP hopper",
         state=("x", "y", "vx", "vy"),
@@ -68,21 +60,46 @@ def slip_hopper() -> HybridSystem:
             "alpha": "rad",
             "g": "m/s^2",
         },
-        modes=[Mode("descent", flight), Mode("stance", stance), Mode("ascent", flight)],
+        modes=[Mode("descent", _flight), Mode("stance", _stance), Mode("ascent", _flight)],
         transitions=[
             Transition(
                 "descent",
                 "stance",
-                Guard(lambda t, x, p: x.y - p.l0 * np.sin(p.alpha), direction=-1),
-                Reset(lambda t, x, p: (-p.l0 * np.cos(p.alpha), x.y, x.vx, x.vy)),
+                Guard(_foot, direction=-1),
+                Reset(_foothold),
                 name="touchdown",
             ),
             Transition(
                 "stance",
                 "ascent",
-                Guard(lambda t, x, p: np.hypot(x.x, x.y) - p.l0, direction=+1),
+                Guard(_extension, direction=+1),
                 name="takeoff",
             ),
-            Transition("ascent", "descent", Guard(lambda t, x, p: x.vy, direction=-1), name="apex"),
+            Transition("ascent", "descent", Guard(_climb, direction=-1), name="apex"),
         ],
     )
+
+
+def _flight(t, x, p):
+    return x.vx, x.vy, 0.0, -p.g
+
+
+def _stance(t, x, p):
+    push = p.k / p.m * (p.l0 / np.hypot(x.x, x.y) - 1)
+    return x.vx, x.vy, push * x.x, push * x.y - p.g
+
+
+def _foot(t, x, p):
+    return x.y - p.l0 * np.sin(p.alpha)
+
+
+def _foothold(t, x, p):
+    return -p.l0 * np.cos(p.alpha), x.y, x.vx, x.vy
+
+
+def _extension(t, x, p):
+    return np.hypot(x.x, x.y) - p.l0
+
+
+def _climb(t, x, p):
+    return x.vy

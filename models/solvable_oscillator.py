@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hybrid import Guard, HybridSystem, Mode, Transition
@@ -39,17 +41,29 @@ def solvable_oscillator() -> HybridSystem:
     N. J. Corron, J. N. Blakely, M. T. Stahl, "A matched filter for chaos", Chaos 20, 023123, 2010.
     doi:10.1063/1.3432557
     """
-
-    def field(s):
-        return lambda t, x, p: (x.v, 2 * p.b * x.v - ((2 * np.pi) ** 2 + p.b**2) * (x.u - s))
-
     return HybridSystem(
         name="solvable chaotic oscillator",
         state=("u", "v"),
         parameters={"b": 0.5},
-        modes=[Mode("plus", field(1.0)), Mode("minus", field(-1.0))],
+        modes=[Mode("plus", partial(_field, 1.0)), Mode("minus", partial(_field, -1.0))],
         transitions=[
-            Transition("plus", "minus", Guard(lambda t, x, p: x.v, +1, when=lambda t, x, p: -x.u)),
-            Transition("minus", "plus", Guard(lambda t, x, p: x.v, -1, when=lambda t, x, p: x.u)),
+            Transition("plus", "minus", Guard(_velocity, +1, when=_is_negative)),
+            Transition("minus", "plus", Guard(_velocity, -1, when=_is_positive)),
         ],
     )
+
+
+def _field(s, t, x, p):
+    return x.v, 2 * p.b * x.v - ((2 * np.pi) ** 2 + p.b**2) * (x.u - s)
+
+
+def _velocity(t, x, p):
+    return x.v
+
+
+def _is_negative(t, x, p):
+    return -x.u
+
+
+def _is_positive(t, x, p):
+    return x.u

@@ -33,17 +33,13 @@ def stick_slip() -> HybridSystem:
     R. I. Leine, D. H. van Campen, A. de Kraker, L. van den Steen, "Stick-slip vibrations induced by alternate
     friction models", Nonlinear Dynamics 16(1), 41-54, 1998. doi:10.1023/A:1008289604683
     """
-
-    def friction(p, speed):
-        return p.Fs / (1 + p.delta * speed)
-
     return filippov(
         name="stick-slip",
         state=("x", "v"),
         parameters={"belt": 0.2, "delta": 3.0, "Fs": 1.0},
-        below=lambda t, x, p: (x.v, friction(p, p.belt - x.v) - x.x),
-        above=lambda t, x, p: (x.v, -friction(p, x.v - p.belt) - x.x),
-        switching=lambda t, x, p: x.v - p.belt,
+        below=_behind,
+        above=_ahead,
+        switching=_slip,
     )
 
 
@@ -80,17 +76,49 @@ def coulomb_stick_slip() -> HybridSystem:
         state=("x", "v"),
         parameters={"belt": 0.2, "Fs": 1.0, "Fk": 0.5},
         modes=[
-            Mode("stick", lambda t, x, p: (p.belt, 0.0)),
-            Mode("slip", lambda t, x, p: (x.v, p.Fk - x.x)),
+            Mode("stick", _stick),
+            Mode("slip", _slipping),
         ],
         transitions=[
-            Transition("stick", "slip", Guard(lambda t, x, p: x.x - p.Fs, direction=+1), name="release"),
+            Transition("stick", "slip", Guard(_pull, direction=+1), name="release"),
             Transition(
                 "slip",
                 "stick",
-                Guard(lambda t, x, p: x.v - p.belt, direction=+1),
-                Reset(lambda t, x, p: (x.x, p.belt)),
+                Guard(_slip, direction=+1),
+                Reset(_caught),
                 name="catch",
             ),
         ],
     )
+
+
+def _friction(p, speed):
+    return p.Fs / (1 + p.delta * speed)
+
+
+def _behind(t, x, p):
+    return x.v, _friction(p, p.belt - x.v) - x.x
+
+
+def _ahead(t, x, p):
+    return x.v, -_friction(p, x.v - p.belt) - x.x
+
+
+def _slip(t, x, p):
+    return x.v - p.belt
+
+
+def _stick(t, x, p):
+    return p.belt, 0.0
+
+
+def _slipping(t, x, p):
+    return x.v, p.Fk - x.x
+
+
+def _pull(t, x, p):
+    return x.x - p.Fs
+
+
+def _caught(t, x, p):
+    return x.x, p.belt

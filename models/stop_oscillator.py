@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hybrid import Guard, HybridSystem, Mode, Transition
@@ -47,29 +49,37 @@ def stop_oscillator() -> HybridSystem:
     S. W. Shaw, P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and
     Vibration 90(1), 129-155, 1983. doi:10.1016/0022-460X(83)90407-8
     """
-
-    def field(side):
-        def stop(x, p):
-            return side * p.F0 + p.ks * (x.x - side * p.d) if side else 0.0
-
-        return lambda t, x, p: (x.v, p.A * np.cos(p.w * t) - p.c * x.v - p.k * x.x - stop(x, p))
-
-    def at_right(t, x, p):
-        return x.x - p.d
-
-    def at_left(t, x, p):
-        return x.x + p.d
-
     return HybridSystem(
         name="stop oscillator",
         state=("x", "v"),
         parameters={"k": 1.0, "c": 0.1, "d": 1.0, "ks": 10.0, "F0": 0.0, "A": 1.0, "w": 1.0},
-        modes=[Mode("free", field(0)), Mode("right", field(+1)), Mode("left", field(-1))],
-        transitions=[
-            Transition("free", "right", Guard(at_right, direction=+1), name="touch right"),
-            Transition("right", "free", Guard(at_right, direction=-1), name="leave right"),
-            Transition("free", "left", Guard(at_left, direction=-1), name="touch left"),
-            Transition("left", "free", Guard(at_left, direction=+1), name="leave left"),
+        modes=[
+            Mode("free", partial(_field, 0)),
+            Mode("right", partial(_field, +1)),
+            Mode("left", partial(_field, -1)),
         ],
-        period=lambda p: 2 * np.pi / p.w,
+        transitions=[
+            Transition("free", "right", Guard(_at_right, direction=+1), name="touch right"),
+            Transition("right", "free", Guard(_at_right, direction=-1), name="leave right"),
+            Transition("free", "left", Guard(_at_left, direction=-1), name="touch left"),
+            Transition("left", "free", Guard(_at_left, direction=+1), name="leave left"),
+        ],
+        period=_forcing_period,
     )
+
+
+def _field(side, t, x, p):
+    stop = side * p.F0 + p.ks * (x.x - side * p.d) if side else 0.0
+    return x.v, p.A * np.cos(p.w * t) - p.c * x.v - p.k * x.x - stop
+
+
+def _at_right(t, x, p):
+    return x.x - p.d
+
+
+def _at_left(t, x, p):
+    return x.x + p.d
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.w

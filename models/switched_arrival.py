@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from hybrid import Guard, HybridSystem, Mode, Transition
+
+BUFFERS = (1, 2, 3)
 
 
 def switched_arrival() -> HybridSystem:
@@ -41,24 +45,25 @@ def switched_arrival() -> HybridSystem:
     examples of discretely controlled continuous systems", IEEE Transactions on Automatic Control 38(1),
     70-83, 1993. doi:10.1109/9.186313
     """
-    buffers = (1, 2, 3)
-
-    def filling(j):
-        def field(t, x, p):
-            inflow = p.rho1 + p.rho2 + p.rho3
-            return tuple(inflow * (i == j) - rho for i, rho in zip(buffers, p, strict=True))
-
-        return field
-
-    def empties(i):
-        return Guard(lambda t, x, p: x[i - 1], direction=-1)
-
     return HybridSystem(
         name="switched arrival system",
         state=("x1", "x2", "x3"),
         parameters={"rho1": 1 / 3, "rho2": 1 / 3, "rho3": 1 / 3},
-        modes=[Mode(f"fill{j}", filling(j)) for j in buffers],
+        modes=[Mode(f"fill{j}", partial(_filling, j)) for j in BUFFERS],
         transitions=[
-            Transition(f"fill{j}", f"fill{i}", empties(i)) for j in buffers for i in buffers if i != j
+            Transition(f"fill{j}", f"fill{i}", _empties(i)) for j in BUFFERS for i in BUFFERS if i != j
         ],
     )
+
+
+def _filling(j, t, x, p):
+    inflow = p.rho1 + p.rho2 + p.rho3
+    return tuple(inflow * (i == j) - rho for i, rho in zip(BUFFERS, p, strict=True))
+
+
+def _empties(i):
+    return Guard(partial(_content, i), direction=-1)
+
+
+def _content(i, t, x, p):
+    return x[i - 1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
@@ -39,32 +41,39 @@ def three_disk_billiard() -> HybridSystem:
     P. Gaspard, S. A. Rice, "Scattering from a classically chaotic repellor", Journal of Chemical Physics 90,
     2225-2241, 1989. doi:10.1063/1.456017
     """
-
-    def from_centre(k, x, p):
-        angle = np.pi / 2 + 2 * np.pi * k / 3
-        return x.x - p.R / np.sqrt(3) * np.cos(angle), x.y - p.R / np.sqrt(3) * np.sin(angle)
-
-    def reaches(k):
-        def gap(t, x, p):
-            dx, dy = from_centre(k, x, p)
-            return dx**2 + dy**2 - p.a**2
-
-        return Guard(gap, direction=-1)
-
-    def reflects(k):
-        def reset(t, x, p):
-            dx, dy = from_centre(k, x, p)
-            twice = 2 * (x.vx * dx + x.vy * dy) / (dx**2 + dy**2)
-            return x.x, x.y, x.vx - twice * dx, x.vy - twice * dy
-
-        return Reset(reset)
-
     return HybridSystem(
         name="three-disk billiard",
         state=("x", "y", "vx", "vy"),
         parameters={"a": 1.0, "R": 6.0},
-        modes=[Mode("flight", lambda t, x, p: (x.vx, x.vy, 0.0, 0.0))],
+        modes=[Mode("flight", _flight)],
         transitions=[
-            Transition("flight", "flight", reaches(k), reflects(k), name=f"disk{k + 1}") for k in range(3)
+            Transition(
+                "flight",
+                "flight",
+                Guard(partial(_gap, k), direction=-1),
+                Reset(partial(_reflected, k)),
+                name=f"disk{k + 1}",
+            )
+            for k in range(3)
         ],
     )
+
+
+def _flight(t, x, p):
+    return x.vx, x.vy, 0.0, 0.0
+
+
+def _from_centre(k, x, p):
+    angle = np.pi / 2 + 2 * np.pi * k / 3
+    return x.x - p.R / np.sqrt(3) * np.cos(angle), x.y - p.R / np.sqrt(3) * np.sin(angle)
+
+
+def _gap(k, t, x, p):
+    dx, dy = _from_centre(k, x, p)
+    return dx**2 + dy**2 - p.a**2
+
+
+def _reflected(k, t, x, p):
+    dx, dy = _from_centre(k, x, p)
+    twice = 2 * (x.vx * dx + x.vy * dy) / (dx**2 + dy**2)
+    return x.x, x.y, x.vx - twice * dx, x.vy - twice * dy

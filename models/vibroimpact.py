@@ -64,7 +64,7 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     if isinstance(contact, type) or not isinstance(contact, ContactLaw) or not callable(contact.modes):
         wanted = "be a law of contact from models.contact, for example Rigid(e=0.8)"
         raise arguments.refusal("contact", wanted, contact)
-    bodies = Bodies(_field, lambda t, x, p: x.x1 - x.x2, lambda t, x, p: x.v1 - x.v2, _collided)
+    bodies = Bodies(_field, _penetration, _rate, _collided)
     return HybridSystem(
         name="vibro-impact",
         state=("x1", "x2", "v1", "v2"),
@@ -81,7 +81,7 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         },
         modes=contact.modes(bodies),
         transitions=contact.transitions(bodies),
-        period=lambda p: 2 * np.pi / p.omega,
+        period=_forcing_period,
     )  # fmt: skip
 
 
@@ -106,6 +106,18 @@ def hertz_stiffness(
     curvature = 2 * (A / 4 + B / 4) ** 0.5
     stiffness = 2 / 3 * np.pi * q * (E / ((1 - nu) * (1 + nu))) / curvature
     return arguments.result("hertz_stiffness", stiffness)
+
+
+def _penetration(t, x, p):
+    return x.x1 - x.x2
+
+
+def _rate(t, x, p):
+    return x.v1 - x.v2
+
+
+def _forcing_period(p):
+    return 2 * np.pi / p.omega
 
 
 def _field(t, x, p, Fcon):

@@ -66,8 +66,8 @@ def as_answer(name: str, result: Any, n: int, span: float) -> Answer:
         result = Answer(
             # A run without a state at the end did not reach it.
             result.x[-1] if len(result.x) else np.full(n, np.nan),
-            times=result.jumps.t,
-            saltation=result.jumps.saltation,
+            times=result.jumps.t if result.keeps_jumps else None,
+            saltation=result.jumps.saltation if result.keeps_jumps else None,
             fundamental=result.fundamental,
             steps=result.steps,
         )

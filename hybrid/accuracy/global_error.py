@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
@@ -54,6 +55,7 @@ class GlobalError:
         return f"<GlobalError {self.x.max():.1e} in the last state{times}, {self.status.code.name}>"
 
 
+@arguments.without_tolerances
 def global_error(
     system: HybridSystem,
     x0: ArrayLike,

@@ -236,7 +236,7 @@ def work_precision(
     x0 = system.variables.state_values("x0", x0)
     t_span = arguments.time_span("t_span", t_span)
     if mode is not None:
-        system.mode_index(mode)
+        system.check_mode(mode)
     system.parameter_values(parameters)
     tangent = arguments.flag("tangent", tangent)
     runs = {
@@ -340,6 +340,7 @@ def _own(
         solver=solver,
         tangent=tangent,
         samples=[t_span[1]],
+        keep_jumps=True,
     )
     if arc.status.code == StatusCode.INTERRUPTED:
         raise KeyboardInterrupt

@@ -116,7 +116,7 @@ def disagreement(
     """
     system = compiled.system
     found = value(compiled, function, index, t, x, values)
-    opaque = _is_opaque(compiled, function.value)
+    opaque = _is_opaque(compiled, function.function)
     text = _difference(system, function.title, function.value, found, t, x, values, opaque)
     if text is not None or function.kind == CONDITION:
         return text

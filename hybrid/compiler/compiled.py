@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from threading import RLock
 from typing import TYPE_CHECKING, Any
@@ -19,12 +20,13 @@ from hybrid.compiler.cache.loader import Absent, load_kernels
 from hybrid.compiler.operations import operations_of
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
-from hybrid.errors import ArgumentError
+from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
 from hybrid.system.functions import CONDITION, ModelFunction
-from hybrid.system.graph import HybridSystem, as_system, functions_of
+from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
+from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
@@ -50,6 +52,8 @@ class CompiledSystem:
         The model.
     emitted
         The generated source and what tracing could prove of the model.
+    watched
+        The globals and other values that the model functions had read, for which this was compiled.
     parts
         The compiled functions by name, for each part of ``hybrid.compiler.parts`` that was needed so far.
     plans
@@ -60,6 +64,7 @@ class CompiledSystem:
 
     system: HybridSystem
     emitted: Emitted
+    watched: Watched = attrs.field(factory=Watched)
     parts: dict[str, Any] = attrs.field(factory=dict, init=False)
     plans: dict[Any, Any] = attrs.field(factory=dict, init=False)
     periodic_at: set[bytes] = attrs.field(factory=set, init=False)
@@ -344,6 +349,10 @@ def _indices(values: Any) -> np.ndarray:
 def compile_system(system: HybridSystem) -> CompiledSystem:
     """Trace, differentiate and compile a model; repeated calls return the first result.
 
+    Values that model functions take from globals, closures, objects and tables, also through functions that
+    they call, belong to what is compiled: after a change of one of them the model is compiled again.
+    Parameters are the quick way to change a value.
+
     Raises
     ------
     ModelError
@@ -354,15 +363,38 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     """
     as_system("system", system)
     compiled: CompiledSystem | None = system._compiled
-    if compiled is None:
+    if not _is_current(compiled):
         load_kernels()
         with _COMPILING:
             compiled = system._compiled
-            if compiled is None:
-                compiled = CompiledSystem(system, emitted_of(system))
+            if not _is_current(compiled):
+                watched = _watched(system)
+                compiled = CompiledSystem(system, emitted_of(system), watched)
                 check_agreement(compiled)
                 object.__setattr__(system, "_compiled", compiled)
+    assert compiled is not None
     return compiled
+
+
+def _is_current(compiled: CompiledSystem | None) -> bool:
+    """Whether the functions have been compiled for the values that they read now."""
+    if compiled is None:
+        return False
+    return compiled.watched.holds() and compiled.system.derived_from.holds()
+
+
+def _watched(system: HybridSystem) -> Watched:
+    """What the functions of a system read now."""
+    if not system.derived_from.holds():
+        raise ModelError(
+            f"{system.name or 'The system'} was derived from model functions that read a global, a closure "
+            "or a table which has changed since. Derive the system again (split, from_equations, filippov), "
+            "or make the value a parameter."
+        )
+    # A field is looked at once for jumps, which may be others now.
+    with suppress(AttributeError):
+        object.__delattr__(system, "switching")
+    return watched_by(system)
 
 
 def emitted_of(system: HybridSystem) -> Emitted:

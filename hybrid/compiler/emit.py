@@ -330,16 +330,11 @@ class _Writer:
         return Written(value, self._complex_step(function, reason))
 
     def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
-        shape = () if function.size is None else (function.size,)
-        name = self._opaque_name(function.title, function.value, reason, shape)
+        name = self._opaque_name(function, reason)
         return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
 
     def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
-        shape = () if function.size is None else (function.size,)
-        name, columns = (
-            self._opaque_name(function.title, function.value, reason, shape),
-            self.system.dimension + 1,
-        )
+        name, columns = self._opaque_name(function, reason), self.system.dimension + 1
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
         lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
         cells = iter(self._cells(function))
@@ -351,19 +346,16 @@ class _Writer:
         try:
             entries = self.traced(derivative)
         except ModelError as reason:
-            return self._opaque_derivative(function, derivative, reason)
+            return self._opaque_derivative(function, reason)
         width = len(entries) // function.rows
         zeros = [ZERO] * (n + 1 - width)
         rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(function.rows)]
         return assignments(cells, [entry for row in rows for entry in row])
 
-    def _opaque_derivative(
-        self, function: ModelFunction, derivative: Callable[..., Any], reason: ModelError
-    ) -> list[str]:
+    def _opaque_derivative(self, function: ModelFunction, reason: ModelError) -> list[str]:
         n = self.system.dimension
         width = n + 1 if derivative_has_time_column(self.system.variables, function) else n
-        shape = (width,) if function.size is None else (function.size, width)
-        name = self._opaque_name(function.derivative_title, derivative, reason, shape)
+        name = self._opaque_name(function, reason, width)
         cells = iter(self._cells(function))
         lines = [f"r = {name}(t, x, p)"]
         for i in range(function.rows):
@@ -377,16 +369,21 @@ class _Writer:
             return [f"out[{j}]" for j in columns]
         return [f"out[{i}, {j}]" for i in range(function.size) for j in columns]
 
-    def _opaque_name(
-        self, title: str, function: Callable[..., Any], reason: ModelError, shape: tuple[int, ...]
-    ) -> str:
+    def _opaque_name(self, function: ModelFunction, reason: ModelError, width: int | None = None) -> str:
+        """Name of a function that stays opaque; with ``width``, of its derivative of so many columns."""
+        title, called = function.title, function.function
+        shape = () if function.size is None else (function.size,)
+        completed = function.completed is not None
+        if width is not None and function.derivative is not None:
+            title, called = function.derivative_title, function.derivative
+            shape, completed = (*shape, width), False
         for name, known in self.opaque.items():
-            if known.function is function and known.shape == shape:
+            if known.function is called and known.shape == shape:
                 return name
-        check_plain(title, function)
-        name, names = f"model_{len(self.opaque)}", tuple(self.system.parameters)
-        why = str(reason).rstrip(".")
-        self.opaque[name] = OpaqueFunction(title, function, why, self.system.state, names, shape)
+        check_plain(title, called)
+        name, names, why = f"model_{len(self.opaque)}", tuple(self.system.parameters), str(reason).rstrip(".")
+        opaque = OpaqueFunction(title, called, why, self.system.state, names, shape, completed=completed)
+        self.opaque[name] = opaque
         return name
 
 
@@ -397,7 +394,7 @@ def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
 
 
 def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> Written:
-    function = reset_function(system.transitions[index], system.dimension)
+    function = reset_function(system.transitions[index], system.state)
     return writer.identity() if function is None else writer.write(function)
 
 

@@ -42,6 +42,8 @@ class OpaqueFunction:
         Shape of what it returns.
     slopes
         Whether its derivatives are asked for, which are taken by the complex step.
+    completed
+        Whether it may return a dict of the components that change: a reset.
     """
 
     title: str
@@ -51,6 +53,7 @@ class OpaqueFunction:
     parameters: tuple[str, ...]
     shape: tuple[int, ...]
     slopes: bool = False
+    completed: bool = False
 
     @property
     def size(self) -> int:
@@ -96,11 +99,13 @@ def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
 def _compiled(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
     from numba import cfunc, float64, int64, njit, void
 
-    from hybrid.compiler.whole_numbers import WholeNumberCompiler, readonly
+    from hybrid.compiler.changed_components import compiler_for
+    from hybrid.compiler.whole_numbers import readonly
     from hybrid.kernels.types.kinds import VECTOR
     from hybrid.kernels.types.numba_types import numba_type
 
-    compiled = njit(error_model="numpy", boundscheck=True, pipeline_class=WholeNumberCompiler)
+    pipeline = compiler_for(opaque.state if opaque.completed else None)
+    compiled = njit(error_model="numpy", boundscheck=True, pipeline_class=pipeline)
     function = compiled(_own_copy(opaque.function))
     scope: dict[str, Any] = {"function": function, "readonly": readonly}
     if isinstance(opaque.state, tuple):
@@ -214,7 +219,9 @@ def _short(error: Exception) -> str:
     lines = [line.strip(" |>") for line in str(error).splitlines()]
     empty = ("Failed in", "During", "File", "There are", "Overload", "- Of", "raised from", "<source", "^")
     telling = [line for line in lines if line and not line.startswith(empty)]
-    text = (telling or lines or ["it gives no reason"])[0].rstrip(".")
+    if not lines:
+        return f"it failed with {type(error).__name__}"
+    text = (telling or lines)[0].rstrip(".")
     if text.endswith("signature:") and len(telling) > 1:
         text = f"{text} {telling[1]}"
     text = text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]} ..."

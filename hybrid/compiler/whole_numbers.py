@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import operator
+from typing import Any
 
 from numba.core import ir, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -217,11 +218,18 @@ def _replace_rounding(statement, function):
 
 
 class WholeNumberCompiler(CompilerBase):
-    """Numba's passes and one more, which replaces arithmetic on whole numbers."""
+    """Numba's passes and one more, which replaces arithmetic on whole numbers.
+
+    A subclass may name another one, which comes before it.
+    """
+
+    first_pass: Any = None
 
     def define_pipelines(self):
         """The one pipeline."""
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.add_pass_after(_CheckWholeNumbers, IRProcessing)
+        if self.first_pass is not None:
+            pipeline.add_pass_after(self.first_pass, IRProcessing)
         pipeline.finalize()
         return [pipeline]

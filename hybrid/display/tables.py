@@ -26,3 +26,8 @@ def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
     body = "".join(row_of("td", row) for row in rows)
     return f"<table><thead>{row_of('th', headings)}</thead><tbody>{body}</tbody></table>"
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: ``1 jump``, ``2 jumps``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

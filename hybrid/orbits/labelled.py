@@ -1,4 +1,4 @@
-"""A periodic orbit as a dataset."""
+"""A periodic orbit as a dataset, and in one line."""
 
 from __future__ import annotations
 
@@ -29,4 +29,19 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
         "iterations": orbit.iterations,
     }
     made_by = attributes("periodic orbit", orbit.status, orbit.system, orbit.parameters)
-    return xarray.Dataset(variables, names.coords(), {**made_by, "signature": list(orbit.signature)})
+    return xarray.Dataset(
+        variables,
+        names.coords(),
+        {**made_by, "signature": list(orbit.signature), "transitions": list(orbit.transitions)},
+    )
+
+
+def described_orbit(orbit: Any) -> str:
+    """A :class:`hybrid.PeriodicOrbit` in one line: where it goes, its largest multiplier with its sign."""
+    through = f" through {', '.join(map(repr, orbit.transitions))}" if orbit.transitions else ""
+    largest = orbit.multipliers[0]
+    pair = f" +- {abs(largest.imag):.6g}i" if largest.imag else ""
+    return (
+        f"<PeriodicOrbit period {orbit.period:.9g} from {orbit.mode!r}{through}, largest multiplier "
+        f"{largest.real:.6g}{pair}, residual {orbit.residual:.1e}, {orbit.status.brief}>"
+    )

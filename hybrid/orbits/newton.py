@@ -33,7 +33,8 @@ class Shot:
     """What one integration over the period gives.
 
     ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``hidden
-    (n,)`` is the part of the gap that is lost in the rounding of components that hardly move.
+    (n,)`` is the part of the gap that is lost in the rounding of components that hardly move. ``beyond``
+    names the transitions whose guards the start lies beyond.
     """
 
     point: Point
@@ -47,6 +48,7 @@ class Shot:
     magnitude: np.ndarray
     status: Status
     hidden: np.ndarray | float = 0.0
+    beyond: tuple[str, ...] = ()
 
     @property
     def gap(self) -> np.ndarray:

@@ -15,10 +15,10 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.hidden import FINEST_GAP, SAMPLES, hidden_gap
-from hybrid.orbits.labelled import labelled_orbit
+from hybrid.orbits.labelled import described_orbit, labelled_orbit
 from hybrid.orbits.newton import EPSILON, ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.periodic_schur import ProductEigenvalues
-from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.arc import HybridArc, Jump
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.periods import split_time
@@ -88,6 +88,8 @@ class PeriodicOrbit:
         Newton iterations used.
     signature
         Names of the modes in the order they are visited.
+    transitions
+        Names of the transitions in the order they fire.
     status
         Whether Newton's method converged, and how far it got if not.
     """
@@ -104,13 +106,11 @@ class PeriodicOrbit:
     residual: float
     iterations: int
     signature: tuple[str, ...]
+    transitions: tuple[str, ...]
     status: Status
 
     def __repr__(self) -> str:
-        return (
-            f"<PeriodicOrbit period {self.period:.9g}, largest multiplier {abs(self.multipliers[0]):.6g}, "
-            f"residual {self.residual:.1e}, {self.status.code.name}>"
-        )
+        return described_orbit(self)
 
     def to_xarray(self) -> xarray.Dataset:
         """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
@@ -254,6 +254,7 @@ class _Shooting:
             magnitude,
             status_of(trajectory, code),
             hidden,
+            trajectory.beyond,
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -312,7 +313,9 @@ class _Shooting:
         except ArgumentError:
             # No mode allows the point.
             return best
-        return trial if trial.size(newton.scale) < best.size(newton.scale) else best
+        # A step through a guard leads to other events.
+        crossed = set(trial.beyond) - set(shot.beyond)
+        return best if crossed or not trial.size(newton.scale) < best.size(newton.scale) else trial
 
     def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
@@ -375,20 +378,21 @@ class _Shooting:
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: Shot, iterations: int, status: Status) -> PeriodicOrbit:
-        eigenvalues = self._eigenvalues(shot)
+        eigenvalues, jumps = self._eigenvalues(shot), self._jumps(shot)
         return PeriodicOrbit(
             system=self.system,
             parameters=self._all_parameters(),
             x0=shot.point.x,
             mode=shot.mode,
             t0=shot.point.t,
-            period=shot.point.period,
+            period=float(shot.point.period),
             multipliers=eigenvalues.values,
             log_moduli=eigenvalues.log_moduli,
             fundamental=shot.fundamental,
             residual=length(shot.gap),
             iterations=iterations,
-            signature=self._signature(shot),
+            signature=(shot.mode, *(jump.target for jump in jumps if jump.target is not None)),
+            transitions=tuple(jump.transition for jump in jumps),
             status=status,
         )
 
@@ -414,13 +418,14 @@ class _Shooting:
         noise = np.maximum(np.abs(rough - drift) / TIGHTER, shot.rounding[:, None])
         return bool(np.any(np.abs(drift) > noise))
 
-    def _signature(self, shot: Shot) -> tuple[str, ...]:
+    def _jumps(self, shot: Shot) -> list[Jump]:
+        """The jumps of one period; those at its point are counted once."""
         arc = self._follow(shot.point, shot.point.period, shot.mode)
         jumps, forcing = list(arc.jumps), self.system.forcing_period(self.parameters) or 0.0
         if jumps and jumps[0].t == shot.point.t:
             end = shot.point.t + shot.point.period
             jumps = [jump for jump in jumps if not same_time(jump.t, end, forcing)]
-        return (shot.mode, *(jump.target for jump in jumps if jump.target is not None))
+        return jumps
 
     def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""

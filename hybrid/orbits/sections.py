@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import progress_bar
+from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
@@ -84,7 +85,7 @@ class Section:
         )
 
     def __repr__(self) -> str:
-        return f"<Section of {len(self)} points, {self.status.code.name}>"
+        return f"<Section of {counted(len(self), 'point')}, {self.status.brief}>"
 
 
 @growing

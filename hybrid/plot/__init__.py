@@ -1,7 +1,12 @@
-"""Plots: arcs over time, phase portraits, sections, orbits, mode graphs, work-precision diagrams."""
+"""Plots: arcs over time, phase portraits, sections, orbits, mode graphs, work-precision diagrams.
 
+The module can be called: ``hybrid.plot(arc)`` is ``hybrid.plot.plot(arc)``.
+"""
+
+import sys
 from collections.abc import Callable
 from functools import singledispatch
+from types import ModuleType
 from typing import Any
 
 from hybrid import arguments
@@ -76,3 +81,14 @@ def plot(result: Any, **options: Any) -> Any:
         If there is no plot for this type of object.
     """
     return drawn(result, **options)
+
+
+class _Plot(ModuleType):
+    """The class of this module, which draws what it is called with."""
+
+    def __call__(self, result: Any, **options: Any) -> Any:
+        """As :func:`plot`."""
+        return plot(result, **options)
+
+
+sys.modules[__name__].__class__ = _Plot

@@ -56,9 +56,10 @@ def plot_arc(
     for row, i in zip(axes, chosen, strict=True):
         for mode, (t, x) in lines.items():
             row.plot(t, x[:, i], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
-        t = np.repeat(arc.jumps.t, 3)
-        ends = _with_gaps(arc.jumps.x_minus[:, i], arc.jumps.x_plus[:, i])
-        row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
+        if arc.keeps_jumps:
+            t = np.repeat(arc.jumps.t, 3)
+            ends = _with_gaps(arc.jumps.x_minus[:, i], arc.jumps.x_plus[:, i])
+            row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
         _shade(row, lines)
         row.set_ylabel(names[i])
         row.margins(x=0)
@@ -96,15 +97,16 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
     lines = _lines(arc)
     for mode, (_, states) in lines.items():
         ax.plot(states[:, i], states[:, j], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
-    before, after = arc.jumps.x_minus, arc.jumps.x_plus
-    ax.plot(
-        _with_gaps(before[:, i], after[:, i]),
-        _with_gaps(before[:, j], after[:, j]),
-        color=JUMP_COLOUR,
-        linewidth=0.9,
-        linestyle=(0, (4, 3)),
-        zorder=1,
-    )
+    if arc.keeps_jumps:
+        before, after = arc.jumps.x_minus, arc.jumps.x_plus
+        ax.plot(
+            _with_gaps(before[:, i], after[:, i]),
+            _with_gaps(before[:, j], after[:, j]),
+            color=JUMP_COLOUR,
+            linewidth=0.9,
+            linestyle=(0, (4, 3)),
+            zorder=1,
+        )
     if len(arc.x):
         ax.plot(arc.x[0, i], arc.x[0, j], "o", color="black", markersize=4)
     ax.set_xlabel(names[i])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Any, overload
 
 import attrs
@@ -13,10 +14,12 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
+from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.saltation import matrices_at
 from hybrid.status import Status
+from hybrid.system.elements import END
 from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
 KINDS = ("transverse", "grazing", "limit")
 # Dense output is evaluated at so many times per call of a kernel.
 TIMES_AT_ONCE = 100_000
+# Jumps that a notebook shows.
+MOST_SHOWN = 20
 
 
 @attrs.frozen(eq=False)
@@ -183,7 +188,25 @@ class Jumps(Sequence[Jump]):
         return len(self._phase)
 
     def __repr__(self) -> str:
-        return f"<{len(self)} jumps>"
+        return f"<{counted(len(self), 'jump')}>"
+
+    def _repr_html_(self) -> str:
+        """The first jumps as a table for a notebook."""
+        names = ("t", "transition", "from", "to", "kind", "transversality")
+        rows = [
+            [
+                f"{jump.t:.9g}",
+                jump.transition,
+                jump.source,
+                END if jump.target is None else jump.target,
+                jump.kind,
+                f"{jump.transversality:.6g}",
+            ]
+            for jump in self[:MOST_SHOWN]
+        ]
+        left = len(self) - len(rows)
+        more = f"\n<p>and {left} more</p>" if left else ""
+        return f"<p>{escape(repr(self))}</p>\n{html_table(names, rows)}{more}"
 
     @overload
     def __getitem__(self, index: int) -> Jump: ...
@@ -290,8 +313,8 @@ class HybridArc:
         The model, and the values of all its parameters in the run, by name.
     t, j, x
         Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``.
-    jumps
-        Sequence of :class:`Jump`.
+    jump_count
+        Number of jumps, also of those that were not kept.
     grazings
         Each :class:`Grazing`, in order.
     status
@@ -313,7 +336,8 @@ class HybridArc:
     j: np.ndarray
     x: np.ndarray
     _mode_index: np.ndarray
-    jumps: Jumps
+    _jumps: Jumps | None
+    jump_count: int
     grazings: tuple[Grazing, ...]
     status: Status
     fundamental: np.ndarray | None
@@ -321,6 +345,27 @@ class HybridArc:
     steps: int
     rejected: int
     _pieces: Pieces | None
+
+    @property
+    def jumps(self) -> Jumps:
+        """Sequence of :class:`Jump`.
+
+        Raises
+        ------
+        ArgumentError
+            If the run did not keep its jumps, as with ``samples`` unless ``keep_jumps`` is True.
+        """
+        if self._jumps is None:
+            raise ArgumentError(
+                f"This arc did not keep its jumps, of which there were {self.jump_count}. Run simulate with "
+                "keep_jumps=True."
+            )
+        return self._jumps
+
+    @property
+    def keeps_jumps(self) -> bool:
+        """Whether the run kept its jumps, so that ``jumps`` holds them."""
+        return self._jumps is not None
 
     @cached_property
     def mode(self) -> np.ndarray:
@@ -336,7 +381,8 @@ class HybridArc:
         """The points of the arc over time: ``x`` (axes ``t`` and ``state``), ``j``, ``mode``.
 
         Without ``samples`` a time occurs twice at each jump, with both states; ``arc.jumps.to_xarray()``
-        has the jumps. ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open` reads it.
+        has the jumps. ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open_store` reads
+        it.
         """
         import xarray
 
@@ -354,7 +400,17 @@ class HybridArc:
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
-        return f"<HybridArc {span}, {len(self.jumps)} jumps, {self.status.code.name}>"
+        return f"<HybridArc {span}, {counted(self.jump_count, 'jump')}, {self.status.brief}>"
+
+    def _repr_html_(self) -> str:
+        """The arc for a notebook: how it ended, and its end by name."""
+        if not len(self.t):
+            return f"<p>{escape(repr(self))}</p>"
+        names = ("t", "mode", *self.system.state_names)
+        ends = [
+            [f"{self.t[i]:.6g}", str(self.mode[i]), *(f"{value:.6g}" for value in self.x[i])] for i in (0, -1)
+        ]
+        return f"<p>{escape(repr(self))}</p>\n<p>{escape(str(self.status))}</p>\n{html_table(names, ends)}"
 
     def __getitem__(self, component: str) -> np.ndarray:
         """A component of the state at the points of the arc, ``(N,)``.

@@ -66,7 +66,8 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
         names = ", ".join(map(repr, trajectory.beyond))
         yield (
             f"The start lies beyond the guard of {names}. This guard counts as crossed, so only its next "
-            "crossing fires."
+            "crossing fires. For an event before the mode is entered, give the mode before a transition with "
+            "the same guard."
         )
 
 
@@ -137,9 +138,14 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
             "was sampled on each step. Write it with NumPy functions (np.sin, np.where)."
         )
     else:
+        emitted = trajectory.compiled.emitted
+        bounded = [repr(name) for i, name in enumerate(names) if not emitted.affine_guard[i]]
+        whose = f"the guard of {bounded[0]}" if len(bounded) == 1 else f"a guard of {', '.join(bounded)}"
         yield (
-            f"On {steps} steps the crossings of a guard are not proved: the guard stays too close to zero, "
-            "so its signs at the ends of pieces of the step decided."
+            f"On {steps} steps the crossings of {whose} are not proved: the guard stays so close to zero "
+            "that its signs at the ends of pieces of the step decided, and two crossings between them may be "
+            "missed. Shorten the steps with max_step= of the solver, or write the guard such that it crosses "
+            "zero at a steeper angle."
         )
 
 

@@ -67,11 +67,13 @@ def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[
     if not allowed:
         raise ArgumentError(
             f"{_place(system, run)} is allowed in no mode: {_faults(system, verdicts)}. Start on the other "
-            "side of a guard, or choose a mode with mode= to start beyond its guard."
+            "side of a guard, or choose a mode with mode=, or HybridSystem(start=...), to start beyond its "
+            "guard."
         )
     candidates = ", ".join(allowed)
     raise ArgumentError(
-        f"{_place(system, run)} is allowed in more than one mode: {candidates}. Choose one with mode=."
+        f"{_place(system, run)} is allowed in more than one mode: {candidates}. Choose one with mode=, or "
+        "for all runs with HybridSystem(start=...)."
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
+from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.simulation.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
 from hybrid.simulation.ending import status_of
@@ -38,6 +39,7 @@ def simulate(
     solver: Solver | None = None,
     tangent: ArrayLike | bool | None = None,
     samples: ArrayLike | None = None,
+    keep_jumps: bool | None = None,
     max_jumps: int = 100_000,
 ) -> HybridArc:
     """Solve a hybrid system from ``x0`` over ``t_span``.
@@ -47,11 +49,14 @@ def simulate(
     system
         The model.
     x0
-        State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``.
+        State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``. A Series of pandas or a
+        DataArray of xarray that is labelled with the names is read by these, in any order.
     t_span
         ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
     mode
-        Mode to start in; by default the only one, or the only one whose guards allow ``x0``.
+        Mode to start in; by default the only one, or the ``start`` of the system, or the only one whose
+        guards allow ``x0``. In a mode that is known so, a guard that ``x0`` lies beyond counts as crossed,
+        and the status says so.
     parameters
         Values that override the system's.
     solver
@@ -60,7 +65,11 @@ def simulate(
         True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is
         controlled with the state's.
     samples
-        Increasing times at which to store the state; only these states and the jumps are then stored.
+        Increasing times at which to store the state; only these states are then stored, so the memory of a
+        run does not grow with its length.
+    keep_jumps
+        Whether the arc holds its jumps; by default it does without ``samples``, and not with them.
+        ``arc.jump_count`` is their number in any case.
     max_jumps
         The run ends with a status at this many jumps.
 
@@ -87,6 +96,12 @@ def simulate(
     times = None if samples is None else arguments.increasing_times("samples", samples, t0, t1)
     vectors = None if tangent is None or tangent is False else _tangent_matrix(tangent, system)
     most = arguments.count("max_jumps", max_jumps, 0)
+    if keep_jumps is None:
+        keep_jumps = times is None
+    elif not arguments.flag("keep_jumps", keep_jumps) and times is None:
+        raise ArgumentError(
+            "keep_jumps=False needs samples=: the points of an arc are made of its jumps too."
+        )
     trajectory = start(
         system,
         x0,
@@ -99,7 +114,7 @@ def simulate(
         horizon=t1 - t0,
     )
     check_time("t_span", t1, trajectory.model.period)
-    arc = _Recorder(trajectory, times, t1).run(t1, most)
+    arc = _Recorder(trajectory, times, t1, bool(keep_jumps)).run(t1, most)
     trajectory.release()
     return arc
 
@@ -120,8 +135,10 @@ def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
 class _Recorder:
     """Runs a trajectory in bursts and files what the kernel wrote down in each."""
 
-    def __init__(self, trajectory: Trajectory, times: np.ndarray | None, t1: float) -> None:
-        self.trajectory = trajectory
+    def __init__(
+        self, trajectory: Trajectory, times: np.ndarray | None, t1: float, keeps_jumps: bool
+    ) -> None:
+        self.trajectory, self.keeps_jumps = trajectory, keeps_jumps
         self.times = times
         # The state at the end is at hand without any polynomial.
         only_the_end = times is not None and not (times.size and times[0] < t1)
@@ -154,12 +171,12 @@ class _Recorder:
                     else:
                         code = self._advance(t1, max_jumps)
         model, system = trajectory.model, trajectory.system
-        columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
-        jumps = Jumps(system, model.parameters, model.period, *columns)
+        jumps = self._jumps()
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, run.mode)
         pieces = None
         if self.times is None:
+            assert jumps is not None
             pieces = Pieces(self.blocks, *join(self.steps))
             t, j, x, mode = hybrid_points(system, pieces, jumps, end)
         else:
@@ -174,6 +191,7 @@ class _Recorder:
             x,
             mode,
             jumps,
+            trajectory.jumps,
             tuple(self.grazings),
             status_of(trajectory, code),
             trajectory.tangent_matrix if trajectory.tangents else None,
@@ -182,6 +200,14 @@ class _Recorder:
             run.rejected,
             pieces,
         )
+
+    def _jumps(self) -> Jumps | None:
+        """The jumps that were kept."""
+        if not self.keeps_jumps:
+            return None
+        model = self.trajectory.model
+        columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
+        return Jumps(self.trajectory.system, model.parameters, model.period, *columns)
 
     def _advance(self, t1: float, max_jumps: int) -> int:
         """Run until the record is full or the run ends; the code."""
@@ -194,7 +220,7 @@ class _Recorder:
     def _file(self, record: Any) -> None:
         period = self.trajectory.model.period
         steps, jumps, grazings, matrices = record.used.tolist()
-        if jumps:
+        if jumps and self.keeps_jumps:
             self._keep(self.jumps, _jump_columns(record, jumps, matrices))
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)

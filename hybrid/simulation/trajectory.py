@@ -36,8 +36,12 @@ def start(
     time: str = "t0",
     horizon: float = 0.0,
     stop: Stop = CTRL_C,
+    by_guards: bool = False,
 ) -> Trajectory:
     """A trajectory at its start, everything about the call checked.
+
+    Without a ``mode`` the system says where a run starts. The guards do if it does not, or with
+    ``by_guards``.
 
     ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
     name of the argument that ``t0`` comes from, ``horizon`` how long the run takes, 0 if that is not known,
@@ -46,6 +50,7 @@ def start(
     as_system("system", system)
     state = system.variables.state_values("x0", x0)
     t0 = arguments.number(time, t0)
+    mode = mode if by_guards else system.starting_mode(mode)
     if system.growth is not None:
         values = system.parameter_values(parameters)
         if system.growth.place(t0, state, values, mode):

@@ -30,6 +30,7 @@ from hybrid.sweep.local import LOOK, cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.labels import named
 
 if TYPE_CHECKING:
     import xarray
@@ -39,6 +40,7 @@ BLOCKS_PER_THREAD = 8
 STARTS = "be states of shape (N, n), or map each component to a number or to N of them"
 
 
+@arguments.without_tolerances
 def simulate_many(
     system: HybridSystem,
     x0: ArrayLike | Mapping[str, ArrayLike],
@@ -61,7 +63,8 @@ def simulate_many(
     system, t_span, mode, parameters, solver, max_jumps
         As for :func:`hybrid.simulate`, the same for all starts.
     x0
-        Starts ``(N, n)``; or a mapping of each component to a number or to ``N`` numbers.
+        Starts ``(N, n)``; or a mapping of each component to a number or to ``N`` numbers. A DataArray or
+        a DataFrame with the names of the components as a coordinate or as columns is read by these.
     samples
         Increasing times at which to store the state. A step ends at each of them.
     executor
@@ -96,7 +99,8 @@ def simulate_many(
     most = arguments.count("max_jumps", max_jumps, 0)
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
     system.parameter_values(parameters)
-    overrides = {} if parameters is None else dict(parameters)
+    overrides = named("parameters", parameters)
+    mode = system.starting_mode(mode)
     options = {"mode": mode, "parameters": overrides, "solver": check_solver(solver)}
     found = _Found(origins, times, t1)
     if system.growth is not None or (mode is not None and len(system.parts_of(mode)) > 1):
@@ -139,13 +143,9 @@ def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int)
 
 def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
     names = system.state_names
-    if isinstance(x0, Mapping):
-        for name in x0:
-            arguments.known("x0: State component", name, names, "State components")
-        missing = [name for name in names if name not in x0]
-        if missing:
-            raise ArgumentError(f"x0 lacks {', '.join(missing)}. The state is {', '.join(names)}.")
-        columns = [arguments.numbers(f"x0[{name!r}]", x0[name], STARTS) for name in names]
+    by_name = system.variables.components("x0", x0)
+    if by_name is not None:
+        columns = [arguments.numbers(f"x0[{name!r}]", by_name[name], STARTS) for name in names]
         try:
             states = np.stack(np.broadcast_arrays(*columns), axis=-1)
         except ValueError:
@@ -230,7 +230,7 @@ class _OneByOne:
             reached = found.times[found.times <= arc.t[-1]]
             found.states[i, : len(reached)] = arc(reached)
             found.states[i, -1], found.t_end[i] = arc.x[-1], arc.t[-1]
-            found.mode[i], found.jumps[i] = str(arc.mode[-1]), len(arc.jumps)
+            found.mode[i], found.jumps[i] = str(arc.mode[-1]), arc.jump_count
             found.tell(i, arc.status)
 
 

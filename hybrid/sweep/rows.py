@@ -25,6 +25,7 @@ from hybrid.sweep.sheet import Labels
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import Unexplored
+from hybrid.system.labels import by_label, named, plain_name
 from hybrid.transform.markers import with_section
 
 # Where the points of a section are taken: per forcing period, at crossings of a surface, or at each jump.
@@ -94,10 +95,12 @@ class Rows:
         tangent: np.ndarray | None,
         system: HybridSystem,
     ) -> Trajectory:
-        """A trajectory at the start of a row: at the place, if the system can start there."""
+        """A trajectory at the start of a row: at the place, if the system can start there beyond no guard."""
         if place is not None:
             with suppress(HybridError):
-                return self.go_on(point, place, tangent, system, self.t0)
+                trajectory = self.go_on(point, place, tangent, system, self.t0)
+                if not trajectory.beyond:
+                    return trajectory
         return self.go_on(point, (self.origin(point), self.mode), tangent, system, self.t0)
 
     def go_on(
@@ -127,16 +130,16 @@ class Rows:
             return self.x0
         state = self.x0.copy()
         for name in self.starts:
-            state[self.system.state_names.index(name)] = point[name]
+            state[self.system.state_names.index(plain_name(name))] = point[name]
         return state
 
     def end_of(self, trajectory: Trajectory, code: int) -> Place | None:
-        """Where the next row goes on. With a single mode the start checks that it allows the state."""
+        """Where the next row goes on."""
         # A run that needs a mode which has not been made yet is repeated.
         status_of(trajectory, code)
         if code != codes.DONE:
             return None
-        return trajectory.x, self.mode if len(self.system.modes) == 1 else trajectory.mode
+        return trajectory.x, trajectory.mode
 
     def section(self, trajectory: Trajectory, points: int) -> tuple[np.ndarray, int]:
         """The next points of the section ``(points, n)``, filled up with nan, and the code of the run."""
@@ -160,7 +163,7 @@ class Rows:
         fixed = {
             name: value
             for name, value in zip(self.system.state_names, self.x0.tolist(), strict=True)
-            if name not in self.starts
+            if name not in map(plain_name, self.starts)
         }
         return {
             "model": self.system,
@@ -199,8 +202,8 @@ def rows_of(
     as_system("system", system)
     swept = as_points(over)
     names = system.state_names
-    others = arguments.mapping("parameters", parameters)
-    for name in swept.names:
+    others = named("parameters", parameters)
+    for name in map(plain_name, swept.names):
         if name not in names:
             arguments.known("over: Parameter", name, system.parameters, "Parameters")
         if name in others:
@@ -209,13 +212,14 @@ def rows_of(
             raise ArgumentError(
                 f"over: {name!r} is also the name of a result. Rename the parameter or state of the model."
             )
-    starts = tuple(name for name in swept.names if name not in system.parameters)
-    if isinstance(x0, Mapping):
-        x0 = {**dict.fromkeys(starts, 0.0), **x0}
+    starts = tuple(name for name in swept.names if plain_name(name) not in system.parameters)
+    by_name = by_label("x0", x0)
+    if by_name is not None:
+        x0 = {**dict.fromkeys(map(plain_name, starts), 0.0), **by_name}
     state = system.variables.state_values("x0", x0)
     system.parameter_values(others)
     if mode is not None:
-        system.mode_index(mode)
+        system.check_mode(mode)
     along = _axis(continue_from, swept.dims)
     if along in starts:
         raise ArgumentError(

@@ -196,7 +196,7 @@ def sees_store(path: Path, seal: str) -> bool:
     return bool(seal) and _read(path / INSIDE / MADE_BY) == seal
 
 
-def open(path: str | os.PathLike[str]) -> xarray.Dataset:
+def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
     """What a sweep saved in a store, also while the sweep runs or after it was killed.
 
     Parameters
@@ -224,7 +224,7 @@ def open(path: str | os.PathLike[str]) -> xarray.Dataset:
     # A group without the parts is the copy of a store. Otherwise a damaged group, or one that another call
     # is laying out, is made again from the parts.
     if (where / GROUP).exists() and (not latest or _is_as_laid_out(where)):
-        needed("zarr", "open")
+        needed("zarr", "open_store")
         # A later call with another grid first removes the file that makes the folder a group.
         before, found = _read(where / GROUP), None
         try:

@@ -8,6 +8,7 @@ from functools import reduce
 from itertools import islice, pairwise
 from threading import Lock
 from types import FrameType
+from typing import Any
 
 # Python 3.11 reports an error if two threads build syntax trees at the same time.
 PARSER = Lock()
@@ -134,10 +135,27 @@ def _chosen(test: ast.expr, a: ast.expr, b: ast.expr) -> ast.expr:
         pairs = zip(a.elts, b.elts, strict=True)
         entries = [c if ast.dump(c) == ast.dump(d) else _chosen(test, c, d) for c, d in pairs]
         return ast.Tuple(entries, ast.Load())
+    if _is_literal_dict(a) and _is_literal_dict(b):
+        return _chosen_changes(test, a, b)
     with PARSER:
         condition = ast.parse(_condition(test), mode="eval").body
     where = ast.Attribute(ast.Name("np", ast.Load()), "where", ast.Load())
     return ast.Call(where, [condition, a, b], [])
+
+
+def _is_literal_dict(node: ast.expr) -> bool:
+    return isinstance(node, ast.Dict) and all(isinstance(key, ast.Constant) for key in node.keys)
+
+
+def _chosen_changes(test: ast.expr, a: Any, b: Any) -> ast.expr:
+    """The choice between two dicts of components that a reset changes; what one lacks stays as it is."""
+    sides = [{key.value: value for key, value in zip(d.keys, d.values, strict=True)} for d in (a, b)]
+    entries = {
+        name: [side.get(name, ast.Attribute(ast.Name("x"), str(name))) for side in sides]
+        for name in {**sides[0], **sides[1]}
+    }
+    chosen = [c if ast.dump(c) == ast.dump(d) else _chosen(test, c, d) for c, d in entries.values()]
+    return ast.Dict([ast.Constant(name) for name in entries], chosen)
 
 
 def _statement(node: ast.If, following: ast.AST | None) -> str | None:

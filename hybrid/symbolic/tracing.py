@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Callable, Iterable
 from functools import lru_cache
 from typing import Any
@@ -46,6 +47,18 @@ def _combined(name: str, contents: tuple[sympy.Expr, ...]) -> sympy.Expr:
     if is_larger_than(MOST_ASKED, made):
         ask_no_more(made)
     return made
+
+
+def _told(error: Exception) -> str:
+    """What stopped a function, with what to write instead if that is known."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        if str(frame.f_globals.get("__name__")).startswith("numpy.linalg"):
+            return (
+                f"np.linalg.{frame.f_code.co_name} of numbers that depend on the state cannot be traced: "
+                "write the solution out (Cramer's rule for two or three unknowns), or multiply by the "
+                "inverse if the matrix is constant"
+            )
+    return f"{type(error).__name__}: {error}"
 
 
 SYMBOLIC = SymbolicAlgebra()
@@ -106,7 +119,7 @@ def trace(
     except ModelError:
         raise
     except Exception as error:
-        raise TraceError(f"{type(error).__name__}: {error}") from error
+        raise TraceError(_told(error)) from error
     for node in nodes(*expressions):
         if node in (sympy.I, sympy.zoo, sympy.nan):
             shown = next((str(each) for each in expressions if not is_larger_than(SHOWN, each)), str(node))

@@ -124,6 +124,13 @@ NEEDS_CHOICE = "a condition as an index cannot be traced: write np.where(x > 0, 
 NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
 
 
+FOREIGN = (
+    "only NumPy's functions can be traced or compiled. Write it with these, as a series or a fit, or carry "
+    "its value as a component of the state, whose rate is the derivative of the function times that of its "
+    "argument"
+)
+
+
 class Traced(NDArrayOperatorsMixin):
     """A placeholder for a number, which behaves like a NumPy scalar."""
 
@@ -263,6 +270,8 @@ def _unknown(name: str, reason: str = "") -> TraceError:
 
 
 def _known(ufunc: np.ufunc) -> str:
+    if getattr(np, ufunc.__name__, None) is not ufunc:
+        raise refusal(f"{ufunc.__name__} is not a function of NumPy: {FOREIGN}")
     if ufunc.__name__ not in UFUNCS | BITWISE:
         raise _unknown(ufunc.__name__)
     return str(ufunc.__name__)

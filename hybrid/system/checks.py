@@ -12,7 +12,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import check_derivative, evaluate, sample_points
-from hybrid.system.functions import CONDITION, ModelFunction
+from hybrid.system.functions import CONDITION, ModelFunction, WholeReset
 from hybrid.system.periodicity import Period, period_at, period_fault
 from hybrid.system.variables import Variables
 
@@ -68,6 +68,8 @@ def _check_function(variables: Variables, function: ModelFunction) -> None:
     if value is not None:
         _check_value(variables, function, value[0])
         _check_pure(variables, function)
+    else:
+        _check_division(variables, function)
     if function.derivative is not None:
         _check_derivative(variables, function, arguments)
 
@@ -83,6 +85,28 @@ def _check_pure(variables: Variables, function: ModelFunction) -> None:
                 f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
                 "random numbers, no counters, no memory of earlier calls."
             )
+
+
+def _check_division(variables: Variables, function: ModelFunction) -> None:
+    """Check that Python does not divide by zero everywhere.
+
+    The state, the time and the parameters are NumPy's numbers, whose quotients never raise an error.
+    """
+    p = variables.parameter_view(variables.defaults)
+    for t, x in sample_points(variables.dimension):
+        try:
+            with np.errstate(all="ignore"):
+                function.value(np.float64(t), variables.state_view(x), p)
+        except ZeroDivisionError as error:
+            failure = error
+        except Exception:  # for another reason, at this point
+            return
+        else:
+            return
+    raise ModelError(
+        f"{function.title} divides by zero at every point that was tried: {failure}. Check the plain numbers "
+        "in its denominators."
+    ) from failure
 
 
 def _check_derivative(variables: Variables, function: ModelFunction, arguments: tuple[Any, ...]) -> None:
@@ -141,7 +165,7 @@ def _check_arity(
     title: str, function: Callable[..., Any], arguments: tuple[Any, ...], signature: str
 ) -> None:
     try:
-        expected = inspect.signature(function)
+        expected = inspect.signature(function.function if isinstance(function, WholeReset) else function)
     except (TypeError, ValueError):  # some builtins and ufuncs have no signature
         return
     try:

@@ -2,14 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import attrs
 
+from hybrid.errors import ModelError, unknown_name
 from hybrid.system.elements import Mode, Transition
+from hybrid.system.labels import plain_name
+from hybrid.system.variables import STATE
 
 CONDITION = "when"
+
+
+@attrs.frozen
+class WholeReset:
+    """A user's reset with all components as its value, also where it returns a dict of those that change.
+
+    ``state`` holds the names of the components, or their number.
+    """
+
+    function: Callable[..., Any]
+    state: tuple[str, ...] | int
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The values after the reset, in order."""
+        value = self.function(t, x, p)
+        if not isinstance(value, dict):
+            return value
+        changed = {plain_name(name): each for name, each in value.items()}
+        names = checked_changes(changed, self.state)
+        return tuple(changed.get(name, before) for name, before in zip(names, x, strict=True))
+
+
+def checked_changes(changed: Iterable[Any], state: tuple[str, ...] | int) -> tuple[str, ...]:
+    """The names of the state, if all names of changed components are among them.
+
+    Raises
+    ------
+    ModelError
+        If a name does not exist, or the components have none.
+    """
+    if isinstance(state, int):
+        raise ModelError(
+            f"a dict of what changes needs names, and the {state} components of this state have none. Return "
+            "all components in order, or name them with state=."
+        )
+    for name in changed:
+        if name not in state:
+            raise ModelError(unknown_name("State component", name, state, STATE))
+    return state
 
 
 @attrs.frozen
@@ -22,19 +64,28 @@ class ModelFunction:
         Mode or transition of the function, as error texts begin: ``"Mode 'flight'"``.
     kind, derivative_name
         Names of the function and its derivative, for example ``"field"`` and ``"jacobian"``.
-    value, derivative
+    function, derivative
         The user's functions of ``(t, x, p)``; ``derivative`` is None if the library derives it, and for a
         condition, which has no derivative.
     size
         Number of values, or None for a scalar.
+    completed
+        Names of the state's components, or their number, if the function may return those that change alone:
+        that of a reset. Else None.
     """
 
     owner: str
     kind: str
-    value: Callable[..., Any]
+    function: Callable[..., Any]
     derivative_name: str
     derivative: Callable[..., Any] | None
     size: int | None
+    completed: tuple[str, ...] | int | None = None
+
+    @property
+    def value(self) -> Callable[..., Any]:
+        """The function, which always returns all values."""
+        return self.function if self.completed is None else WholeReset(self.function, self.completed)
 
     @property
     def identity(self) -> tuple[int, int, int | None]:
@@ -42,7 +93,7 @@ class ModelFunction:
 
         What the user gives need not be hashable.
         """
-        return id(self.value), id(self.derivative), self.size
+        return id(self.function), id(self.derivative), self.size
 
     @property
     def rows(self) -> int:
@@ -79,26 +130,30 @@ def condition_function(transition: Transition) -> ModelFunction | None:
     return ModelFunction(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
 
 
-def reset_function(transition: Transition, dimension: int) -> ModelFunction | None:
+def reset_function(transition: Transition, state: tuple[str, ...] | int) -> ModelFunction | None:
     """The reset of a transition; None for the identity."""
     reset = transition.reset
     if reset is None:
         return None
-    owner = f"Transition {transition.name!r}"
-    return ModelFunction(owner, "reset", reset.function, "jacobian", reset.jacobian, dimension)
+    owner, n = f"Transition {transition.name!r}", _dimension(state)
+    return ModelFunction(owner, "reset", reset.function, "jacobian", reset.jacobian, n, state)
+
+
+def _dimension(state: tuple[str, ...] | int) -> int:
+    return state if isinstance(state, int) else len(state)
 
 
 def functions_in(
-    modes: Sequence[Mode], transitions: Sequence[Transition], dimension: int
+    modes: Sequence[Mode], transitions: Sequence[Transition], state: tuple[str, ...] | int
 ) -> Iterator[tuple[int, ModelFunction]]:
     """Every model function with the index of its mode or transition, fields first."""
     for index, mode in enumerate(modes):
-        yield index, field_function(mode, dimension)
+        yield index, field_function(mode, _dimension(state))
     for index, transition in enumerate(transitions):
         yield index, guard_function(transition)
         condition = condition_function(transition)
         if condition is not None:
             yield index, condition
-        reset = reset_function(transition, dimension)
+        reset = reset_function(transition, state)
         if reset is not None:
             yield index, reset

@@ -22,6 +22,7 @@ from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
 from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -79,6 +80,9 @@ class HybridSystem(Portable):
         Default values by name; any call may override them.
     modes, transitions
         Nodes and edges. If guards are crossed at the same time, the transition listed first fires.
+    start
+        Name of the mode that a run starts in if the call names none. In a system that has been split it may
+        be a mode from before: the run starts in the part that the state lies in.
     period
         Forcing period, a number or a function of ``p``. Every model function must have this period in
         ``t``, which is checked. Time is then stored as a number of whole periods and a phase.
@@ -100,6 +104,7 @@ class HybridSystem(Portable):
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
+    start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
@@ -107,6 +112,8 @@ class HybridSystem(Portable):
     notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_notes, repr=False)
     # What makes further modes, for a system that is made in stages.
     growth: Growth | None = attrs.field(default=None, kw_only=True, validator=_growth, repr=False)
+    # What the functions read that this system was derived from.
+    derived_from: Watched = attrs.field(factory=Watched, kw_only=True, eq=False, repr=False)
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 
@@ -147,11 +154,12 @@ class HybridSystem(Portable):
             f"HybridSystem {self.name}".rstrip(),
             f"state: {state}",
             f"parameters: {parameters or 'none'}",
-            f"modes: {', '.join(self.mode_names)}",
+            f"modes: {', '.join(map(repr, self.mode_names))}",
         ]
+        if self.start is not None:
+            lines.append(f"start: {self.start!r}")
         if self.period is not None:
-            period = "a function of the parameters" if callable(self.period) else f"{self.period:.6g}"
-            lines.append(f"period: {period}")
+            lines.append(f"period: {self._period_told()}")
         if self.switching:
             inside = "; ".join(f"{', '.join(names)} in mode {mode}" for mode, names in self.switching.items())
             lines.append(f"kinks or jumps inside of modes: {inside} (hybrid.split makes modes of them)")
@@ -159,6 +167,14 @@ class HybridSystem(Portable):
         if not self.is_whole:
             lines.append("A run adds the modes that it needs.")
         return lines
+
+    def _period_told(self) -> str:
+        """The period at the default parameters, if it has one there."""
+        try:
+            period = f"{self.forcing_period():.6g}"
+        except (ArithmeticError, ValueError):
+            return "a function of the parameters"
+        return f"{period}, a function of the parameters" if callable(self.period) else period
 
     def _transition_rows(self) -> list[list[str]]:
         return [
@@ -244,6 +260,21 @@ class HybridSystem(Portable):
         parts = [i for i, mode in enumerate(self.modes) if name in (mode.name, mode.part_of)]
         return parts or [self.mode_index(name)]
 
+    def check_mode(self, name: object, what: str = "Mode") -> None:
+        """ModelError unless a run may start in a mode of that name; ``what`` begins the text."""
+        names = [*self.mode_names, *(mode.part_of for mode in self.modes if mode.part_of)]
+        if self.growth is not None:
+            # No part of a mode may have been made yet.
+            names += self.growth.original.mode_names
+        if not isinstance(name, str) or name not in names:
+            raise ModelError(unknown_name(what, name, dict.fromkeys(names), "Modes"))
+
+    def starting_mode(self, mode: str | None) -> str | None:
+        """The mode that a call names, or the only one, or ``start``; None if the guards choose it."""
+        if mode is not None:
+            return mode
+        return self.mode_names[0] if len(self.modes) == 1 and self.is_whole else self.start
+
     def copies_of(self, name: str) -> list[int]:
         """Indices of the transitions that are copies of a transition, or of the one of that name."""
         copies = []
@@ -294,6 +325,8 @@ class HybridSystem(Portable):
                 if name is not None and name not in self.mode_names:
                     what = f"Transition {transition.name!r}: {end} mode"
                     raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
+        if self.start is not None:
+            self.check_mode(self.start, "HybridSystem: start mode")
         if self.is_whole:
             # The modes between those of a stage may not have been made yet.
             self._check_reachable()
@@ -314,7 +347,14 @@ class HybridSystem(Portable):
 
 def functions_of(system: HybridSystem) -> Iterator[tuple[int, ModelFunction]]:
     """Every model function with the index of its mode or transition, fields first."""
-    return functions_in(system.modes, system.transitions, system.dimension)
+    return functions_in(system.modes, system.transitions, system.state)
+
+
+def watched_by(system: HybridSystem) -> Watched:
+    """The values that the functions of a system read now from elsewhere."""
+    functions = [function for _, function in functions_of(system)]
+    period = system.period if callable(system.period) else None
+    return Watched([*(each.function for each in functions), *(each.derivative for each in functions), period])
 
 
 def as_system(name: str, value: object) -> HybridSystem:

@@ -13,6 +13,8 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
+from hybrid.arguments import without_tolerances
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -65,6 +67,7 @@ def growing(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
 
     The first argument is the system; a result therefore belongs to a system that has every mode it visits.
     """
+    function = without_tolerances(function)
 
     @wraps(function)
     def call(system: Any, *args: P.args, **kwargs: P.kwargs) -> R:

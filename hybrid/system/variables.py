@@ -15,9 +15,12 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.system.frozen import FrozenMapping
+from hybrid.system.labels import by_label, named, plain_name
 
 STATE = "State components"
 PARAMETERS = "Parameters"
+# What model functions call them.
+LETTERS = {STATE: "x", PARAMETERS: "p"}
 MOST_COMPONENTS = 1_000_000
 # Number of named-value classes kept for later models with the same names.
 MOST_CLASSES = 256
@@ -39,7 +42,16 @@ def _explaining_class(kind: str, names: tuple[str, ...]) -> type[Any]:
         raise UnknownComponentError(unknown_name(kind.removesuffix("s"), name, names, kind))
 
     plain = plain_class(kind, names)
-    return type(plain.__name__, (plain,), {"__slots__": (), "__getattr__": __getattr__})
+
+    def __getitem__(self: Any, key: Any) -> Any:
+        if isinstance(key, str):
+            getattr(self, key)
+            letter = LETTERS.get(kind, "x")
+            raise ModelError(f"{letter}[{key!r}] is written {letter}.{key}: names are attributes here.")
+        return plain.__getitem__(self, key)
+
+    methods = {"__slots__": (), "__getattr__": __getattr__, "__getitem__": __getitem__}
+    return type(plain.__name__, (plain,), methods)
 
 
 def named_values(kind: str, names: tuple[str, ...], values: Iterable[Any]) -> Any:
@@ -78,6 +90,14 @@ class Variables:
     state: tuple[str, ...] | int
     parameters: Mapping[str, float]
 
+    def __attrs_post_init__(self) -> None:
+        both = [name for name in self.state_names if name in self.parameters]
+        if both:
+            raise ModelError(
+                f"HybridSystem: {', '.join(map(repr, both))} is the name of a state and of a parameter. A "
+                "name means one thing; rename one of the two."
+            )
+
     @property
     def dimension(self) -> int:
         """Number of state components ``n``."""
@@ -103,14 +123,14 @@ class Variables:
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
         values = dict(self.parameters)
-        for name, number in arguments.mapping("parameters", overrides).items():
+        for name, number in named("parameters", overrides).items():
             arguments.known("parameters: Parameter", name, values, "Parameters")
             values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
         return np.array(list(values.values()), dtype=float)
 
     def as_units(self, value: object) -> Mapping[str, str]:
         """Units by name of a component, of a parameter or of the time ``t``, read-only."""
-        given = arguments.mapping("HybridSystem: units", value, "map names to texts")
+        given = named("HybridSystem: units", value, "map names to texts")
         for name, unit in given.items():
             names = [*self.state_names, *self.parameter_names, "t"]
             arguments.known("HybridSystem: units: Name", name, names, "Names")
@@ -118,7 +138,9 @@ class Variables:
         return FrozenMapping(given)
 
     def state_values(self, name: str, value: object) -> np.ndarray:
-        """A finite state ``(n,)`` from the argument ``name``: numbers in order, or a mapping by name.
+        """A finite state ``(n,)`` from the argument ``name``: numbers in order, or with names as labels.
+
+        Labels have a mapping, a Series of pandas, and a DataArray of xarray with a coordinate of names.
 
         Raises
         ------
@@ -126,15 +148,9 @@ class Variables:
             If the shape is wrong, or a component is missing, unknown or not finite.
         """
         names = self.state_names
-        if isinstance(value, Mapping):
-            for component in value:
-                arguments.known(f"{name}: State component", component, names, "State components")
-            missing = [component for component in names if component not in value]
-            if missing:
-                raise ArgumentError(
-                    f"{name} lacks {', '.join(missing)}. The state is {', '.join(names)}; give each a number."
-                )
-            value = [value[component] for component in names]
+        by_name = self.components(name, value)
+        if by_name is not None:
+            value = [by_name[component] for component in names]
         found = arguments.floats(value)
         if found is None:
             raise ArgumentError(
@@ -152,6 +168,27 @@ class Variables:
             component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
             raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
         return found
+
+    def components(self, name: str, value: object) -> dict[str, Any] | None:
+        """What the argument ``name`` gives for each component, if it has labels; else None.
+
+        Raises
+        ------
+        ArgumentError
+            If a component is missing or unknown.
+        """
+        given = by_label(name, value)
+        if given is None:
+            return None
+        for component in given:
+            arguments.known(f"{name}: State component", component, self.state_names, "State components")
+        missing = [component for component in self.state_names if component not in given]
+        if missing:
+            raise ArgumentError(
+                f"{name} lacks {', '.join(missing)}. The state is {', '.join(self.state_names)}; give each a "
+                "number."
+            )
+        return given
 
     def state_view(self, values: Any) -> Any:
         """The state as model functions get it: by name, or a read-only array without names."""
@@ -196,7 +233,7 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     # A set has no order.
     if not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1):
         raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)
-    names = tuple(value)
+    names = tuple(map(plain_name, value))
     if not names:
         raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
     _check_identifiers(names, "state")
@@ -205,7 +242,7 @@ def as_state(value: Any) -> tuple[str, ...] | int:
 
 def as_parameters(value: Any) -> Mapping[str, float]:
     """Default values of parameters by name, read-only."""
-    given = arguments.mapping("HybridSystem: parameters", value)
+    given = named("HybridSystem: parameters", value)
     _check_identifiers(tuple(given), "parameter")
     return FrozenMapping(
         {name: arguments.number(f"HybridSystem: parameter {name!r}", each) for name, each in given.items()}

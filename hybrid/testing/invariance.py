@@ -166,7 +166,7 @@ def check_samples(case: Case) -> None:
     run = case.run
     jumps = {jump.t: jump.x_plus for jump in run.arc.jumps}
     times = np.unique([case.t0 + case.fraction * case.duration, *jumps, run.t1])
-    arc = case.simulate(run.t1, samples=times)
+    arc = case.simulate(run.t1, samples=times, keep_jumps=True)
     hint = "samples that change the steps, or are taken on the wrong side of an event."
     compare(case, SAMPLES, arc, _fired(arc), str(arc.mode[-1]), hint)
     for t, x in zip(arc.t, arc.x, strict=True):

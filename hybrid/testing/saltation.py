@@ -159,7 +159,7 @@ def check_flow_direction(case: Case) -> None:
     looked_at = 0
     for jump in case.run.arc.jumps:
         transition = case.transition(jump)
-        felt = [guard_function(transition), reset_function(transition, case.system.dimension)]
+        felt = [guard_function(transition), reset_function(transition, case.system.state)]
         slopes = [
             case.slope(function, jump.transition, jump.t, jump.x_minus)
             for function in felt

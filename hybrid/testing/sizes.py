@@ -34,7 +34,7 @@ def sizes_along(
     for jump in arc.jumps:
         places.append((jump.source, jump.t, jump.x_minus))
         index = system.transition_index(jump.transition)
-        reset = reset_function(system.transitions[index], system.dimension)
+        reset = reset_function(system.transitions[index], system.state)
         if reset is not None:
             made = np.maximum(made, _absolute(derivative(reset, index, jump.t, jump.x_minus)) @ size)
     for mode, t, x in places:

@@ -16,6 +16,7 @@ from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver
 from hybrid.system.derivatives import evaluate
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.labels import named
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
@@ -54,7 +55,7 @@ def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tupl
     names = as_system("system", system).state_names
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda x: _drawn_state(name, len(names), x))
-    chosen = arguments.mapping(name, ranges, RANGES)
+    chosen = named(name, ranges, RANGES)
     for each in chosen:
         arguments.known(f"{name}: State component", each, names, "State components")
     return st.tuples(
@@ -88,7 +89,7 @@ def _parameters(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[
     declared = dict(as_system("system", system).parameters)
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda values: _drawn_parameters(name, declared, values))
-    chosen = arguments.mapping(name, ranges, RANGES)
+    chosen = named(name, ranges, RANGES)
     for each in chosen:
         arguments.known(f"{name}: Parameter", each, declared, "Parameters")
     drawn = {
@@ -137,7 +138,7 @@ def cases(
         If a name does not exist, or a range or the span is invalid.
     """
     if mode is not None:
-        as_system("system", system).mode_index(mode)
+        as_system("system", system).check_mode(mode)
     state, values = _states("states", system, states), _parameters("parameters", system, parameters)
     through = tuple(
         arguments.known("passable: Transition", name, system.transition_names, "Transitions")
@@ -218,7 +219,7 @@ def _drawn_parameters(name: str, declared: Mapping[str, float], value: Any) -> d
     """All parameters, from those that a user's strategy has drawn."""
     if not isinstance(value, Mapping):
         raise arguments.refusal(name, "draw mappings of names to numbers", value)
-    drawn = dict(value)
+    drawn = named(name, value)
     for each in drawn:
         arguments.known(f"{name}: Parameter", each, declared, "Parameters")
     return {**declared, **{each: arguments.number(f"{name}[{each!r}]", drawn[each]) for each in drawn}}

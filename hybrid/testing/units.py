@@ -10,6 +10,7 @@ import attrs
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.system.elements import Guard, Reset
+from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 from hybrid.testing.case import Case, as_case, discard
@@ -105,7 +106,7 @@ def _measured(system: HybridSystem) -> Measured:
         return lambda t, x, p: [rate * (getattr(p, state) / getattr(p, time)) for rate in rates(t, x, p)]
 
     def longer(reset: Callable[..., Any]) -> Callable[..., Any]:
-        values = original(reset)
+        values = original(WholeReset(reset, system.state))
         return lambda t, x, p: [value * getattr(p, state) for value in values(t, x, p)]
 
     def period(p: Any) -> Any:

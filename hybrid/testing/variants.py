@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, named_values
 
@@ -79,6 +80,7 @@ def renamed(system: HybridSystem) -> HybridSystem:
     if system not in _RENAMED:
         _RENAMED[system] = attrs.evolve(
             system,
+            start=system.start and new_name(system.mode_names, system.start),
             modes=[attrs.evolve(mode, name=new_name(system.mode_names, mode.name)) for mode in system.modes],
             transitions=[
                 attrs.evolve(
@@ -121,6 +123,10 @@ def _altered(system: HybridSystem) -> Altered:
     cuts: list[Transition] = []
     transitions: list[Transition] = []
     unaware = _unaware_of_more(system)
+
+    def whole(reset: Callable[..., Any]) -> Callable[..., Any]:
+        return WholeReset(reset, system.state)
+
     for mode in system.modes:
         field = mode if stay else Mode(mode.name, unaware(mode.field), jacobian=unaware(mode.jacobian))
         modes += [field, attrs.evolve(field, name=mode.name + AGAIN)]
@@ -130,7 +136,7 @@ def _altered(system: HybridSystem) -> Altered:
             Transition(mode.name + AGAIN, mode.name, Guard(plane, -1), name=back),
         ]
     for transition in system.transitions:
-        changed = transition if stay else _freed(transition, unaware, factor, multiples)
+        changed = transition if stay else _freed(transition, unaware, whole, factor, multiples)
         again = attrs.evolve(changed, name=changed.name + AGAIN, source=changed.source + AGAIN)
         if transition.source == transition.target:
             again = attrs.evolve(again, target=again.source)
@@ -155,8 +161,8 @@ def _altered(system: HybridSystem) -> Altered:
 
 
 def free_name(system: HybridSystem, name: str) -> str:
-    """A name like this one that no parameter has."""
-    taken = system.parameters
+    """A name like this one that neither a parameter nor a component of the state has."""
+    taken = {*system.parameters, *system.state_names}
     return next(free for i in range(len(taken) + 1) if (free := name + "_" * i) not in taken)
 
 
@@ -173,11 +179,15 @@ def _unaware_of_more(system: HybridSystem) -> Callable[[Any], Any]:
 
 
 def _freed(
-    transition: Transition, unaware: Callable[[Any], Any], factor: str, multiples: tuple[str, ...]
+    transition: Transition,
+    unaware: Callable[[Any], Any],
+    whole: Callable[[Any], Any],
+    factor: str,
+    multiples: tuple[str, ...],
 ) -> Transition:
     """A transition with a factor on its guard, and with multiples of the guard added to its reset."""
     g, gradient = unaware(transition.guard.function), unaware(transition.guard.gradient)
-    reset = None if transition.reset is None else unaware(transition.reset.function)
+    reset = None if transition.reset is None else unaware(whole(transition.reset.function))
 
     def scaled_guard(t: Any, x: Any, p: Any) -> Any:
         return getattr(p, factor) * g(t, x, p)

@@ -8,6 +8,7 @@ from hybrid.errors import ModelError, shown
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.watched import Watched
 from hybrid.transform.surface import SwitchingSurface
 
 
@@ -18,6 +19,7 @@ def filippov(
     above: Function,
     switching: Function,
     *,
+    start: str | None = None,
     period: float | Function | None = None,
     name: str = "",
     units: Mapping[str, str] | None = None,
@@ -51,7 +53,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    period, name, units
+    start, period, name, units
         As for `HybridSystem`.
 
     Returns
@@ -135,9 +137,11 @@ def filippov(
         parameters=parameters,
         modes=modes,
         transitions=transitions,
+        start=start,
         period=period,
         name=name,
         units={} if units is None else units,
+        derived_from=Watched([below, above, switching]),
     )
 
 

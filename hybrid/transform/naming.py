@@ -113,6 +113,12 @@ class Names:
         )
 
 
+def copy_name(transition: str, own: str, to: str = "") -> str:
+    """Name of the copy of a user's transition that leaves some sides, and leads to others if they matter."""
+    sides = f"{own}->{to}" if own and to else own or (to and f"->{to}")
+    return f"{transition} ({sides})" if sides else transition
+
+
 class _Printer(StrPrinter):
     """Sums start with a positive term if they have one."""
 

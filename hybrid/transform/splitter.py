@@ -22,10 +22,11 @@ from hybrid.symbolic.switches import Resolved, Surfaces, Switches
 from hybrid.symbolic.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
-from hybrid.system.graph import HybridSystem
+from hybrid.system.functions import WholeReset
+from hybrid.system.graph import HybridSystem, watched_by
 from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
-from hybrid.transform.naming import Names
+from hybrid.transform.naming import Names, copy_name
 
 # Parts may differ from the field by so much of its largest value: other orders of the same sums.
 AGREEMENT = 1e-9
@@ -59,6 +60,7 @@ class Splitter:
 
     def __init__(self, system: HybridSystem) -> None:
         self.original = system
+        self.watched = watched_by(system)
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
         self.heights: dict[int, Function] = {}
@@ -197,7 +199,8 @@ class Splitter:
         modes = [self.known[cell][0] for cell in self.made]
         notes = (*self.original.notes, *self.names.notes)
         growth = self if self.frontier else None
-        return attrs.evolve(self.original, modes=modes, transitions=transitions, notes=notes, growth=growth)
+        made: dict[str, Any] = {"modes": modes, "transitions": transitions, "notes": notes, "growth": growth}
+        return attrs.evolve(self.original, **made, derived_from=self.watched)
 
     def name_of(self, cell: Cell) -> str:
         """Name of the mode of a cell."""
@@ -234,7 +237,8 @@ class Splitter:
         if transition.reset is None:
             return [*self.symbols.x]
         try:
-            return trace(transition.reset.function, self.variables.state, self.variables.parameter_names)
+            reset = WholeReset(transition.reset.function, self.variables.state)
+            return trace(reset, self.variables.state, self.variables.parameter_names)
         except TraceError:
             return None
 
@@ -382,7 +386,9 @@ class Splitter:
         }
         guard = self._smooth_guard(cell, outgoing)
         if transition.target is None:
-            yield Edge(attrs.evolve(transition, guard=guard, name=_copy_name(transition, own), **new), None)
+            yield Edge(
+                attrs.evolve(transition, guard=guard, name=copy_name(transition.name, own), **new), None
+            )
             return
         asked = [] if guard.when is None else [self._truth(guard.when)]
         limit = self._limit(cell, transition)
@@ -401,7 +407,7 @@ class Splitter:
                 target=self.name_of(landing.cell),
                 guard=attrs.evolve(guard, when=when),
                 reset=transition.reset if after == outgoing.reset else Reset(expressed(after or ())),
-                name=_copy_name(transition, own, to if len(landings) > 1 else ""),
+                name=copy_name(transition.name, own, to if len(landings) > 1 else ""),
                 **new,
             )
             yield Edge(copy, landing.cell, limit)
@@ -482,12 +488,6 @@ def _begun(system: HybridSystem) -> Splitter:
     splitter = Splitter(system)
     splitter.begin()
     return splitter
-
-
-def _copy_name(transition: Transition, own: str, to: str = "") -> str:
-    """Name of the copy of a user's transition that leaves some sides, and leads to others if they matter."""
-    sides = f"{own}->{to}" if own and to else own or (to and f"->{to}")
-    return f"{transition.name} ({sides})" if sides else transition.name
 
 
 def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:

@@ -31,17 +31,34 @@ def cache_directory() -> Path:
     write to it. If this does not hold, or if the folder cannot be written to, a private folder is used
     instead, and one line says so.
     """
+    return _usable(_chosen_folder())
+
+
+def _chosen_folder() -> Path:
     chosen = os.environ.get("HYBRID_CACHE_DIR")
     if chosen:
-        return _usable(Path(chosen))
+        return Path(chosen)
     import platformdirs
 
-    return _usable(Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False)))
+    return Path(platformdirs.user_cache_dir("hybrid-systems", appauthor=False))
 
 
 def cache_folder(name: str) -> Path:
     """A folder of that name in the cache, under the same conditions as ``cache_directory``."""
     return _usable(cache_directory() / name, name)
+
+
+def path_in_cache(folder: str, file: str) -> Path:
+    """Path from which a file of the cache is read.
+
+    It is in the chosen folder if the file is there and the folder can be trusted, even on a disk that is full
+    or cannot be written to; else where it would be stored.
+    """
+    chosen = _chosen_folder()
+    path = chosen / folder / file
+    if path.exists() and _distrust(chosen) is None and _distrust(chosen / folder) is None:
+        return path
+    return cache_folder(folder) / file
 
 
 @cache
@@ -58,16 +75,24 @@ def _objection(folder: Path) -> str | None:
     """Why a folder cannot be used; None if it can. Creates the folder if it does not exist."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if hasattr(os, "geteuid"):
-            found = folder.stat()
-            if found.st_uid != os.geteuid():
-                return "it belongs to another user"
-            if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-                return "others can write to it (chmod go-w)"
+        distrust = _distrust(folder)
+        if distrust is not None:
+            return distrust
         with tempfile.TemporaryFile(dir=folder) as draft:
             draft.write(b"room")
     except OSError as error:
         return error.strerror or str(error)
+    return None
+
+
+def _distrust(folder: Path) -> str | None:
+    """Why what is in a folder must not be run; None if only this user can have put it there."""
+    if hasattr(os, "geteuid"):
+        found = folder.stat()
+        if found.st_uid != os.geteuid():
+            return "it belongs to another user"
+        if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return "others can write to it (chmod go-w)"
     return None
 
 

@@ -19,7 +19,15 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from hybrid.compiler.cache import second_process, shipped
-from hybrid.compiler.cache.folder import PACKAGE, announced, cache_folder, keep, kept, source_key
+from hybrid.compiler.cache.folder import (
+    PACKAGE,
+    announced,
+    cache_folder,
+    keep,
+    kept,
+    path_in_cache,
+    source_key,
+)
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import processor
@@ -134,17 +142,23 @@ def import_numba() -> None:
 
 
 def _path(module: str) -> Path:
+    """Where compiled code of a kernel module is stored."""
     return cache_folder(f"kernels-{kernels_key(module)}") / f"{module}.o"
+
+
+def _place(module: str) -> Path:
+    """Where it is read."""
+    return path_in_cache(f"kernels-{kernels_key(module)}", f"{module}.o")
 
 
 def _on_disk(module: str) -> bytes | None:
     content = shipped.shipped(module, sources_key(module))
-    return kept(_path(module)) if content is None else content
+    return kept(_place(module)) if content is None else content
 
 
 def is_kept(module: str) -> bool:
     """Whether compiled code of a kernel module is on disk."""
-    return is_shipped(module) or _path(module).exists()
+    return is_shipped(module) or _place(module).exists()
 
 
 def is_shipped(module: str) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.compiler.cache.folder import PACKAGE, cache_folder, keep, kept, source_key
+from hybrid.compiler.cache.folder import PACKAGE, cache_folder, keep, kept, path_in_cache, source_key
 from hybrid.compiler.cache.loader import kernels_key, sources_in
 from hybrid.compiler.emitted import Emitted, Programs, Propagator, Series
 
@@ -22,19 +22,24 @@ def models_folder() -> Path:
     return cache_folder(f"models-{_compiler()}")
 
 
+def kept_of_model(file: str) -> bytes | None:
+    """Content of a file with stored results for a model; None if missing or damaged."""
+    return kept(path_in_cache(f"models-{_compiler()}", file))
+
+
 def read(operations: str) -> Emitted | None:
     """Stored results of tracing the system with these operations; None if missing or damaged."""
-    return _read(_path(operations))
+    return _read(kept_of_model(_file(operations)))
 
 
 def write(operations: str, emitted: Emitted) -> None:
     """Store the results of tracing the system with these operations."""
     text = json.dumps(attrs.asdict(emitted), default=int)
-    keep(_path(operations), text.encode())
+    keep(models_folder() / _file(operations), text.encode())
 
 
-def _path(operations: str) -> Path:
-    return models_folder() / f"emitted_{_digest(operations)}.json"
+def _file(operations: str) -> str:
+    return f"emitted_{_digest(operations)}.json"
 
 
 @cache
@@ -60,8 +65,7 @@ def _tracer() -> str:
     return " ".join([digest, sys.version, np.__version__, *versions])
 
 
-def _read(path: Path) -> Emitted | None:
-    content = kept(path)
+def _read(content: bytes | None) -> Emitted | None:
     if content is None:
         return None
     try:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.compiler.cache.folder import keep, kept, source_key
-from hybrid.compiler.cache.store import models_folder
+from hybrid.compiler.cache.folder import keep, source_key
+from hybrid.compiler.cache.store import kept_of_model, models_folder
 from hybrid.compiler.cases import Case, cases_of, function_text
 from hybrid.compiler.llvm.engine import load, processor
 from hybrid.compiler.llvm.lowering import (
@@ -100,11 +100,11 @@ def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int
 @lru_cache(maxsize=MOST_SOURCES)
 def shared_functions(source: str, names: tuple[str, ...]) -> dict[str, Compiled]:
     """The compiled functions of a text that calls no user function, shared by all systems with it."""
-    path = models_folder() / f"model_{source_key(source, processor())}.o"
-    code = kept(path)
+    file = f"model_{source_key(source, processor())}.o"
+    code = kept_of_model(file)
     if code is None:
         code = _code(source, names, {})
-        keep(path, code)
+        keep(models_folder() / file, code)
     return load(code, names)
 
 

@@ -213,7 +213,7 @@ def runs(made):
                 "progress": FLAG[1:],
             },
         ),
-        (call(hybrid.open, "run.zarr"), {"path": [None, 3, "", "no such store", Odd()]}),
+        (call(hybrid.open_store, "run.zarr"), {"path": [None, 3, "", "no such store", Odd()]}),
         (
             call(lyapunov.compare_models, {"a": OSCILLATOR}, (0.0, 0.0), reference="a"),
             {

@@ -173,7 +173,7 @@ def test_every_function_agrees_with_the_model(model, compiled):
     for k, transition in enumerate(system.transitions):
         pairs.append(("guard", "guard_gradient", k, guard_function(transition)))
         if transition.reset is not None:
-            pairs.append(("reset", "reset_jacobian", k, reset_function(transition, system.dimension)))
+            pairs.append(("reset", "reset_jacobian", k, reset_function(transition, system.state)))
     for value, derivative, index, function in pairs:
         for t, x in sample_points(n):
             expected = plain(system, function.value, t, x)

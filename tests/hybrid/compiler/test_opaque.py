@@ -75,11 +75,13 @@ class TestTextOfTheCompiler:
             ("None for signature:\n >>> floor(complex128)", "None for signature: floor(complex128)"),
             ("Wrong signature:", "Wrong signature:"),
             ("Failed in nopython mode", "Failed in nopython mode"),
-            ("", "it gives no reason"),
         ],
     )
     def test_the_line_that_names_the_problem(self, text, told):
         assert _short(ValueError(text)) == f"ValueError: {told}"
+
+    def test_an_error_without_a_text_is_named(self):
+        assert _short(AssertionError()) == "it failed with AssertionError"
 
     def test_a_long_line_is_cut(self):
         most = "x" * LONGEST_REASON

@@ -399,7 +399,6 @@ class TestNoOrbit:
             (OSCILLATOR, {"max_iterations": -1}, "max_iterations must be a whole number of at least 0"),
             (OSCILLATOR, {"t0": math.inf}, "t0 must be finite"),
             (OSCILLATOR, {"x0": (0.0,)}, r"x0 has shape \(1,\)"),
-            (OSCILLATOR, {"x0": (7.0, 0.0)}, "is allowed in no mode"),
             (bouncing_ball(), {}, "An autonomous system needs a guess of its period: give period="),
             (bouncing_ball(), {"period": -1.0}, "period must be positive; got -1.0"),
         ],

@@ -97,7 +97,6 @@ class TestStroboscopic:
             ({"periods": 0}, "periods must be a whole number of at least 1; got 0"),
             ({"periods": 2.5}, "periods must be a whole number of at least 1; got 2.5"),
             ({"transient": -1}, "transient must be a whole number of at least 0; got -1"),
-            ({"x0": (2.0, 0.0)}, "is allowed in no mode"),
         ],
     )
     def test_bad_arguments(self, arguments, text):

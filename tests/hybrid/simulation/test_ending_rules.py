@@ -28,7 +28,6 @@ def test_guards_that_the_start_lies_beyond_are_named():
         (0, {0, 2}, None),
         (3, {0, 2}, "The crossings of 'one', 'three' are not proved: the guard could not be traced"),
         (3, {1}, "The crossings of 'two' are not proved"),
-        (3, set(), "On 3 steps the crossings of a guard are not proved"),
     ],
 )
 def test_crossings_that_are_not_proved(steps, sampled, told):

@@ -39,10 +39,10 @@ def test_what_was_saved_comes_back(found, name, tmp_path):
     pytest.importorskip("zarr")
     labelled = found[name].to_xarray()
     labelled.to_zarr(tmp_path / "saved.zarr", zarr_format=3, consolidated=False)
-    assert labelled.identical(hybrid.open(tmp_path / "saved.zarr"))
+    assert labelled.identical(hybrid.open_store(tmp_path / "saved.zarr"))
     if name != "orbit":
         labelled.to_netcdf(tmp_path / "saved.nc")
-        with hybrid.open(tmp_path / "saved.nc") as other:
+        with hybrid.open_store(tmp_path / "saved.nc") as other:
             for variable in labelled.data_vars:
                 np.testing.assert_array_equal(other[variable].values, labelled[variable].values)
 

@@ -154,9 +154,27 @@ class TestRecordsThatFillTheMemory:
         np.testing.assert_allclose(arc.x[:, 0], np.sin([1.0, end]), rtol=0, atol=1e-8)
 
     def test_jumps_count_too(self, small):
-        arc = hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing", samples=[1e6])
+        arc = hybrid.simulate(
+            self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing", samples=[1e6], keep_jumps=True
+        )
         assert arc.status.code == hybrid.StatusCode.OUT_OF_MEMORY
         assert len(arc.jumps) == int(arc.jumps[-1].t / (2 * np.pi) + 0.5)
+
+    def test_without_its_jumps_a_run_of_samples_keeps_nothing_that_grows(self, small):
+        end = 2e5
+        arc = hybrid.simulate(
+            self.SYSTEM, (0.0, 1.0), (0.0, end), mode="swing", samples=[1.0, end], max_jumps=10**6
+        )
+        assert arc.status.ok
+        assert arc.jump_count == int(end / (2 * np.pi))
+        assert not arc.keeps_jumps
+        assert repr(arc) == f"<HybridArc t = 1 to 200000, {arc.jump_count} jumps, SUCCESS>"
+        with pytest.raises(hybrid.ArgumentError, match=r"did not keep its jumps.*keep_jumps=True"):
+            len(arc.jumps)
+
+    def test_the_jumps_of_a_whole_arc_belong_to_its_points(self):
+        with pytest.raises(hybrid.ArgumentError, match="keep_jumps=False needs samples="):
+            hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, 1.0), mode="swing", keep_jumps=False)
 
     def test_the_room_is_a_third_of_the_memory(self, monkeypatch):
         pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 3000}

@@ -65,7 +65,7 @@ def test_charts_travel_with_their_models(pool, continue_from, tmp_path):
     pytest.importorskip("zarr")
     stored = make(executor=pool, store=tmp_path / "s")
     assert same(stored, make())
-    assert same(stored, hybrid.open(tmp_path / "s"))
+    assert same(stored, hybrid.open_store(tmp_path / "s"))
 
 
 def test_workers_write_into_a_store_that_they_see(pool, tmp_path, monkeypatch):
@@ -76,7 +76,7 @@ def test_workers_write_into_a_store_that_they_see(pool, tmp_path, monkeypatch):
     whole = sweep(np_sin, over, store=tmp_path / "s", executor=pool)
     assert not writers
     assert same(whole, sweep(np_sin, over))
-    assert same(whole, hybrid.open(tmp_path / "s"))
+    assert same(whole, hybrid.open_store(tmp_path / "s"))
     # A worker on a machine where the folder is another one sends its results back.
     monkeypatch.setattr(Store, "seal", lambda self: "of another store")
     sweep(np_sin, {"a": np.arange(40.0)}, store=tmp_path / "s", executor=pool)
@@ -136,4 +136,4 @@ def test_a_worker_that_dies_has_its_chunks_done_by_others(client, tmp_path):
     assert (swept.status == StatusCode.SUCCESS).all()
     np.testing.assert_array_equal(swept.y, np.sin(over["a"]))
     assert len(set(swept.by.values)) >= 2
-    assert same(swept, hybrid.open(tmp_path / "s"))
+    assert same(swept, hybrid.open_store(tmp_path / "s"))

@@ -83,12 +83,12 @@ def same(one, other):
 def test_what_was_saved_comes_back(tmp_path):
     path = tmp_path / "run.zarr"
     swept = sweep(task, GRID, store=path)
-    assert swept.identical(hybrid.open(path).load())
+    assert swept.identical(hybrid.open_store(path).load())
     assert same(swept, sweep(task, GRID))
     with xarray.open_zarr(path) as plain:
         np.testing.assert_array_equal(plain.y, swept.y)
     swept.to_netcdf(tmp_path / "run.nc")
-    with hybrid.open(tmp_path / "run.nc") as other:
+    with hybrid.open_store(tmp_path / "run.nc") as other:
         np.testing.assert_array_equal(other.y, swept.y)
 
 
@@ -99,7 +99,7 @@ def test_what_another_attempt_has_left_is_no_obstacle(tmp_path):
     (path / ".new-folder").mkdir()
     (path / ".new-file").touch()
     store._lay_out(swept, path)
-    assert same(swept, hybrid.open(path).load())
+    assert same(swept, hybrid.open_store(path).load())
     assert [each.name for each in path.glob(".new-*")] == [".new-file"]
 
 
@@ -114,9 +114,9 @@ def test_more_points_and_a_finer_grid_use_what_is_there(tmp_path):
     sweep(task, GRID, store=tmp_path / "s")
     CALLS.made = []
     finer = {"a": [1.0, 1.5, 2.0, 3.0, 4.0], "b": [0.2, 0.1]}
-    assert same(sweep(task, finer, store=tmp_path / "s"), hybrid.open(tmp_path / "s").load())
+    assert same(sweep(task, finer, store=tmp_path / "s"), hybrid.open_store(tmp_path / "s").load())
     assert {a for a, _ in CALLS} == {1.5, 4.0}
-    swept = hybrid.open(tmp_path / "s").load()
+    swept = hybrid.open_store(tmp_path / "s").load()
     CALLS.made = []
     assert same(swept, sweep(task, finer))
     CALLS.made = []
@@ -129,7 +129,7 @@ def test_what_is_asked_last_is_laid_out_though_nothing_is_computed(tmp_path):
     sweep(task, GRID, store=tmp_path / "s")
     CALLS.made = []
     fewer = sweep(task, {"a": [2.0, 1.0], "b": [0.2]}, store=tmp_path / "s")
-    assert same(fewer, hybrid.open(tmp_path / "s").load())
+    assert same(fewer, hybrid.open_store(tmp_path / "s").load())
     written = (tmp_path / "s" / store.GROUP).stat().st_mtime_ns
     sweep(task, {"a": [2.0, 1.0], "b": [0.2]}, store=tmp_path / "s")
     assert (tmp_path / "s" / store.GROUP).stat().st_mtime_ns == written
@@ -162,13 +162,13 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
     with pytest.raises(ArgumentError, match="is not empty, and is not the store of a sweep"):
         sweep(task, GRID, store=tmp_path)
     with pytest.raises(ArgumentError, match="path must be the store of a sweep or a file"):
-        hybrid.open(tmp_path)
+        hybrid.open_store(tmp_path)
     with pytest.raises(ArgumentError, match="store must be the path of a folder; got 3"):
         sweep(task, GRID, store=3)
 
 
 def test_an_empty_folder_becomes_a_store(tmp_path):
-    assert same(sweep(task, GRID, store=tmp_path), hybrid.open(tmp_path).load())
+    assert same(sweep(task, GRID, store=tmp_path), hybrid.open_store(tmp_path).load())
 
 
 def test_an_interrupted_sweep_goes_on(tmp_path, monkeypatch):
@@ -187,7 +187,7 @@ def test_an_interrupted_sweep_goes_on(tmp_path, monkeypatch):
     finally:
         signal.signal(signal.SIGINT, before)
     assert (part.status == StatusCode.NOT_RUN).sum() == 6
-    assert same(part, hybrid.open(tmp_path / "s").load())
+    assert same(part, hybrid.open_store(tmp_path / "s").load())
     CALLS.made = []
     whole = sweep(slow, over, store=tmp_path / "s", executor=1)
     assert len(CALLS) == 6
@@ -218,21 +218,21 @@ def test_killed_at_any_instant(tmp_path):
         child.kill()
         child.communicate()
         try:
-            counts.append(int((hybrid.open(tmp_path / "s").status != StatusCode.NOT_RUN).sum()))
+            counts.append(int((hybrid.open_store(tmp_path / "s").status != StatusCode.NOT_RUN).sum()))
         except ArgumentError:  # killed before the store was made
             counts.append(0)
     assert counts == sorted(counts)
     assert counts[-1] > 0
     child = run_program(tmp_path / "s")
     assert child.communicate(timeout=60)[0].split() == ["ready", "200"]
-    assert same(hybrid.open(tmp_path / "s").load(), alone())
+    assert same(hybrid.open_store(tmp_path / "s").load(), alone())
 
 
 def test_two_processes_on_one_store(tmp_path):
     children = [run_program(tmp_path / "s") for _ in range(2)]
     for child in children:
         assert child.communicate(timeout=60)[0].split() == ["ready", "200"]
-    assert same(hybrid.open(tmp_path / "s").load(), alone())
+    assert same(hybrid.open_store(tmp_path / "s").load(), alone())
 
 
 def test_a_full_disk_is_said_and_loses_nothing(tmp_path, monkeypatch):
@@ -248,7 +248,7 @@ def test_a_full_disk_is_said_and_loses_nothing(tmp_path, monkeypatch):
     with pytest.raises(HybridError, match=r"cannot be written: .*No space left on device.*call again"):
         sweep(task, GRID, store=tmp_path / "s", executor=1)
     monkeypatch.undo()
-    done = int((hybrid.open(tmp_path / "s").status != StatusCode.NOT_RUN).sum())
+    done = int((hybrid.open_store(tmp_path / "s").status != StatusCode.NOT_RUN).sum())
     assert 0 < done < 6
     CALLS.made = []
     whole = sweep(task, GRID, store=tmp_path / "s")
@@ -334,7 +334,7 @@ def test_readers_and_writers_at_once(tmp_path):
     def look():
         while not stop.is_set():
             if (tmp_path / "s" / store.INSIDE / store.LATEST).exists():
-                found = hybrid.open(tmp_path / "s").load()
+                found = hybrid.open_store(tmp_path / "s").load()
                 done = (found.status == StatusCode.SUCCESS).values
                 if not done.any():
                     continue
@@ -408,7 +408,7 @@ def test_whatever_file_is_damaged_the_results_are_right_or_said_to_be_lost(tmp_p
         (path / name).unlink()
         if how != "gone":
             (path / name).write_bytes(damaged(content, how))
-        for call in (lambda: hybrid.open(path), lambda: sweep(task, grid, store=path, executor=1)):
+        for call in (lambda: hybrid.open_store(path), lambda: sweep(task, grid, store=path, executor=1)):
             try:
                 found = call()
             except HybridError:
@@ -430,7 +430,7 @@ def test_parts_without_what_made_them_are_not_taken(tmp_path):
 def test_a_copy_of_the_zarr_group_alone_is_read_or_said_to_be_damaged(tmp_path):
     wanted = sweep(task, GRID, store=tmp_path / "s", executor=1)
     shutil.rmtree(tmp_path / "s" / store.INSIDE)
-    assert (hybrid.open(tmp_path / "s").y == wanted.y)[:2].all()
+    assert (hybrid.open_store(tmp_path / "s").y == wanted.y)[:2].all()
     next(each for each in (tmp_path / "s/y/c").rglob("0") if each.is_file()).write_bytes(b"nothing")
     with pytest.raises(HybridError, match=r"the zarr group .* is damaged"):
-        hybrid.open(tmp_path / "s")
+        hybrid.open_store(tmp_path / "s")

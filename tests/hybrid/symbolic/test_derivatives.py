@@ -93,7 +93,7 @@ def test_matrices_of_zeros():
         ],
     )
     compiled, x = compile_system(system), np.linspace(0.5, 1.5, n)
-    field = compiled.derivative(field_function(system.modes[0], system.dimension), 0, 0.3, x, np.zeros(0))
+    field = compiled.derivative(field_function(system.modes[0], system.state), 0, 0.3, x, np.zeros(0))
     expected = -np.eye(n, n + 1)
     for i in range(0, n, 5):
         expected[i] = 0.0
@@ -101,9 +101,7 @@ def test_matrices_of_zeros():
         expected[i, 0] += x[i]
         expected[i, n] = -1.0
     np.testing.assert_allclose(field, expected, atol=1e-15)
-    reset = compiled.derivative(
-        reset_function(system.transitions[0], system.dimension), 0, 0.3, x, np.zeros(0)
-    )
+    reset = compiled.derivative(reset_function(system.transitions[0], system.state), 0, 0.3, x, np.zeros(0))
     np.testing.assert_array_equal(reset, np.diag([0.5] + [1.0] * (n - 1) + [0.0])[:n])
 
 

@@ -220,8 +220,8 @@ def test_a_system_is_shown_as_a_table():
     assert text.splitlines()[0] == "HybridSystem vibro-impact"
     assert "state: x1, x2, v1, v2" in text
     assert "P = 500" in text
-    assert "modes: free, contact" in text
-    assert "period: a function of the parameters" in text
+    assert "modes: 'free', 'contact'" in text
+    assert ", a function of the parameters" in text
     assert [line.split() for line in text.splitlines()[-2:]] == [
         ["impact", "free", "contact", "rises"],
         ["release", "contact", "free", "falls"],

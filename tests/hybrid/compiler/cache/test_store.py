@@ -29,5 +29,5 @@ def test_what_was_traced_is_read_back(system, monkeypatch, tmp_path):
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b'{"programs": 1}'])
 def test_what_does_not_describe_a_model_is_traced_again(content, monkeypatch, tmp_path):
     monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path))
-    keep(store._path("operations"), content)
+    keep(store.models_folder() / store._file("operations"), content)
     assert store.read("operations") is None

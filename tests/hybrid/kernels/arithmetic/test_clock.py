@@ -79,7 +79,9 @@ def test_a_shift_of_time_changes_nothing(system, x0, span, solver, shift):
 
 
 def test_spikes_go_on_as_they_began():
-    arc = hybrid.simulate(NEURON, (-70.6, 0.0), (0.0, 2e5), parameters={"b": 0.0}, samples=[2e5])
+    arc = hybrid.simulate(
+        NEURON, (-70.6, 0.0), (0.0, 2e5), parameters={"b": 0.0}, samples=[2e5], keep_jumps=True
+    )
     assert arc.status.ok
     intervals = np.diff(arc.jumps.t)
     assert len(intervals) > 10_000

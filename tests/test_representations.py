@@ -1,0 +1,62 @@
+"""What results show of themselves, in a terminal and in a notebook."""
+
+import re
+
+import pytest
+
+import hybrid
+import lyapunov
+import models
+
+BALL = models.bouncing_ball()
+
+
+def test_one_jump_is_singular():
+    one, two = (hybrid.simulate(BALL, (1.0, 0.0), (0.0, end)) for end in (0.5, 1.2))
+    assert (repr(one), repr(one.jumps)) == ("<HybridArc t = 0 to 0.5, 1 jump, SUCCESS>", "<1 jump>")
+    assert repr(two.jumps) == "<2 jumps>"
+
+
+def test_an_orbit_shows_its_transitions_and_the_sign_of_its_multiplier():
+    orbit = hybrid.periodic_orbit(
+        models.simplest_walker(), (0.2003, 0.4006, -0.1998, -0.0158), mode="behind", period=3.88
+    )
+    assert sorted(orbit.transitions) == ["heelstrike", "passing"]
+    shown = "<PeriodicOrbit period 3.88246375 from 'behind' through 'heelstrike', 'passing', largest "
+    assert repr(orbit).startswith(f"{shown}multiplier 1,")
+    pair = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    assert re.search(r"through 'impact', largest multiplier -0\.584295 \+- 0\.0056\d*i,", repr(pair))
+    flipped = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0), parameters={"r": 0.3})
+    assert "largest multiplier -" in repr(flipped)
+
+
+def test_a_system_shows_a_number_for_its_period():
+    text = repr(models.impact_oscillator())
+    assert "modes: 'flight'" in text
+    assert "period: 6.28319, a function of the parameters" in text
+
+
+def test_a_spectrum_without_intervals_says_why_and_what_to_do():
+    spectrum = lyapunov.lyapunov_spectrum(BALL, (1.0, 0.0), intervals=20)
+    assert spectrum.intervals == 0
+    assert "without a complete interval, ACCUMULATION" in repr(spectrum)
+    assert "accumulates_to=" in repr(spectrum)
+
+
+@pytest.mark.parametrize(
+    ("result", "texts"),
+    [
+        (lambda: hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.2)), ["2 jumps, SUCCESS", "<td>flight</td>"]),
+        (lambda: hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.2)).jumps, ["<td>bounce</td>", "<th>kind</th>"]),
+        (lambda: hybrid.simulate(BALL, (1.0, 0.0), (0.0, 4.06)).jumps, ["more</p>"]),
+        (
+            lambda: lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=5),
+            ["<td>sum rule</td>", "5 intervals of 6.28319. SUCCESS"],
+        ),
+    ],
+)
+def test_a_notebook_gets_a_table(result, texts):
+    html = result()._repr_html_()
+    assert html.count("<table>") == html.count("</table>") == 1
+    for text in texts:
+        assert text in html
