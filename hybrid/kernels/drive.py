@@ -94,11 +94,10 @@ def enter(parts, task):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)
     if fires == RESTING or (fires == NO_TRANSITION and parts.rests_on_guard(task)):
-        limit_mode = model.accumulates_to[run.last_fired]
-        if limit_mode == NO_MODE:
+        if model.accumulates_to[run.last_fired] == NO_MODE:
             run.at_rest = 1
             return ACCUMULATION
-        parts.rest(task, limit_mode)
+        parts.rest(task)
         return GO_ON
     if fires != NO_TRANSITION:
         run.pending = fires

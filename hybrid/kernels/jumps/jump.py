@@ -16,6 +16,7 @@ from hybrid.kernels.events.guards import (
     guard_acceleration,
     guard_speed,
 )
+from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.jumps.chatter import (
     chatter_matrix,
@@ -314,11 +315,19 @@ def change_mode_of_instant(model, run, target, work):
     follow(run, n, work)
 
 
-@exported(None, Task, INTEGER)
-def rest(task, limit_mode):
+@njit(**KERNEL)
+def go_onward(run, onward):
+    """Fire the transition that takes the state out of the mode of a limit at once, if there is one."""
+    if onward != NO_TRANSITION:
+        run.pending, run.locked = onward, 1
+
+
+@exported(None, Task)
+def rest(task):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     _, model, _, run, _, work = task_of(task)
     n, transition, tangents = model.dimension, run.last_fired, task.tangents
+    limit_mode, onward = mode_of_limit(model, run, transition, run.phase, run.y, work)
     recall_map(model, run, tangents, work)
     change_mode_of_instant(model, run, limit_mode, work)
     chatter_matrix(model, run, transition, work)
@@ -333,3 +342,4 @@ def rest(task, limit_mode):
             run.ill_conditioned_growth += grown
     run.previous_mode = run.mode
     run.mode = limit_mode
+    go_onward(run, onward)

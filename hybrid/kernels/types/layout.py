@@ -423,7 +423,7 @@ class Parts(Structure):
     jump: function(None, Task, INTEGER)
     finish_chatter: function(TRUTH, Task, INTEGER, REAL)
     complete: INTEGER
-    rest: function(None, Task, INTEGER)
+    rest: function(None, Task)
     first_in_order: function(INTEGER, Task, INTEGER)
 
 
