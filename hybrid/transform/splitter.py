@@ -468,7 +468,7 @@ class Splitter:
         return None if side is None else side * orientation
 
     def _limit(self, cell: Cell, transition: Transition) -> Cell | None:
-        """A cell for the limit of chatter, on the sides of the cell: a run goes on from it where it would start."""
+        """A cell for the limit of chatter, on the sides of the cell; its starts lead on from there."""
         if transition.accumulates_to is None:
             return None
         return self._landings(cell, transition.accumulates_to, [*self.symbols.x])[0].cell

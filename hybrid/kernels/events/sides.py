@@ -318,8 +318,8 @@ def mode_of_limit(model, run, transition, t, x, work):
     """The mode in which a run goes on from the limit ``x (n,)`` of a chatter, and a transition still to fire.
 
     The mode that the ``transition`` names may have several parts. A run goes on in the part in which it would
-    start: transitions at the start that keep the state lead there. One that ends the run, or that has a reset,
-    is left to be fired.
+    start: transitions at the start that keep the state lead there. One that ends the run, or has a reset, is
+    left to be fired.
     """
     mode = model.accumulates_to[transition]
     if mode == NO_MODE:

@@ -19,6 +19,8 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.jumps.chatter import (
+    BEFORE,
+    STEADY,
     chatter_matrix,
     remember_impulse,
 )
@@ -44,7 +46,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL, VECTOR
 from hybrid.kernels.types.layout import Model, Task, Work
-from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
 
@@ -150,6 +152,16 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
     run.indistinct += orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True, annihilated)
     run.strain = 0.0
     return run.growth[0] - before
+
+
+@njit(**INLINE)
+def ends_own_flight(model, run, transition, transversality):
+    """Whether an impact ends the flight that the last one began, about as fast: a low bounce is no grazing.
+
+    All orbits nearby hit the guard too, because the pull leads them back to it.
+    """
+    bounces = run.chattering > 0 and run.chatter_jumps == run.jumps and run.last_fired == transition
+    return bounces and abs(transversality) >= STEADY * run.trail[BEFORE, model.dimension]
 
 
 @njit(**KERNEL)
@@ -276,6 +288,7 @@ def jump(task, transition):
     else:
         transversality = cross_without_map(model, run, transition, mode, work)
     judged = asked and not locked and model.marker[transition] == 0
+    judged = judged and not ends_own_flight(model, run, transition, transversality)
     if judged and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING
     if kind == GRAZING:
