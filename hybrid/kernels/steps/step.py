@@ -219,7 +219,7 @@ def no_attempt(model, method, mode, t, h, y, tangents, work):
 
 @njit(**KERNEL)
 def moves_nothing(model, run, slopes, h):
-    """Whether a step along ``slopes (n,)`` moves neither the state nor the time of the field by their rounding.
+    """Whether a step along ``slopes (n,)`` moves neither the state nor the time by their rounding.
 
     Terms near overflow make steps so short, and places where the field is not defined.
     """

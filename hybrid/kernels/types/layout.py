@@ -250,7 +250,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       transition ``ran_dry`` there; 0 if the tolerances cover it.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
-    - ``stretch (n,)``: the state after ``stretch_steps`` steps, where the time ``stretch_left`` was left; from
+    - ``stretch (n,)``: the state after ``stretch_steps`` steps, with the time ``stretch_left`` left. From
       there the run has to get on. ``stretch_moved`` is 1 if the state has moved since.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
       vectors.

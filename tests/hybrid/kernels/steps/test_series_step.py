@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.steps import series as module
-from hybrid.kernels.steps.series import CRAWL, MOST_CRAWLING, MOST_SHORTER, SHORTER
+from hybrid.kernels.steps.series import MOST_SHORTER, SHORTER
 from hybrid.kernels.steps.series_length import EXACT_TOLERANCE, MOST_BITS
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
@@ -119,7 +119,7 @@ class TestStep:
         method = SimpleNamespace(order=order, rtol=1e-5, atol=1e-6, max_step=others.pop("max_step", math.inf))
         self.run = SimpleNamespace(
             **{"mode": MODE, "phase": T, "y": np.arange(6.0), "stage": STALE, "steps": 10, "pending": 7}
-            | {"grazing_place": 2.0, "crawling": 0, "since_entry": 5.0}
+            | {"grazing_place": 2.0, "since_entry": 5.0}
             | others
         )
         attempts = SimpleNamespace(
@@ -318,21 +318,3 @@ class TestStep:
                 near, kind=DESINGULARISED, phase=phase, earliest_on_series=event, reach_guard=0.0
             )
             assert found == (GO_ON, 0.328125)
-
-    def test_steps_that_crawl(self):
-        """The step takes 0.5; one that does not leave the start of a stay has so many tries."""
-        for since, code, count in (
-            (0.499 / CRAWL, GO_ON, 0),
-            (0.501 / CRAWL, STEP_TOO_SMALL, MOST_CRAWLING + 1),
-        ):
-            found = self.step(kind=DESINGULARISED, since_entry=since, crawling=MOST_CRAWLING)
-            assert found == (code, 0.5 if code == GO_ON else 0.0)
-            assert self.run.crawling == count
-        crawling = {"kind": DESINGULARISED, "since_entry": 0.501 / CRAWL}
-        assert self.step(**crawling, crawling=MOST_CRAWLING - 1) == (GO_ON, 0.5)
-        event = (1.0, 2, 1.0, NO_TRANSITION)
-        assert self.step(**crawling, crawling=MOST_CRAWLING, earliest_on_series=event)[0] == GO_ON
-        assert self.run.crawling == 0
-        assert self.step(0.3, **crawling, crawling=MOST_CRAWLING) == (GO_ON, 0.3)
-        assert self.step(since_entry=0.501 / CRAWL, crawling=MOST_CRAWLING) == (GO_ON, 0.5)
-        assert self.run.crawling == MOST_CRAWLING
