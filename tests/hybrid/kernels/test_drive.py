@@ -258,7 +258,7 @@ class TestEnter:
         parts = SimpleNamespace(
             enter=lambda *given: fires,
             rests_on_guard=lambda task: rests,
-            rest=lambda task, mode: rested.append(mode),
+            rest=lambda task: rested.append(True),
         )
         task = task_of(stage=ENTERING, calm_mode=1, at_rest=0, **values)
         code = kernels.enter(parts, task)
@@ -276,7 +276,7 @@ class TestEnter:
     def test_a_state_at_rest_goes_to_the_limit_or_ends(self):
         for fires, rests in ((RESTING, False), (NO_TRANSITION, True)):
             assert self.entered(fires, rests=rests)[0] == codes.ACCUMULATION
-            assert self.entered(fires, rests=rests, last_fired=1)[::6] == (GO_ON, [1])
+            assert self.entered(fires, rests=rests, last_fired=1)[::6] == (GO_ON, [True])
         assert self.entered(0, rests=True)[2] == 0
 
     def test_what_is_not_finite_ends_the_run(self):

@@ -214,6 +214,7 @@ class TestJump:
         model.target, model.marker = np.array([9, 2]), np.array([9, marker])
         run = SimpleNamespace(mode=0, phase=T, y="y", locked=locked, last_kind=GRAZING, due=[5, 5])
         run.ill_conditioned, run.ill_conditioned_growth, run.steep_jumps = 3, 1.0, 5
+        run.chattering = 0
         task = SimpleNamespace(tangents=tangents, orthonormal=orthonormal)
         record, work = SimpleNamespace(jump_phase=np.zeros(room)), SimpleNamespace(new="new", saltation="xi")
         tested = plain(

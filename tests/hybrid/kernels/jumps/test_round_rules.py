@@ -332,19 +332,6 @@ class TestEndless:
 
 
 class TestAgreement:
-    @pytest.mark.parametrize("component", [0, 1])
-    @pytest.mark.parametrize("way", [1.0, -1.0])
-    def test_estimates_agree_up_to_the_tolerances(self, component, way):
-        model, run = run_of([1.0])
-        method, sizes = SimpleNamespace(atol=0.5, rtol=0.25), np.array([2.0, 2.0])
-        one, other = np.array([3.0, 4.0]), np.array([3.0, 4.0])
-        for apart, expected in ((0.99, True), (1.01, False), (np.nan, False)):
-            other[component] = one[component] + way * apart
-            assert bool(kernels.agree(model, method, run, one, other, sizes)) == expected
-            run.trail[ENDLESS, component] = 1.0
-            assert kernels.agree(model, method, run, one, other, sizes)
-            run.trail[ENDLESS, component] = 0.0
-
     def limit(
         self,
         *,
