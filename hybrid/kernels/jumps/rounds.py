@@ -211,10 +211,10 @@ def hold_endless(model, run, turn, t, left, work):
 
 
 @njit(**KERNEL)
-def agree(model, method, run, one, other, share, sizes):
-    """Whether two estimates of the limit agree up to a share of their sizes, but for what moves for ever."""
+def agree(model, method, run, one, other, sizes, slack):
+    """Whether two estimates of the limit agree up to tolerances and ``slack (n,)``, but for endless moves."""
     for i in range(model.dimension):
-        apart = not abs(one[i] - other[i]) <= method.atol + share * sizes[i]
+        apart = not abs(one[i] - other[i]) <= method.atol + method.rtol * sizes[i] + slack[i]
         if apart and run.trail[ENDLESS, i] == 0.0:
             return False
     return True
@@ -274,6 +274,23 @@ def rounding_of_flights(model, run, work):
 
 
 @njit(**KERNEL)
+def hidden_by_rounding(model, run, turn, ratio, hidden, slack, work):
+    """What the limit may be off by, where rounding hides the time ``hidden`` of it, into ``slack (n,)``.
+
+    A component whose changes shrink as the rounds do, by their ``ratio``, has next to nothing left to change.
+    ``work.field`` is current. The sizes in ``work.trial`` grow with the slack.
+    """
+    jumps, visits = run.jumps, run.visits
+    last, before = visits[slot_of(run, jumps)], visits[slot_of(run, jumps - turn)]
+    earlier = visits[slot_of(run, jumps - 2 * turn)]
+    for i in range(model.dimension):
+        change = abs(last[i] - before[i])
+        shrinks = change <= 0.5 * (1.0 + ratio) * abs(before[i] - earlier[i])
+        slack[i] = max(MOVES_ON * change if shrinks else 0.0, hidden * abs(work.field[i]))
+        work.trial[i] = max(work.trial[i], slack[i] / ROUGH)
+
+
+@njit(**KERNEL)
 def limit_of_rounds(model, method, run, work):
     """Time to the limit of the jumps that fire in turn, and their number; zero if there is no limit yet.
 
@@ -291,30 +308,32 @@ def limit_of_rounds(model, method, run, work):
     seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
     lasted = time_before(model, run, 0, seen) + left
     size_of_visits(model, method, run, seen, work.trial, work)
-    latest, end, share = time_before(model, run, 0, turn), run.phase + left, method.rtol
+    latest, end, slack = time_before(model, run, 0, turn), run.phase + left, work.rounding[1]
     misfit, nearly = abs(left + latest - earlier), left <= NOTHING_LEFT * lasted
     agreed = misfit <= method.rtol * lasted
     hidden = rounding_of_flights(model, run, work) / (1.0 - ratio) ** 2
-    if not agreed and max(misfit, ROUGH * latest) <= hidden:
-        agreed, share = True, ROUGH
-        last, before = run.visits[slot_of(run, run.jumps)], run.visits[slot_of(run, run.jumps - turn)]
-        for i in range(model.dimension):
-            work.trial[i] = max(work.trial[i], MOVES_ON * abs(last[i] - before[i]) / ROUGH)
-    if not (agreed or nearly):
+    drowned = not agreed and max(misfit, ROUGH * latest) <= hidden
+    if not (agreed or nearly or drowned):
         return 0.0, 0
+    for i in range(model.dimension):
+        slack[i] = 0.0
+    if drowned:
+        hidden_by_rounding(model, run, turn, ratio, hidden, slack, work)
     resolved = latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase)
     if resolved:
         extrapolate(model, run, turn, 0, left, work.settled)
         hold_endless(model, run, turn, end, left, work)
         extrapolate(model, run, turn, turn, earlier, work.error)
-        agreed = agreed and agree(model, method, run, work.settled, work.error, share, work.trial)
+        agreed = (agreed or drowned) and agree(
+            model, method, run, work.settled, work.error, work.trial, slack
+        )
         if (agreed or nearly) and is_limit(model, run, turn, end, work):
             return left, turn
-    if nearly or not resolved:
+    if nearly or (drowned and not resolved):
         extrapolate_by_rounds(model, run, turn, 0, work.settled)
         hold_endless(model, run, turn, end, left, work)
         extrapolate_by_rounds(model, run, turn, turn, work.error)
-        agreed = agree(model, method, run, work.settled, work.error, share, work.trial)
+        agreed = agree(model, method, run, work.settled, work.error, work.trial, slack)
         if agreed and is_limit(model, run, turn, end, work):
             return left, turn
     return 0.0, 0

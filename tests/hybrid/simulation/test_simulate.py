@@ -406,7 +406,6 @@ class TestBadArguments:
             ({"samples": [0.2, math.nan]}, r"samples must be finite; got samples\[1\] = nan"),
             ({"samples": [-1.0, 0.5]}, r"samples must lie in t_span, \[0.0, 1.0\]; got times from -1.0"),
             ({"max_jumps": -1}, "max_jumps must be a whole number of at least 0; got -1"),
-            ({"x0": (-1.0, 0.0)}, "is allowed in no mode: mode 'flight' is left through 'bounce'"),
         ],
     )
     def test_text(self, ball, arguments, text):

@@ -19,7 +19,6 @@ from hybrid.kernels.types.codes import (
     READY,
     ROOTED,
     STALE,
-    STEP_TOO_SMALL,
     TAYLOR,
 )
 from hybrid.kernels.types.layout import EPSILON
@@ -210,13 +209,6 @@ class TestStep:
         assert self.step(fragile=1, kind=DESINGULARISED, moves_nothing=True) == (GO_ON, 0.5)
         with np.errstate(over="ignore", invalid="ignore"):
             assert self.step(factor=math.inf) == (NON_FINITE, 0.0)
-        # Shorter than four roundings of time.
-        late = 0.5 / (4.0 * EPSILON)
-        assert self.step(phase=1.01 * late) == (STEP_TOO_SMALL, 0.0)
-        assert self.step(phase=-1.01 * late) == (STEP_TOO_SMALL, 0.0)
-        assert self.step(phase=0.99 * late) == (GO_ON, 0.5)
-        assert self.step(0.5, phase=1.01 * late) == (GO_ON, 0.5)
-        assert self.step(phase=1.01 * late, earliest_on_series=(0.5, 2, 1.0, NO_TRANSITION)) == (GO_ON, 0.25)
 
     def test_what_limits_a_step(self):
         assert self.step(0.25) == (GO_ON, 0.25)
