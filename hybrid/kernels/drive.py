@@ -19,6 +19,7 @@ from hybrid.kernels.types.codes import (
     ENTERING,
     GO_ON,
     INCOMPLETE,
+    MANY_STEPS,
     MAX_JUMPS,
     MAX_STEPS,
     NO_MODE,
@@ -39,10 +40,10 @@ from hybrid.kernels.types.options import KERNEL, exported
 # More jumps than this at one instant, in total or per transition, count as endless.
 MOST_JUMPS_AT_ONCE = 1000
 MOST_JUMPS_EACH = 100
-# So many steps in a row that are no longer than this share of what remains lead nowhere: beside a place where
-# the field is not defined, the state may be too close to that place to move by more than its rounding.
-CREEP = 1e-12
-MOST_CREEPING = 100_000
+# By these shares time or state must have moved after many steps: of the time left, and of the size of a
+# component. A run whose state is at rest, and that needs more than 10^7 such steps, does not get on.
+OF_TIME = 1e-3
+OF_STATE = 1e-4
 # A landing may be this many times as far from its guard as the rounding of the state.
 MOST_ROUNDING = 64.0
 
@@ -94,11 +95,10 @@ def enter(parts, task):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)
     if fires == RESTING or (fires == NO_TRANSITION and parts.rests_on_guard(task)):
-        limit_mode = model.accumulates_to[run.last_fired]
-        if limit_mode == NO_MODE:
+        if model.accumulates_to[run.last_fired] == NO_MODE:
             run.at_rest = 1
             return ACCUMULATION
-        parts.rest(task, limit_mode)
+        parts.rest(task)
         return GO_ON
     if fires != NO_TRANSITION:
         run.pending = fires
@@ -109,6 +109,35 @@ def enter(parts, task):
     run.last_step = 0.0
     run.stage = STALE
     return GO_ON
+
+
+@njit(**KERNEL)
+def begin_stretch(model, run, remaining):
+    """Remember where a run is: from here it has to get on."""
+    run.stretch_steps, run.stretch_moved, run.stretch_left = run.steps, 0, remaining
+    for i in range(model.dimension):
+        run.stretch[i] = run.y[i]
+
+
+@njit(**KERNEL)
+def gets_on(model, method, run, remaining):
+    """Whether a run gets on: many steps have moved its time or its state.
+
+    Beside a place where the field jumps or ends, steps may be as short as the tolerances, and the state stays
+    within them. Short steps that lead somewhere get on, and so does any run that makes jumps.
+    """
+    for i in range(model.dimension if run.stretch_moved == 0 else 0):
+        y, start = run.y[i], run.stretch[i]
+        if abs(y - start) > OF_STATE * max(abs(y), abs(start)) + MANY_STEPS * method.atol:
+            run.stretch_moved = 1
+            break
+    if run.steps - run.stretch_steps < MANY_STEPS:
+        return True
+    ahead = not (1.0 - OF_TIME) * run.stretch_left < remaining <= run.stretch_left
+    if not (ahead or run.stretch_moved == 1):
+        return False
+    begin_stretch(model, run, remaining)
+    return True
 
 
 @njit(**KERNEL)
@@ -220,9 +249,9 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         code, span = step(parts, task, remaining)
         if code != GO_ON:
             return int(code)
-        creeps = run.pending == NO_TRANSITION and span <= CREEP * remaining
-        run.creeping = run.creeping + 1 if creeps else 0
-        if run.creeping > MOST_CREEPING:
+        if run.pending != NO_TRANSITION:
+            begin_stretch(model, run, remaining)
+        elif not gets_on(model, task.method, run, remaining):
             return STEP_TOO_SMALL
         forward(run, model.period, span)
         run.since_entry += span

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import attrs
+import numpy as np
 
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.notes import MOST_LATENESS, is_plain
@@ -28,6 +29,11 @@ LOWER = (
     "Lower atol, or write the exponents as 1/2, 1/3, 2/3 or 3/4: with Taylor, such powers have a series "
     "without this error."
 )
+
+# A state above this size grows beyond all numbers.
+HUGE = 1e100
+# A state that doubles within this share of the time grows without bound, if it does not slow down.
+SOON = 1e-6
 
 
 def status_of(trajectory: Trajectory, code: int) -> Status:
@@ -225,8 +231,59 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code == codes.ACCUMULATION and not run.at_rest:
         return chatter_status(where, [names[i] for i in _recent(trajectory, run.round)])
     last = run.last_fired
+    if code in (codes.STEP_TOO_SMALL, codes.NON_FINITE):
+        failed = _failed(trajectory, code)
+        if failed is not None:
+            return failed
     bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
     return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
+
+
+def _failed(trajectory: Trajectory, code: int) -> Status | None:
+    """Status of a run whose steps led nowhere, if the field tells why; else None."""
+    run, where, kind = trajectory.run, _place(trajectory), StatusCode(code)
+    if _grows_without_bound(trajectory):
+        return Status(
+            kind,
+            f"The solution grows without bound {where}.",
+            "Check the model, or end the run before: a transition whose target is None ends it at a guard.",
+        )
+    if code == codes.NON_FINITE:
+        return None
+    emitted, mode = trajectory.compiled.emitted, trajectory.mode
+    names = [*trajectory.system.switching.get(mode, ()), emitted.steep_inside[run.mode]]
+    names = [*dict.fromkeys(name for name in names if name)]
+    stalled = run.stretch_moved == 0 and run.steps - run.stretch_steps >= codes.MANY_STEPS
+    if names:
+        return Status(
+            kind,
+            f"The steps became too short to get on {where}, where its field jumps or has an infinite slope "
+            f"({', '.join(names)}).",
+            "hybrid.split(system), or hybrid.from_equations, makes modes of the pieces of the field.",
+        )
+    if not stalled:
+        return None
+    return Status(
+        kind,
+        f"The last {codes.MANY_STEPS} steps moved neither the time nor the state {where}: the field is stiff "
+        "or not smooth there.",
+        "If the field is smooth, RadauIIA() takes longer steps. If it is not, as a quotient is where its "
+        "denominator vanishes, add a transition to a mode in which the state rests.",
+    )
+
+
+def _grows_without_bound(trajectory: Trajectory) -> bool:
+    """Whether the state grows as fast as ever at any size, or has no number for its size any more."""
+    x = trajectory.x
+    if np.abs(x).max(initial=0.0) > HUGE:
+        return True
+    run = trajectory.run
+    with np.errstate(all="ignore"):
+        here, beyond = trajectory.field(), trajectory.field(2.0 * x)
+        moments = np.abs(x) / np.abs(here)
+        fastest = int(np.argmin(np.where(here * x > 0.0, moments, np.inf)))
+        soon = moments[fastest] <= SOON * max(abs(run.phase), run.longest_step)
+        return bool(soon and here[fastest] * x[fastest] > 0.0 and beyond[fastest] / here[fastest] >= 1.0)
 
 
 def _steep(trajectory: Trajectory, code: int) -> Status | None:

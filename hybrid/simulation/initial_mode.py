@@ -23,7 +23,7 @@ def choose_mode(
 ) -> tuple[int, tuple[str, ...]]:
     """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
 
-    If the mode is named, the transitions whose guards the state lies beyond are returned too.
+    If the mode is named, or the only one, the transitions whose guards the state lies beyond come too.
 
     Raises
     ------
@@ -31,6 +31,9 @@ def choose_mode(
         If the name is unknown, no mode allows the state, or more than one does.
     """
     modes = system.mode_names
+    own = {each.part_of or each.name for each in system.modes}
+    if mode is None and len(own) == 1:
+        [mode] = own
     if mode is not None:
         within = system.parts_of(mode)
         verdicts, _ = _verdicts(system, parts, model, run, work, within)
@@ -45,8 +48,6 @@ def choose_mode(
             return index, tuple(tr.name for tr in beyond)
         return _refused(system, run, verdicts, [modes[i] for i in within])
     verdicts, undefined = _verdicts(system, parts, model, run, work, range(len(modes)))
-    if len(modes) == 1 and codes.BEYOND not in verdicts:
-        return 0, ()
     violated = {transition.source for transition in _against(system, verdicts)}
     if undefined and len(violated) == len(modes):
         # Otherwise it may be a guard of modes to which the state does not belong.

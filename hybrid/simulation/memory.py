@@ -142,6 +142,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "first_step": (modes,),
         "stay": (modes,),
         "scale": (n,),
+        "stretch": (n,),
         "growth": (tangents,),
         "trail": (5, n + 1),
         "before": (n * tangents,),

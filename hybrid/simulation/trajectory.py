@@ -157,10 +157,11 @@ class Trajectory:
         )
         return self.work.jacobian[:, :n].copy()
 
-    def field(self) -> np.ndarray:
-        """``f`` of the current mode at the current point, ``(n,)``."""
+    def field(self, x: np.ndarray | None = None) -> np.ndarray:
+        """``f`` of the current mode at the current time, ``(n,)``, at the current state or at another one."""
         run, out = self.run, np.empty(self.model.dimension)
-        load_kernels("hybrid.kernels.steps.step").field_at(self.model, run.mode, run.phase, run.y, out)
+        state = run.y if x is None else x
+        load_kernels("hybrid.kernels.steps.step").field_at(self.model, run.mode, run.phase, state, out)
         return out
 
     def advance(self, t: float, record: Any, max_jumps: int = UNLIMITED) -> int:

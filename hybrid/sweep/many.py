@@ -256,6 +256,8 @@ class _Runs:
         for time in t_span:
             check_time("t_span", time, self.model.period)
         mode = options["mode"]
+        if mode is None and len(system.modes) == 1:
+            [mode] = system.mode_names
         self.named = codes.NO_MODE if mode is None else system.mode_index(mode)
         places = [split_time(time, self.model.period) for time in (*found.times.tolist(), t_span[1])]
         self.cycles = np.array([cycle for cycle, _ in places], dtype=np.int64)

@@ -474,13 +474,10 @@ class Splitter:
         return None if side is None else side * orientation
 
     def _limit(self, cell: Cell, transition: Transition) -> Cell | None:
-        """The cell for the limit of chatter: on the sides of the cell, above where it has none."""
+        """A cell for the limit of chatter, on the sides of the cell; its starts lead on from there."""
         if transition.accumulates_to is None:
             return None
-        sides = _upper(cell.sides)
-        pieces = self.pieces[self.original.mode_index(transition.accumulates_to)]
-        [choice] = pieces.choices({}, lambda number: sides.get(number, 1))
-        return choice.cell
+        return self._landings(cell, transition.accumulates_to, [*self.symbols.x])[0].cell
 
 
 def _begun(system: HybridSystem) -> Splitter:

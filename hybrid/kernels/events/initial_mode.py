@@ -43,7 +43,7 @@ def verdicts_on(parts, model, run, work, first, stop, verdicts):
             if allowed(model, transition, t, run.y, work.scalar):
                 verdicts[transition] = LEAVES if run.due[transition] == 1 else BEYOND
         if fires >= 0 and verdicts[fires] == NO_OBJECTION:
-            verdicts[fires] = BEYOND
+            verdicts[fires] = LEAVES
     return NO_TRANSITION
 
 

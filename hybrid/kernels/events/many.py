@@ -58,10 +58,7 @@ def mode_of_start(parts, task, named, verdicts):
     for mode in range(modes):
         allowed = True
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-            verdict = verdicts[model.outgoing[slot]]
-            # A single mode may be left at once.
-            if verdict == BEYOND or (verdict != NO_OBJECTION and modes > 1):
-                allowed = False
+            allowed = allowed and verdicts[model.outgoing[slot]] == NO_OBJECTION
         if allowed:
             if chosen != NO_MODE:
                 return NO_MODE

@@ -31,7 +31,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.events.soon import acceleration_soon
-from hybrid.kernels.types.codes import NO_TRANSITION, RESTING
+from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION, RESTING
 from hybrid.kernels.types.options import KERNEL
 
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
@@ -301,15 +301,42 @@ def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work)
 
 
 @njit(**KERNEL)
-def beyond_at_start(model, run, mode, t, work):
-    """A transition that fires only at the start of a run, if the state lies beyond its guard; else none."""
+def beyond_at_start(model, run, mode, t, x, work):
+    """A transition that fires only at the start of a run, if ``x (n,)`` lies beyond its guard; else none."""
     for slot in range(model.first_at_start[mode], model.first_at_start[mode + 1]):
         transition = model.at_start[slot]
-        value = guard_value(model, transition, t, run.y, work.scalar)
-        beyond = value * model.direction[transition] > rounding_band(model, run, transition, t, run.y, work)
-        if beyond and allowed(model, transition, t, run.y, work.scalar):
+        value = guard_value(model, transition, t, x, work.scalar)
+        model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+        beyond = value * model.direction[transition] > rounding_band(model, run, transition, t, x, work)
+        if beyond and allowed(model, transition, t, x, work.scalar):
             return transition
     return NO_TRANSITION
+
+
+@njit(**KERNEL)
+def mode_of_limit(model, run, transition, t, x, work):
+    """The mode in which a run goes on from the limit ``x (n,)`` of a chatter, and a transition still to fire.
+
+    The mode that the ``transition`` names may have several parts. A run goes on in the part in which it would
+    start: transitions at the start that keep the state lead there. One that ends the run, or has a reset, is
+    left to be fired.
+    """
+    mode = model.accumulates_to[transition]
+    if mode == NO_MODE:
+        return run.mode, NO_TRANSITION
+    onward = beyond_at_start(model, run, mode, t, x, work)
+    for _ in range(model.first_at_start.shape[0]):
+        if onward == NO_TRANSITION or model.target[onward] == NO_MODE:
+            break
+        model.reset(onward, t, x, model.parameters, work.state)
+        keeps = True
+        for i in range(model.dimension):
+            keeps = keeps and work.state[i] == x[i]
+        if not keeps:
+            break
+        mode = model.target[onward]
+        onward = beyond_at_start(model, run, mode, t, x, work)
+    return mode, onward
 
 
 @njit(**KERNEL)

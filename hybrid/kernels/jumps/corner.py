@@ -57,7 +57,7 @@ def enter(model, run, work):
     came = STARTED if left == NO_MODE else LANDED
     fired = run.last_fired if run.jumps > 0 else NO_TRANSITION
     fires = take_sides(model, run, mode, t, run.y, came, left, fired, run.side, run.due, run.on_guard, work)
-    excluded = beyond_at_start(model, run, mode, t, work) if came == STARTED else NO_TRANSITION
+    excluded = beyond_at_start(model, run, mode, t, run.y, work) if came == STARTED else NO_TRANSITION
     if excluded != NO_TRANSITION:
         run.locked = 1
         return excluded

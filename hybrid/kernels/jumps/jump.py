@@ -17,8 +17,11 @@ from hybrid.kernels.events.guards import (
     guard_acceleration,
     guard_speed,
 )
+from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.jumps.chatter import (
+    BEFORE,
+    STEADY,
     chatter_matrix,
     remember_impulse,
 )
@@ -44,7 +47,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL, VECTOR
 from hybrid.kernels.types.layout import Model, Task, Work
-from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
 
@@ -150,6 +153,16 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
     run.indistinct += orthonormalise(run.y, n, tangents, run.growth, work.jacobian, True, annihilated)
     run.strain = 0.0
     return run.growth[0] - before
+
+
+@njit(**INLINE)
+def ends_own_flight(model, run, transition, transversality):
+    """Whether an impact ends the flight that the last one began, about as fast: a low bounce is no grazing.
+
+    All orbits nearby hit the guard too, because the pull leads them back to it.
+    """
+    bounces = run.chattering > 0 and run.chatter_jumps == run.jumps and run.last_fired == transition
+    return bounces and abs(transversality) >= STEADY * run.trail[BEFORE, model.dimension]
 
 
 @njit(**KERNEL)
@@ -278,6 +291,7 @@ def jump(task, transition):
     else:
         transversality = cross_without_map(model, run, transition, mode, work)
     judged = asked and not locked and model.marker[transition] == 0
+    judged = judged and not ends_own_flight(model, run, transition, transversality)
     if judged and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING
     if kind == GRAZING:
@@ -317,11 +331,19 @@ def change_mode_of_instant(model, run, target, work):
     follow(run, n, work)
 
 
-@exported(None, Task, INTEGER)
-def rest(task, limit_mode):
+@njit(**KERNEL)
+def go_onward(run, onward):
+    """Fire the transition that takes the state out of the mode of a limit at once, if there is one."""
+    if onward != NO_TRANSITION:
+        run.pending, run.locked = onward, 1
+
+
+@exported(None, Task)
+def rest(task):
     """Go on in the mode for the limit of a chatter that is over at once: the state rests on the guard."""
     _, model, _, run, _, work = task_of(task)
     n, transition, tangents = model.dimension, run.last_fired, task.tangents
+    limit_mode, onward = mode_of_limit(model, run, transition, run.phase, run.y, work)
     recall_map(model, run, tangents, work)
     change_mode_of_instant(model, run, limit_mode, work)
     chatter_matrix(model, run, transition, work)
@@ -336,3 +358,4 @@ def rest(task, limit_mode):
             run.ill_conditioned_growth += grown
     run.previous_mode = run.mode
     run.mode = limit_mode
+    go_onward(run, onward)

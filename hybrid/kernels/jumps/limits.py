@@ -9,6 +9,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward
 from hybrid.kernels.arithmetic.slopes import whole_jacobian
+from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.jumps.chatter import (
     accumulation,
     add_change_of_duration,
@@ -23,7 +24,7 @@ from hybrid.kernels.jumps.drift import (
     rounding_of_tangents,
 )
 from hybrid.kernels.jumps.endless import may_be_held
-from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, move
+from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, move
 from hybrid.kernels.jumps.locked import (
     begin_instant,
 )
@@ -37,7 +38,6 @@ from hybrid.kernels.jumps.rounds import (
 from hybrid.kernels.jumps.skipped import MANY_AT_ONCE, has_come_to_rest, jumps_in_turn, way_is_free
 from hybrid.kernels.types.codes import (
     LIMIT_OF_CHATTER,
-    NO_MODE,
     NO_TRANSITION,
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
@@ -69,15 +69,14 @@ def follow_impacts(task, transition, remaining):
     span = accumulation(model, method, run, transition, run.stay[run.mode], work)
     if not 0.0 < span <= remaining:
         return False
-    limit_mode = model.accumulates_to[transition]
-    target = run.mode if limit_mode == NO_MODE else limit_mode
+    x_limit = work.settled
+    target, onward = mode_of_limit(model, run, transition, run.phase + span, x_limit, work)
     steep, noise = 0.0, 0.0
     if tangents > 0:
         noise = rounding_of_tangents(model, run, transition, span, work)
         if not drift_is_known(model, run, target, span, noise, work):
             return False
         steep = span * feedback(work.jacobian, model.dimension)
-    x_limit = work.settled
     if not way_is_free(model, method, run, 1, span, work):
         return False
     chatter_matrix(model, run, transition, work)
@@ -101,6 +100,7 @@ def follow_impacts(task, transition, remaining):
             drift(run.instant, n, n, work.jacobian, span, work.state, work.field)
     run.round = 1
     move(model, run, transition, target, x_limit)
+    go_onward(run, onward)
     return True
 
 
@@ -153,8 +153,7 @@ def go_to_limit(task, turn, left):
         return False
     if not may_be_held(model, run, turn, left, work.settled, work):
         return False
-    limit_mode = model.accumulates_to[transition]
-    target = run.mode if limit_mode == NO_MODE else limit_mode
+    target, onward = mode_of_limit(model, run, transition, run.phase + left, work.settled, work)
     if left > 0.0:
         remember_flight(run, record, n, left, work.settled)
     for i in range(n):
@@ -172,6 +171,7 @@ def go_to_limit(task, turn, left):
         run.instant[j] = math.nan
     run.round = turn
     move(model, run, transition, target, work.settled)
+    go_onward(run, onward)
     return True
 
 

@@ -7,7 +7,7 @@ the time that is left, and both are extrapolated to where none is left.
 
 from numba import njit
 
-from hybrid.kernels.events.guards import guard_value, may_jump
+from hybrid.kernels.events.guards import guard_value, may_jump, rounding_band
 from hybrid.kernels.types.codes import ENDLESS, NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -211,10 +211,10 @@ def hold_endless(model, run, turn, t, left, work):
 
 
 @njit(**KERNEL)
-def agree(model, method, run, one, other, sizes):
-    """Whether two estimates of the limit agree up to the tolerances, but for what moves for ever."""
+def agree(model, method, run, one, other, sizes, slack):
+    """Whether two estimates of the limit agree up to tolerances and ``slack (n,)``, but for endless moves."""
     for i in range(model.dimension):
-        apart = not abs(one[i] - other[i]) <= method.atol + method.rtol * sizes[i]
+        apart = not abs(one[i] - other[i]) <= method.atol + method.rtol * sizes[i] + slack[i]
         if apart and run.trail[ENDLESS, i] == 0.0:
             return False
     return True
@@ -250,18 +250,44 @@ def is_limit(model, run, turn, t, work):
 
 
 @njit(**KERNEL)
-def size_of_visits(model, run, seen, out, work):
+def size_of_visits(model, method, run, seen, out, work):
     """Largest size of each component right after the last jumps, into ``out (n,)``.
 
-    What a component moves within the rounding of time is rough as well.
+    What a component moves within the rounding of time, or within its tolerance, is rough as well.
     """
     field = work.field
     model.field(run.mode, run.phase, run.y, model.parameters, field)
     moment = ROUNDING_OF_TIME * EPSILON * abs(run.phase)
     for i in range(model.dimension):
-        out[i] = max(run.scale[i], moment * abs(field[i]) / ROUGH)
+        out[i] = max(run.scale[i], (moment * abs(field[i]) + method.atol) / ROUGH)
         for back in range(seen):
             out[i] = max(out[i], abs(run.visits[slot_of(run, run.jumps - back), i]))
+
+
+@njit(**KERNEL)
+def rounding_of_flights(model, run, work):
+    """How far rounding may move the time of the last jump: that of the time, and that of its guard."""
+    fired = run.last_fired
+    model.guard_gradient(fired, run.phase, run.y, model.parameters, work.gradient)
+    band = rounding_band(model, run, fired, run.phase, run.y, work)
+    return EPSILON * abs(run.phase) + band / abs(run.last_transversality)
+
+
+@njit(**KERNEL)
+def hidden_by_rounding(model, run, turn, ratio, hidden, slack, work):
+    """What the limit may be off by, where rounding hides the time ``hidden`` of it, into ``slack (n,)``.
+
+    A component whose changes shrink as the rounds do, by their ``ratio``, has next to nothing left to change.
+    ``work.field`` is current. The sizes in ``work.trial`` grow with the slack.
+    """
+    jumps, visits = run.jumps, run.visits
+    last, before = visits[slot_of(run, jumps)], visits[slot_of(run, jumps - turn)]
+    earlier = visits[slot_of(run, jumps - 2 * turn)]
+    for i in range(model.dimension):
+        change = abs(last[i] - before[i])
+        shrinks = change <= 0.5 * (1.0 + ratio) * abs(before[i] - earlier[i])
+        slack[i] = max(MOVES_ON * change if shrinks else 0.0, hidden * abs(work.field[i]))
+        work.trial[i] = max(work.trial[i], slack[i] / ROUGH)
 
 
 @njit(**KERNEL)
@@ -269,33 +295,45 @@ def limit_of_rounds(model, method, run, work):
     """Time to the limit of the jumps that fire in turn, and their number; zero if there is no limit yet.
 
     To be called after each jump. The limit is known once two estimates, a round apart, agree up to the
-    tolerances, or once there is next to nothing left. The limit state goes to ``work.settled``.
+    tolerances, or once there is next to nothing left. Nor do later jumps tell more once the flights are so
+    short, or so low, that rounding is all that parts the estimates. The limit state goes to ``work.settled``.
     """
     turn = transitions_in_turn(model, run) if shortens(model, run) else 0
     if turn == 0:
         return 0.0, 0
-    left, _ = time_left_of_rounds(model, run, turn, 0)
+    left, ratio = time_left_of_rounds(model, run, turn, 0)
     earlier, _ = time_left_of_rounds(model, run, turn, turn)
     if not earlier > 0.0:
         return 0.0, 0
     seen = max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)
     lasted = time_before(model, run, 0, seen) + left
-    size_of_visits(model, run, seen, work.trial, work)
-    latest, end = time_before(model, run, 0, turn), run.phase + left
-    nearly = left <= NOTHING_LEFT * lasted
-    agreed = abs(left + latest - earlier) <= method.rtol * lasted
-    if latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase) and (agreed or nearly):
+    size_of_visits(model, method, run, seen, work.trial, work)
+    latest, end, slack = time_before(model, run, 0, turn), run.phase + left, work.rounding[1]
+    misfit, nearly = abs(left + latest - earlier), left <= NOTHING_LEFT * lasted
+    agreed = misfit <= method.rtol * lasted
+    hidden = rounding_of_flights(model, run, work) / (1.0 - ratio) ** 2
+    drowned = not agreed and max(misfit, ROUGH * latest) <= hidden
+    if not (agreed or nearly or drowned):
+        return 0.0, 0
+    for i in range(model.dimension):
+        slack[i] = 0.0
+    if drowned:
+        hidden_by_rounding(model, run, turn, ratio, hidden, slack, work)
+    resolved = latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase)
+    if resolved:
         extrapolate(model, run, turn, 0, left, work.settled)
         hold_endless(model, run, turn, end, left, work)
         extrapolate(model, run, turn, turn, earlier, work.error)
-        agreed = agreed and agree(model, method, run, work.settled, work.error, work.trial)
+        agreed = (agreed or drowned) and agree(
+            model, method, run, work.settled, work.error, work.trial, slack
+        )
         if (agreed or nearly) and is_limit(model, run, turn, end, work):
             return left, turn
-    if nearly:
+    if nearly or (drowned and not resolved):
         extrapolate_by_rounds(model, run, turn, 0, work.settled)
         hold_endless(model, run, turn, end, left, work)
         extrapolate_by_rounds(model, run, turn, turn, work.error)
-        agreed = agree(model, method, run, work.settled, work.error, work.trial)
+        agreed = agree(model, method, run, work.settled, work.error, work.trial, slack)
         if agreed and is_limit(model, run, turn, end, work):
             return left, turn
     return 0.0, 0

@@ -83,7 +83,10 @@ def has_come_to_rest(model, run, turn, x, rounds, work):
     share, clock, moved = AT_REST * ROUNDING_OF_STATE * EPSILON, size_of_time(model, t), work.trial
     model.field(mode, t, x, model.parameters, work.field)
     for i in range(n):
-        moved[i] = share * (run.scale[i] + clock * abs(work.field[i]))
+        size = run.scale[i]
+        for row in range(min(run.jumps, run.visits.shape[0])):
+            size = max(size, abs(run.visits[row, i]))
+        moved[i] = share * (size + clock * abs(work.field[i]))
         work.rounding[0, i] = 2.0 * rounds * moved[i]
     mark_endless(model, run, turn, t, x, work.rounding[0], work)
     for back in range(turn):

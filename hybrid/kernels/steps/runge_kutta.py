@@ -31,6 +31,7 @@ from hybrid.kernels.steps.step import (
     attempt_again,
     interpolant_path,
     interpolation_stages,
+    moves_nothing,
     rates,
     starting_step,
 )
@@ -276,7 +277,10 @@ def runge_kutta_step(task, remaining):
         run.rejected += 1
         shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
         run.next_step = h * shrink
-        if h * shrink <= FINEST * measured_time(model, run, mode) or h * shrink < 1e-200:
+        finest = h * shrink <= FINEST * measured_time(model, run, mode)
+        if finest and ratio > 1.0:
+            finest = moves_nothing(model, run, work.stages[0], h * shrink)
+        if finest or h * shrink < 1e-200:
             # The field may end at a guard, as ``sqrt(h)`` does at ``h``.
             correction, run.pending = reach_any(model, run, t, h, tangents, work)
             if run.pending == NO_TRANSITION:

@@ -66,10 +66,6 @@ CLOSE = 1e-8
 LONG = 100.0
 # A step may exceed the last stay in a mode by this share of the stay.
 AHEAD = 0.25
-# The clock of a guard's root stands still where guard and speed vanish together. Steps shorter than this
-# share of the stay in the mode do not lead away from there, if so many of them follow one another.
-CRAWL = 1e-4
-MOST_CRAWLING = 100
 # Below this share of the time the excess is too small for a step.
 NEXT_TO_NOTHING = 1e-10
 
@@ -254,7 +250,7 @@ def series_step(task, remaining):
             order, h, last, growth = within_floats(
                 series, n, start, stride, groups, order, rtol, atol, exact, work.weights
             )
-    if not h > 0.0 or (model.fragile[mode] == 1 and clock < 0 and moves_nothing(model, run, series, h)):
+    if not h > 0.0 or (model.fragile[mode] == 1 and clock < 0 and moves_nothing(model, run, series[1], h)):
         return NON_FINITE, 0.0
     if clock < 0:
         h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))
@@ -315,12 +311,8 @@ def series_step(task, remaining):
         rounding = max(finest, 4.0 * EPSILON * series[order + 2, clock])
         if fired == NO_TRANSITION and not cut and remaining - span <= rounding:
             span = remaining
-    if clock >= 0:
-        crawls = fired == NO_TRANSITION and span <= CRAWL * run.since_entry and span < remaining
-        run.crawling = run.crawling + 1 if crawls else 0
-        if run.crawling > MOST_CRAWLING:
-            return STEP_TOO_SMALL, 0.0
-    if fired == NO_TRANSITION and not span > finest and span < remaining:
+    stays = fired == NO_TRANSITION and not span > finest and span < remaining
+    if stays and moves_nothing(model, run, series[1], h):
         return STEP_TOO_SMALL, 0.0
     if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)

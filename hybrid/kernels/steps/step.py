@@ -218,11 +218,14 @@ def no_attempt(model, method, mode, t, h, y, tangents, work):
 
 
 @njit(**KERNEL)
-def moves_nothing(model, run, series, h):
-    """Whether a step moves neither state nor time by their rounding: terms near overflow make it so short."""
+def moves_nothing(model, run, slopes, h):
+    """Whether a step along ``slopes (n,)`` moves neither the state nor the time by their rounding.
+
+    Terms near overflow make steps so short, and places where the field is not defined.
+    """
     if model.timed[run.mode] == 1 and h > EPSILON * measured_time(model, run, run.mode):
         return False
     for i in range(model.dimension):  # noqa: SIM110 (no generators in kernels)
-        if abs(series[1, i]) * h > EPSILON * abs(series[0, i]):
+        if abs(slopes[i]) * h > EPSILON * abs(run.y[i]):
             return False
     return True

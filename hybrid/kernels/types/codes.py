@@ -16,6 +16,9 @@ REFUSED = -2
 # A part that is not compiled yet is needed.
 INCOMPLETE = -3
 
+# Steps after which a run must have got on.
+MANY_STEPS = 10_000
+
 # ``Run.stage``: what the driver has to do before it can step: nothing, evaluate the rates anew (the tangent
 # vectors were changed from outside), or take its sides at every guard of a mode.
 READY = 0

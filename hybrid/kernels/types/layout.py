@@ -185,8 +185,8 @@ COUNTERS = (
     "unproved",
     "at_rest",
     "round",
-    "crawling",
-    "creeping",
+    "stretch_steps",
+    "stretch_moved",
     "indistinct",
     "unchecked",
     "unresolved",
@@ -225,6 +225,7 @@ NUMBERS = (
     "lateness",
     "longest_step",
     "unknown_time",
+    "stretch_left",
 )
 
 
@@ -249,6 +250,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       transition ``ran_dry`` there; 0 if the tolerances cover it.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
+    - ``stretch (n,)``: the state after ``stretch_steps`` steps, with the time ``stretch_left`` left. From
+      there the run has to get on. ``stretch_moved`` is 1 if the state has moved since.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
       vectors.
     - ``trail (5, n + 1)``: follows the jumps of one transition to their limit; the last two rows mark the
@@ -273,6 +276,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     first_step: VECTOR
     stay: VECTOR
     scale: VECTOR
+    stretch: VECTOR
     growth: VECTOR
     trail: MATRIX
     before: VECTOR
@@ -423,7 +427,7 @@ class Parts(Structure):
     jump: function(None, Task, INTEGER)
     finish_chatter: function(TRUTH, Task, INTEGER, REAL)
     complete: INTEGER
-    rest: function(None, Task, INTEGER)
+    rest: function(None, Task)
     first_in_order: function(INTEGER, Task, INTEGER, INTEGER, REAL)
 
 

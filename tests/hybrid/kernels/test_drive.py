@@ -169,7 +169,6 @@ def task_of(**values):
         "horizon": 0.0,
         "since_entry": 0.5,
         "longest_step": 0.25,
-        "creeping": 0,
         "next_step": 1.0,
         "last_step": 1.0,
     }
@@ -259,7 +258,7 @@ class TestEnter:
         parts = SimpleNamespace(
             enter=lambda *given: fires,
             rests_on_guard=lambda task: rests,
-            rest=lambda task, mode: rested.append(mode),
+            rest=lambda task: rested.append(True),
         )
         task = task_of(stage=ENTERING, calm_mode=1, at_rest=0, **values)
         code = kernels.enter(parts, task)
@@ -277,7 +276,7 @@ class TestEnter:
     def test_a_state_at_rest_goes_to_the_limit_or_ends(self):
         for fires, rests in ((RESTING, False), (NO_TRANSITION, True)):
             assert self.entered(fires, rests=rests)[0] == codes.ACCUMULATION
-            assert self.entered(fires, rests=rests, last_fired=1)[::6] == (GO_ON, [1])
+            assert self.entered(fires, rests=rests, last_fired=1)[::6] == (GO_ON, [True])
         assert self.entered(0, rests=True)[2] == 0
 
     def test_what_is_not_finite_ends_the_run(self):
@@ -347,6 +346,8 @@ class TestAdvance:
             enter=enter,
             is_full=lambda record: full,
             is_late=lambda method, run: run.longest_step < late,
+            begin_stretch=lambda model, run, left: None,
+            gets_on=lambda model, method, run, left: True,
         ).advance
         task = task_of(**values)
         task.orthonormal = orthonormal
@@ -370,21 +371,6 @@ class TestAdvance:
             horizons = []
             self.advanced(horizon=known, steps=steps, seen=horizons)
             assert horizons == [told] * 4
-
-    def test_steps_that_lead_nowhere_end_the_run(self):
-        """Each is no longer than 1e-12 of what remains, and none has an event."""
-        lengths = []
-
-        def step(left):
-            lengths.append(left)
-            return GO_ON, (1.5 if len(lengths) > 1 else 0.9e-12) * min(left, 1.0)
-
-        assert self.advanced(step=step, creeping=drive.MOST_CREEPING)[0] == codes.STEP_TOO_SMALL
-        for others in ({"creeping": drive.MOST_CREEPING - 1}, {"pending": (0,)}):
-            lengths.clear()
-            assert self.advanced(step=step, **({"creeping": drive.MOST_CREEPING} | others))[0] == codes.DONE
-        lengths.append(0.0)
-        assert self.advanced(step=step, creeping=drive.MOST_CREEPING)[0] == codes.DONE
 
     def test_a_mode_is_entered_first(self):
         assert self.advanced(stage=ENTERING)[1][:2] == ["enter", 5.0]

@@ -302,6 +302,7 @@ def test_bare_time_may_have_lost_its_digits(last, period, timed, bare, code, mon
     """A mode that depends on time, in a system without a period, is advised to declare one."""
     asked = []
     monkeypatch.setattr(ending, "_place", lambda trajectory: "at the place")
+    monkeypatch.setattr(ending, "_failed", lambda trajectory, code: None)
     monkeypatch.setattr(ending, "run_status", lambda *given, **options: asked.append((given, options)))
     trajectory = SimpleNamespace(
         run=SimpleNamespace(

@@ -34,6 +34,7 @@ def choose(monkeypatch):
         monkeypatch.setattr(initial_mode, "load_kernels", lambda name: SimpleNamespace(try_modes=try_modes))
         system = SimpleNamespace(
             mode_names=modes,
+            modes=[SimpleNamespace(name=m, part_of=m.split(",")[0] if "," in m else None) for m in modes],
             dimension=2,
             transition_names=tuple(out),
             transitions=[SimpleNamespace(name=n, source=s, part_of=part) for n, (s, part) in out.items()],
@@ -67,11 +68,10 @@ def test_the_mode_that_allows_the_start(choose, verdicts, mode, expected):
     assert choose(verdicts, mode) == expected
 
 
-def test_the_only_mode_of_a_system_is_left_at_once_but_not_entered_beyond_a_guard(choose):
+def test_the_only_mode_of_a_system_needs_no_name(choose):
     own = {"hit": ("m", "hit")}
     assert choose({"hit": LEAVES}, out=own, modes=("m",)) == (0, ())
-    with pytest.raises(ArgumentError, match="allowed in no mode: mode 'm' is left through 'hit'"):
-        choose({"hit": BEYOND}, out=own, modes=("m",))
+    assert choose({"hit": BEYOND}, out=own, modes=("m",)) == (0, ("hit",))
     with pytest.raises(ArgumentError, match=r"'hit': the guard is nan at t = 0.5, x0 = \(1.0, 2.0\)"):
         choose({"hit": math.nan}, out=own, modes=("m",))
 

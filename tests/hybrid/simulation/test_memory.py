@@ -88,7 +88,7 @@ def test_a_run(shapes):
         "passed": (5,),
         "visits": (64, N + 2),
         **dict.fromkeys(("first_step", "stay"), (4,)),
-        "scale": (N,),
+        **dict.fromkeys(("scale", "stretch"), (N,)),
         **dict.fromkeys(("growth", "growth_before"), (K,)),
         "trail": (5, N + 1),
         "before": (N * K,),

@@ -322,7 +322,7 @@ class TestCopies:
     def test_the_limit_of_chatter_is_on_the_same_side(self):
         system = machine(lambda t, x, p: (x.q, x.u), limit="m")
         limits = {each.source: each.accumulates_to for each in system.transitions if each.part_of == "tick"}
-        assert limits == {"m: u<0": "m: u<0", "m: u>0": "m: u>0", "m: u=0": "m: u>0"}
+        assert limits == {"m: u<0": "m: u<0", "m: u>0": "m: u>0", "m: u=0": "m: u=0"}
         assert {each.accumulates_to for each in machine(None).transitions} == {None}
         free = machine(None, limit="free")
         assert {each.accumulates_to for each in free.transitions if each.part_of == "tick"} == {"free"}

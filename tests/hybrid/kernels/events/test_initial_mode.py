@@ -60,8 +60,8 @@ def verdicts(*, fires=NO_TRANSITION, value=0.0, side=0, on=0, due=0, marker=0, p
         ({"side": 1, "due": 1}, LEAVES),
         ({"due": 1, "marker": 1}, LEAVES),
         ({"due": 1, "allowed": False}, NO_OBJECTION),
-        # What fires on entering objects at least as much as what lies beyond.
-        ({"fires": 0}, BEYOND),
+        # A transition at the start leaves the mode.
+        ({"fires": 0}, LEAVES),
         ({"fires": 0, "due": 1}, LEAVES),
     ],
 )

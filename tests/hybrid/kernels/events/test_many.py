@@ -71,13 +71,6 @@ def test_the_only_mode_that_allows_the_state(given, mode):
     assert start(given, undefined=True) == NO_MODE
 
 
-def test_a_single_mode_may_be_left_at_once_but_not_started_beyond_a_guard():
-    alone = ((0, 1),)
-    assert start({}, outgoing=alone) == 0
-    assert start({1: LEAVES}, outgoing=alone) == 0
-    assert start({1: BEYOND}, outgoing=alone) == NO_MODE
-
-
 @pytest.mark.parametrize("kind", [RUNGE_KUTTA, TAYLOR, EXACT, DESINGULARISED, ROOTED])
 def test_a_mode_that_is_named(kind):
     """It may start beyond its guards, except where its series hold their roots."""

@@ -207,8 +207,9 @@ def test_transitions_that_fire_only_at_a_start(values, refused, expected):
     model = SimpleNamespace(
         first_at_start=integers(0, 1, 3), at_start=integers(9, 4, 2), direction=integers(0, 0, -1, 0, 1)
     )
-    run, work = SimpleNamespace(y=np.zeros(1)), SimpleNamespace(scalar=np.zeros(1))
-    assert stubbed.beyond_at_start(model, run, 1, 0.0, work) == expected
+    model.parameters, model.guard_gradient = None, lambda *given: None
+    x, work = np.zeros(1), SimpleNamespace(scalar=np.zeros(1), gradient=None)
+    assert stubbed.beyond_at_start(model, None, 1, 0.0, x, work) == expected
 
 
 class TestHeld:

@@ -214,6 +214,7 @@ class TestJump:
         model.target, model.marker = np.array([9, 2]), np.array([9, marker])
         run = SimpleNamespace(mode=0, phase=T, y="y", locked=locked, last_kind=GRAZING, due=[5, 5])
         run.ill_conditioned, run.ill_conditioned_growth, run.steep_jumps = 3, 1.0, 5
+        run.chattering = 0
         task = SimpleNamespace(tangents=tangents, orthonormal=orthonormal)
         record, work = SimpleNamespace(jump_phase=np.zeros(room)), SimpleNamespace(new="new", saltation="xi")
         tested = plain(
@@ -289,39 +290,6 @@ class TestJump:
             ("map", 2, "xi"), "sizes", *(carried if tangents else []), ("leave", 1, 7.0),
         ]  # fmt: skip
         assert self.counts == (True, 1, 0.5 if tangents else 0.0)
-
-
-@pytest.mark.parametrize("kind", [GRAZING, TRANSVERSE])
-@pytest.mark.parametrize("tangents", [0, 1, 3])
-def test_a_limit_that_is_reached_at_once(tangents, kind):
-    """The chatter's matrix comes after the map of the instant, which the tangent vectors go through."""
-    said, run = (
-        Recorder(),
-        SimpleNamespace(last_fired=1, mode=0, previous_mode=9, last_kind=kind, instant="i"),
-    )
-    run.ill_conditioned_growth = 1.0
-    work = SimpleNamespace(saltation="xi", state=None, rounding=None)
-    tested = plain(
-        jump,
-        task_of=lambda task: (None, Model(), None, run, None, work),
-        recall_map=said.stub("recall", kept=(2,)),
-        change_mode_of_instant=said.stub("change", kept=(2,)),
-        chatter_matrix=said.stub("chatter", kept=(2,)),
-        multiply=said.stub("multiply", kept=(0, 1, 2, 3)),
-        map_of_instant=said.stub("map", kept=(1, 2)),
-        assume_sizes=said.stub("sizes"),
-        restore_tangents=said.stub("restore", kept=(1, 2)),
-        carry_tangents=said.stub("carry", 0.5, kept=(2, 3, 4)),
-    )
-    tested.rest(SimpleNamespace(tangents=tangents, orthonormal=1), 2)
-    grazing = kind == GRAZING
-    carried = [("map", 2, "xi"), "sizes", ("restore", 2, tangents), ("carry", tangents, True, grazing)]
-    assert said.calls == [
-        ("recall", tangents), ("change", 2), ("chatter", 1), ("multiply", "xi", "i", 2, 2),
-        *(carried if tangents else []),
-    ]  # fmt: skip
-    assert run.ill_conditioned_growth == (1.5 if grazing and tangents else 1.0)
-    assert (run.previous_mode, run.mode) == (0, 2)
 
 
 def test_images_of_tangent_vectors_have_the_rounding_of_their_terms():

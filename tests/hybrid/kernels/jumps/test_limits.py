@@ -89,8 +89,11 @@ class Scene:
             ),
             *("carry_tangents", "whole_jacobian", "drift", "move"),
         )
+        target = self.run.mode if limit_mode == NO_MODE else limit_mode
         self.kernels = plain(
-            limits, **{name: self.noted(name, answers.get(name)) for name in {*doers, *answers}}
+            limits,
+            **{name: self.noted(name, answers.get(name)) for name in {*doers, *answers}},
+            mode_of_limit=lambda *given: (target, NO_TRANSITION),
         )
 
     def noted(self, name, answer):

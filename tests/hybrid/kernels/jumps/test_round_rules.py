@@ -332,19 +332,6 @@ class TestEndless:
 
 
 class TestAgreement:
-    @pytest.mark.parametrize("component", [0, 1])
-    @pytest.mark.parametrize("way", [1.0, -1.0])
-    def test_estimates_agree_up_to_the_tolerances(self, component, way):
-        model, run = run_of([1.0])
-        method, sizes = SimpleNamespace(atol=0.5, rtol=0.25), np.array([2.0, 2.0])
-        one, other = np.array([3.0, 4.0]), np.array([3.0, 4.0])
-        for apart, expected in ((0.99, True), (1.01, False), (np.nan, False)):
-            other[component] = one[component] + way * apart
-            assert bool(kernels.agree(model, method, run, one, other, sizes)) == expected
-            run.trail[ENDLESS, component] = 1.0
-            assert kernels.agree(model, method, run, one, other, sizes)
-            run.trail[ENDLESS, component] = 0.0
-
     def limit(
         self,
         *,
@@ -400,113 +387,6 @@ class TestAgreement:
             assert not self.limit(moved=moved)
         assert self.limit(moved=(0.0, 3.0), endless=(0.0, 1.0))
         assert not self.limit(moved=(3.0, 0.0), endless=(0.0, 1.0))
-
-    def test_sizes_are_the_largest_of_the_last_visits(self):
-        states = [(1.0, 1.0), (-4.0, 2.0), (3.0, 8.0), (99.0, 99.0)]
-        model, run = run_of([1.0, 2.0, 3.0, 4.0], states=states, scale=np.array([2.0, 9.0]))
-        work, out = SimpleNamespace(field=np.zeros(2)), np.zeros(2)
-        rates = [0.0, 0.0]
-
-        def field(mode, t, x, parameters, out):
-            assert (mode, t, x.tolist()) == (1, 99.0, [1.0, 1.0])
-            out[:] = rates
-
-        model.field = field
-        kernels.size_of_visits(model, run, 3, out, work)
-        assert out.tolist() == [4.0, 9.0]
-        # What a fast component moves within the rounding of time is not told apart.
-        rates[:] = -1e12, 1e12
-        kernels.size_of_visits(model, run, 3, out, work)
-        assert out == pytest.approx([64.0 * EPSILON * 99.0 * 1e12 / 1e-6] * 2, rel=1e-14)
-
-
-class TestLimitOfRounds:
-    """Rounds of two, with a state that is linear in the time left."""
-
-    def found(
-        self, ratio=0.5, *, bent=0.0, is_limit=True, first=0.01, jumps=40, rtol=1e-9, end=1.0, agrees=None,
-        turn=2, longer=0.0,
-    ):  # fmt: skip
-        left = geometric(ratio, count=40, turn=turn, first=first)
-        left = [time * (1.0 + bent * time) for time in left]
-        # One more round may be longer than all others say.
-        left[4 * turn :] = [time + longer for time in left[4 * turn :]]
-        states = [(5.0 + 2.0 * time, -3.0 * time) for time in left]
-        fired = TURN if turn == 2 else tuple(range(1, 1 + turn))
-        model, run = run_of(left, states=states, end=end, jumps=jumps, fired=fired)
-        model.field = lambda mode, t, x, parameters, out: out.fill(0.0)
-        names = ("trial", "settled", "error", "field")
-        work = SimpleNamespace(**{name: np.zeros(2) for name in names})
-        self.asked, self.work, self.left = [], work, left
-
-        def limit(model, run, turn, t, work):
-            self.asked.append(("limit", turn, t, *work.settled))
-            return is_limit
-
-        def hold(model, run, turn, t, left, work):
-            self.asked.append(("hold", turn, t, left))
-
-        replaced = {"is_limit": limit, "hold_endless": hold}
-        if agrees is not None:
-            replaced["agree"] = lambda *given: agrees
-        method = SimpleNamespace(rtol=rtol, atol=1e-9)
-        return plain(rounds, **replaced).limit_of_rounds(model, method, run, work)
-
-    def test_two_estimates_agree(self):
-        assert self.found() == (pytest.approx(0.01, rel=1e-12), 2)
-        hold, limit = self.asked
-        assert hold == ("hold", 2, pytest.approx(1.0, rel=1e-14), pytest.approx(0.01, rel=1e-12))
-        assert limit == (
-            "limit",
-            2,
-            pytest.approx(1.0, rel=1e-14),
-            pytest.approx(5.0),
-            pytest.approx(0.0, abs=1e-9),
-        )
-        assert self.work.error == pytest.approx([5.0, 0.0], abs=1e-9)
-
-    def test_none_yet(self):
-        for turn in (1, 2):
-            assert self.found(jumps=16, turn=turn) == (0.0, 0)
-            assert self.asked == []
-        assert self.found(jumps=17, turn=1) == (pytest.approx(0.01, rel=1e-12), 1)
-        # There must have been a limit one round earlier, too.
-        assert self.found(longer=0.1) == (0.0, 0)
-        assert self.asked == []
-        assert self.found(is_limit=False) == (0.0, 0)
-        assert self.found(agrees=False) == (0.0, 0)
-
-    def test_estimates_of_the_time_must_agree(self):
-        """They differ by the term of third order of a series that is bent."""
-        assert self.found(bent=0.5, rtol=1e-3) != (0.0, 0)
-        assert self.found(bent=0.5, rtol=1e-12) == (0.0, 0)
-        assert self.found(bent=0.5, rtol=1e-12, agrees=True) == (0.0, 0)
-        # They count against the time of the last 16 jumps, from 2^8 units of 0.01 to none.
-        model, run = run_of([time * (1.0 + 0.5 * time) for time in geometric(0.5, count=40, turn=2)], end=1.0)
-        left, earlier = (kernels.time_left_of_rounds(model, run, 2, back)[0] for back in (0, 2))
-        apart = abs(left + kernels.time_before(model, run, 0, 2) - earlier)
-        lasted = 2.56 * (1.0 + 0.5 * 2.56)
-        for share, expected in ((1.1, True), (0.9, False)):
-            found = self.found(bent=0.5, rtol=share * apart / lasted, agrees=True)
-            assert (found != (0.0, 0)) == expected
-
-    def test_next_to_nothing_left_is_a_limit_if_the_resets_lead_back(self):
-        """The states need not agree then, as long as rounds are longer than the rounding of time."""
-        assert self.found(ratio=0.1, agrees=False) == (pytest.approx(0.01, rel=1e-9), 2)
-        assert self.found(ratio=0.1, agrees=False, is_limit=False) == (0.0, 0)
-        # That is 1e-7 of the time that 16 jumps or five rounds took.
-        for turn, ratio in ((1, 1e-7 ** (1 / 16)), (2, 1e-7 ** (1 / 8)), (4, 1e-7 ** (1 / 5))):
-            for share, expected in ((0.99, True), (1.01, False)):
-                found = self.found(ratio=share * ratio, turn=turn, agrees=False)
-                assert (found != (0.0, 0)) == expected
-        # Without them, the components must agree as series of their own.
-        late = {"ratio": 0.1, "first": 1e-13, "end": 1e3}
-        assert self.found(**late, agrees=False) == (0.0, 0)
-        assert self.found(**late, agrees=True, is_limit=False) == (0.0, 0)
-        assert self.found(**late, agrees=True) == (pytest.approx(1e-13, rel=1e-6), 2)
-        assert [each[:2] for each in self.asked] == [("hold", 2), ("limit", 2)]
-        for found in (self.work.settled, self.work.error):
-            assert found == pytest.approx([5.0, 0.0], abs=1e-15)
 
 
 def test_the_transition_that_names_the_mode_of_the_limit_fires_next():

@@ -157,6 +157,7 @@ class TestRest:
         )
         model.first_slope, model.slope_column = np.array([[9] * 3, [0, 1, 1]]), np.array([1])
         run = SimpleNamespace(mode=1, phase=T, scale=np.array([1.0, 10.0]), trail=np.zeros((5, 2)))
+        run.jumps, run.visits = 1, np.zeros((4, 4))
         work = memory()
         work.jacobian[0] = 88.0, -7.0, 88.0
         tested = plain(

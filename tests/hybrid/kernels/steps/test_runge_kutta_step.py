@@ -8,7 +8,7 @@ import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.steps import runge_kutta
-from hybrid.kernels.steps.runge_kutta import FINEST, SAFETY, SHRINK
+from hybrid.kernels.steps.runge_kutta import SAFETY, SHRINK
 from hybrid.kernels.steps.runge_kutta_guards import NOT_THERE
 from hybrid.kernels.types.codes import GO_ON, NO_TRANSITION, NON_FINITE, READY, STALE, STEP_TOO_SMALL
 from tests.hybrid.kernels.plain import plain
@@ -141,22 +141,6 @@ class TestStep:
         assert run.next_step == pytest.approx(2.0 * shrink, rel=1e-6)
         assert (run.steps, run.rejected, run.last_step, run.last_ratio) == (11, 6, 3.0, 0.5)
         assert self.step(ratio=1.0)[0] == (GO_ON, 2.0)
-
-    @pytest.mark.parametrize(("ratio", "code"), [(4.0, STEP_TOO_SMALL), (math.nan, NON_FINITE)])
-    def test_the_shortest_step_may_reach_a_guard(self, ratio, code):
-        shrink = 0.45 if ratio == 4.0 else 0.1
-        for factor in (0.99, 1.01):
-            length = factor * 2.0 * FINEST / shrink
-            found, calls = self.step(ratio=ratio, next_step=length)
-            assert found == ((code, 0.0) if factor < 1.0 else (GO_ON, 0.0))
-            assert calls[1:] == ([("reach_any", 7.0, length, 3)] if factor < 1.0 else [])
-            found, calls = self.step(ratio=ratio, next_step=length, reaches=(0.125, 4))
-            if factor < 1.0:
-                assert found == (GO_ON, 0.125)
-                assert calls[2:] == [("accept", 3, 0.0, 0.125)]
-                assert self.run.pending == 4
-            else:
-                assert found == (GO_ON, 0.0)
 
     def test_the_shortest_step_at_the_time_zero(self):
         assert self.step(ratio=4.0, clock=0.0, next_step=1.5e-200 / 0.45)[0] == (GO_ON, 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.steps import series as module
-from hybrid.kernels.steps.series import CRAWL, MOST_CRAWLING, MOST_SHORTER, SHORTER
+from hybrid.kernels.steps.series import MOST_SHORTER, SHORTER
 from hybrid.kernels.steps.series_length import EXACT_TOLERANCE, MOST_BITS
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
@@ -19,7 +19,6 @@ from hybrid.kernels.types.codes import (
     READY,
     ROOTED,
     STALE,
-    STEP_TOO_SMALL,
     TAYLOR,
 )
 from hybrid.kernels.types.layout import EPSILON
@@ -119,7 +118,7 @@ class TestStep:
         method = SimpleNamespace(order=order, rtol=1e-5, atol=1e-6, max_step=others.pop("max_step", math.inf))
         self.run = SimpleNamespace(
             **{"mode": MODE, "phase": T, "y": np.arange(6.0), "stage": STALE, "steps": 10, "pending": 7}
-            | {"grazing_place": 2.0, "crawling": 0, "since_entry": 5.0}
+            | {"grazing_place": 2.0, "since_entry": 5.0}
             | others
         )
         attempts = SimpleNamespace(
@@ -210,13 +209,6 @@ class TestStep:
         assert self.step(fragile=1, kind=DESINGULARISED, moves_nothing=True) == (GO_ON, 0.5)
         with np.errstate(over="ignore", invalid="ignore"):
             assert self.step(factor=math.inf) == (NON_FINITE, 0.0)
-        # Shorter than four roundings of time.
-        late = 0.5 / (4.0 * EPSILON)
-        assert self.step(phase=1.01 * late) == (STEP_TOO_SMALL, 0.0)
-        assert self.step(phase=-1.01 * late) == (STEP_TOO_SMALL, 0.0)
-        assert self.step(phase=0.99 * late) == (GO_ON, 0.5)
-        assert self.step(0.5, phase=1.01 * late) == (GO_ON, 0.5)
-        assert self.step(phase=1.01 * late, earliest_on_series=(0.5, 2, 1.0, NO_TRANSITION)) == (GO_ON, 0.25)
 
     def test_what_limits_a_step(self):
         assert self.step(0.25) == (GO_ON, 0.25)
@@ -318,21 +310,3 @@ class TestStep:
                 near, kind=DESINGULARISED, phase=phase, earliest_on_series=event, reach_guard=0.0
             )
             assert found == (GO_ON, 0.328125)
-
-    def test_steps_that_crawl(self):
-        """The step takes 0.5; one that does not leave the start of a stay has so many tries."""
-        for since, code, count in (
-            (0.499 / CRAWL, GO_ON, 0),
-            (0.501 / CRAWL, STEP_TOO_SMALL, MOST_CRAWLING + 1),
-        ):
-            found = self.step(kind=DESINGULARISED, since_entry=since, crawling=MOST_CRAWLING)
-            assert found == (code, 0.5 if code == GO_ON else 0.0)
-            assert self.run.crawling == count
-        crawling = {"kind": DESINGULARISED, "since_entry": 0.501 / CRAWL}
-        assert self.step(**crawling, crawling=MOST_CRAWLING - 1) == (GO_ON, 0.5)
-        event = (1.0, 2, 1.0, NO_TRANSITION)
-        assert self.step(**crawling, crawling=MOST_CRAWLING, earliest_on_series=event)[0] == GO_ON
-        assert self.run.crawling == 0
-        assert self.step(0.3, **crawling, crawling=MOST_CRAWLING) == (GO_ON, 0.3)
-        assert self.step(since_entry=0.501 / CRAWL, crawling=MOST_CRAWLING) == (GO_ON, 0.5)
-        assert self.run.crawling == MOST_CRAWLING

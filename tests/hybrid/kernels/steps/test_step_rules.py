@@ -246,11 +246,10 @@ class TestMovesNothing:
 
     def nothing(self, *moved, timed=0, clock=1.0):
         state = np.array([5.0, -5.0])
-        series = np.array([state, np.array(moved) * EPSILON * state / 2.0])
+        slopes = np.array(moved) * EPSILON * state / 2.0
         model = SimpleNamespace(dimension=2, timed=np.array([7, timed]))
-        return kernels.moves_nothing(
-            model, SimpleNamespace(mode=1, phase=clock, since_entry=0.0), series, 2.0
-        )
+        run = SimpleNamespace(mode=1, phase=clock, since_entry=0.0, y=state)
+        return kernels.moves_nothing(model, run, slopes, 2.0)
 
     @pytest.mark.parametrize("way", [1.0, -1.0])
     def test_is_asked_of_every_component(self, way):
