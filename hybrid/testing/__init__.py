@@ -20,6 +20,7 @@ from hybrid.testing.invariance import (
     check_scale,
     check_split,
 )
+from hybrid.testing.landing import check_landings, check_limits
 from hybrid.testing.saltation import (
     check_continuity,
     check_extension,
@@ -49,6 +50,8 @@ __all__ = [
     "check_extension",
     "check_flow_direction",
     "check_jumps",
+    "check_landings",
+    "check_limits",
     "check_names",
     "check_order",
     "check_period",

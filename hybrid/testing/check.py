@@ -39,6 +39,7 @@ from hybrid.testing.invariance import (
     check_split,
     turned,
 )
+from hybrid.testing.landing import LANDINGS, LIMITS, check_landings, check_limits
 from hybrid.testing.saltation import (
     CONTINUITY,
     EXTENSION,
@@ -231,6 +232,10 @@ def check_system(
         UNITS: check_units,
         CUT: check_cut,
     }
+    if any(each.reset is not None for each in system.transitions):
+        properties[LANDINGS] = check_landings
+    if any(each.accumulates_to for each in system.transitions):
+        properties[LIMITS] = check_limits
     if elastic is not None:
         flip = turned("elastic", system, elastic)
         properties[ELASTIC] = lambda case: check_elastic(case, flip)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import attrs
 
 from hybrid.compiler.compiled import compile_system
-from hybrid.system.elements import Guard, Reset
+from hybrid.solvers import Solver
+from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, STATE, named_values
@@ -21,6 +22,8 @@ UNITS = "The units of the state and of the time do not matter"
 
 # Units are powers of two up to this exponent, so that they do not change rounding.
 LARGEST_EXPONENT = 40
+# The unit of the state in one mode alone, in those of the other modes.
+UNIT_OF_ONE = 2.0**-10
 
 
 @attrs.frozen(eq=False)
@@ -31,12 +34,14 @@ class Measured:
     ----------
     system
         The system; with its parameters as declared it equals the original.
-    state, time
-        Names of the parameters that hold the units of the state and of the time.
+    state
+        Names of the parameters that hold the units of the state in each mode.
+    time
+        Name of the parameter that holds the unit of the time.
     """
 
     system: HybridSystem
-    state: str
+    state: tuple[str, ...]
     time: str
 
 
@@ -53,6 +58,8 @@ def measured(system: HybridSystem) -> Measured:
 def check_units(case: Case) -> None:
     """Other units of state and time, with the absolute tolerance in those units, give the same run.
 
+    So does another unit of the state in one mode alone, with resets that convert the state.
+
     Raises
     ------
     PropertyError
@@ -61,38 +68,56 @@ def check_units(case: Case) -> None:
     as_case(case)
     if compile_system(case.system).emitted.opaque:
         discard("a model function cannot be traced, so it cannot be changed")
-    run, variant = case.run, measured(case.system)
     exponent = round(LARGEST_EXPONENT * (2.0 * case.fraction - 1.0))
-    state, time = 2.0**exponent, 2.0 ** (-exponent // 2)
-    solver = attrs.evolve(case.solver, atol=state * case.solver.atol, max_step=time * case.solver.max_step)
-    start = time * case.t0, [state * value for value in case.x0], case.mode
+    unit, time = 2.0**exponent, 2.0 ** (-exponent // 2)
+    solver = attrs.evolve(case.solver, atol=unit * case.solver.atol, max_step=time * case.solver.max_step)
+    modes = case.system.mode_names
+    told = f"states are multiplied by {unit:.3g}, times by {time:.3g}"
+    _compare_measured(case, dict.fromkeys(modes, unit), time, solver, told)
+    free = [name for name in modes if name not in _modes_of_limits(case.system)]
+    if len(modes) > 1 and free:
+        one = free[int(case.fraction * len(free))]
+        units = dict.fromkeys(modes, 1.0) | {one: 1.0 / UNIT_OF_ONE}
+        told = f"states in mode {one!r} alone are multiplied by {units[one]:.3g}"
+        _compare_measured(case, units, 1.0, case.solver, told)
+
+
+def _compare_measured(case: Case, units: Mapping[str, float], time: float, solver: Solver, told: str) -> None:
+    """Fail if the run is another one with these ``units`` of the state by mode and this unit of the time."""
+    variant = measured(case.system)
+    assert case.mode is not None
+    start = time * case.t0, [units[case.mode] * value for value in case.x0], case.mode
+    extra = dict(zip(variant.state, (units[name] for name in case.system.mode_names), strict=True))
     arc = case.simulate(
-        time * run.t1,
+        time * case.run.t1,
         system=variant.system,
         start=start,
-        extra={variant.state: state, variant.time: time},
+        extra={**extra, variant.time: time},
         solver=solver,
     )
-    compare(
-        case,
-        UNITS,
-        attrs.evolve(arc, x=arc.x / state),
-        [jump.transition for jump in arc.jumps],
-        str(arc.mode[-1]),
-        f"a threshold that has a unit; states are multiplied by {state:.3g}, times by {time:.3g}.",
-    )
+    last = str(arc.mode[-1])
+    fired = [jump.transition for jump in arc.jumps]
+    hint = f"a threshold that has a unit; {told}."
+    compare(case, UNITS, attrs.evolve(arc, x=arc.x / units[last]), fired, last, hint)
+
+
+def _modes_of_limits(system: HybridSystem) -> set[str]:
+    """Modes that the limit of a chatter joins: it has no reset that could convert the state."""
+    pairs = [{each.source, each.accumulates_to} for each in system.transitions if each.accumulates_to]
+    return {name for pair in pairs for name in pair if name is not None}
 
 
 def _measured(system: HybridSystem) -> Measured:
     names = tuple(system.parameters)
-    state, time = free_name(system, "unit_of_state"), free_name(system, "unit_of_time")
+    units = {name: free_name(system, f"unit_of_state_{i}") for i, name in enumerate(system.mode_names)}
+    time = free_name(system, "unit_of_time")
     n = system.dimension
 
-    def original(function: Callable[..., Any]) -> Callable[..., Any]:
-        """A model function of the state and the time in other units."""
+    def original(function: Callable[..., Any], mode: str) -> Callable[..., Any]:
+        """A model function of the time and of the state in a mode in other units."""
 
         def called(t: Any, x: Any, p: Any) -> Any:
-            unit = getattr(p, state)
+            unit = getattr(p, units[mode])
             if isinstance(system.state, int):
                 place = x / unit
             else:
@@ -101,13 +126,17 @@ def _measured(system: HybridSystem) -> Measured:
 
         return called
 
-    def faster(field: Callable[..., Any]) -> Callable[..., Any]:
-        rates = original(field)
-        return lambda t, x, p: [rate * (getattr(p, state) / getattr(p, time)) for rate in rates(t, x, p)]
+    def faster(mode: Mode) -> Callable[..., Any]:
+        rates, unit = original(mode.field, mode.name), units[mode.name]
+        return lambda t, x, p: [rate * (getattr(p, unit) / getattr(p, time)) for rate in rates(t, x, p)]
 
-    def longer(reset: Callable[..., Any]) -> Callable[..., Any]:
-        values = original(WholeReset(reset, system.state))
-        return lambda t, x, p: [value * getattr(p, state) for value in values(t, x, p)]
+    def converted(transition: Transition) -> Reset | None:
+        source, target = transition.source, transition.target or transition.source
+        if transition.reset is None and source == target:
+            return None
+        reset = (lambda t, x, p: x) if transition.reset is None else transition.reset.function
+        values = original(WholeReset(reset, system.state), source)
+        return Reset(lambda t, x, p: [value * getattr(p, units[target]) for value in values(t, x, p)])
 
     def period(p: Any) -> Any:
         declared = system.period
@@ -115,26 +144,22 @@ def _measured(system: HybridSystem) -> Measured:
             declared = declared(named_values(PARAMETERS, names, p[: len(names)]))
         return getattr(p, time) * declared
 
-    transitions = [
-        attrs.evolve(
-            transition,
-            guard=Guard(
-                original(transition.guard.function),
-                transition.guard.direction,
-                when=None if transition.guard.when is None else original(transition.guard.when),
-                at_start=transition.guard.at_start,
-            ),
-            reset=None if transition.reset is None else Reset(longer(transition.reset.function)),
+    def guard(transition: Transition) -> Guard:
+        own, when = transition.guard, transition.guard.when
+        return Guard(
+            original(own.function, transition.source),
+            own.direction,
+            when=None if when is None else original(when, transition.source),
+            at_start=own.at_start,
         )
-        for transition in system.transitions
-    ]
-    modes = [attrs.evolve(mode, field=faster(mode.field), jacobian=None) for mode in system.modes]
-    parameters = {**system.parameters, state: 1.0, time: 1.0}
+
     changed = attrs.evolve(
         system,
-        parameters=parameters,
-        modes=modes,
-        transitions=transitions,
+        parameters={**system.parameters, **dict.fromkeys(units.values(), 1.0), time: 1.0},
+        modes=[attrs.evolve(mode, field=faster(mode), jacobian=None) for mode in system.modes],
+        transitions=[
+            attrs.evolve(each, guard=guard(each), reset=converted(each)) for each in system.transitions
+        ],
         period=None if system.period is None else period,
     )
-    return Measured(changed, state, time)
+    return Measured(changed, tuple(units.values()), time)

@@ -1,9 +1,9 @@
 """An event lands on the far side: beyond its guard, by more than the rounding of the guard there.
 
-The root of a guard on a step is known up to rounding, on this side of zero or on that. A reset, a condition or
-another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a comparison. Each of them must find
-the crossing made. So the state of an event is the first on the flow at which the guard has the far sign by more
-than its rounding, or, where the guard or a force jumps, at which it has jumped.
+The root of a guard on a step is known up to rounding, on this side of zero or on that. A reset, a condition
+or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a comparison. Each of them must
+find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
+by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
 """
 
 import math
@@ -16,7 +16,7 @@ from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rou
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
-# The guard of an event is beyond zero by this share of its rounding band, two units in the last place, or more.
+# The guard of an event is beyond zero by this share of its band, two units in the last place, or more.
 BEYOND = 0.125
 # The next number beyond a guard that is exactly zero, and so has no rounding.
 NEXT_TO_ZERO = 1e-200
@@ -41,7 +41,7 @@ def _is_beyond(model, run, transition, side, x, work):
 
 @njit(**KERNEL)
 def _way_beyond(model, run, transition, side, work):
-    """A guard's time to get from its value to beyond its rounding at its speed; 0 if that does not lead there.
+    """Time in which a guard gets beyond its rounding at its speed; 0 if that does not lead there.
 
     ``work.field`` is current.
     """
@@ -62,7 +62,7 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 @njit(**KERNEL)
 def _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, work):
-    """``land_beyond`` with ``run.scale`` as the sizes of the state itself, at most the time ``farthest`` on."""
+    """``land_beyond``, at most the time ``farthest`` on; ``run.scale`` has the sizes of the state itself."""
     n, mode = model.dimension, run.mode
     if _is_beyond(model, run, transition, side, run.y, work):
         return
@@ -80,9 +80,7 @@ def _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, wor
         if time_left(model, run, stop_cycle, stop_phase) < 0.0:
             set_clock(run, stop_cycle, stop_phase)
         if _is_beyond(model, run, transition, side, work.state, work):
-            if not speed > 0.0 or _goes_on(
-                model, transition, mode, run.phase, work.state, side, speed, work
-            ):
+            if not speed > 0.0 or _goes_on(model, transition, mode, run.phase, work.state, side, speed, work):
                 for i in range(n):
                     run.y[i] = work.state[i]
                 run.since_entry += span

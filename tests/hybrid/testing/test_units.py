@@ -42,7 +42,7 @@ class Noting(Engine):
 
     def simulate(self, system, x0, t_span, *, parameters, solver, **options):
         arc = super().simulate(system, x0, t_span, parameters=parameters, solver=solver, **options)
-        if "unit_of_state" in parameters:
+        if "unit_of_time" in parameters:
             self.asked.append((system, x0, t_span, parameters, solver, options))
         return arc
 
@@ -63,7 +63,7 @@ def test_the_units_are_powers_of_two(fraction, state, time):
     assert system is units.measured(SWING).system
     assert list(x0) == [0.5 * state, -state]
     assert t_span == (0.25 * time, case.run.t1 * time)
-    assert parameters == {"a": 0.25, "w": 2.0, "unit_of_state": state, "unit_of_time": time}
+    assert parameters == {"a": 0.25, "w": 2.0, "unit_of_state_0": state, "unit_of_time": time}
     assert used == attrs.evolve(solver, atol=1e-10 * state, max_step=0.5 * time)
     assert options == {"mode": "m"}
     assert len(case.run.arc.jumps) == 1
@@ -73,7 +73,7 @@ class Longer(Engine):
     """Other units add a thousandth to the state."""
 
     def simulate(self, system, x0, t_span, *, parameters, **options):
-        x0 = np.array(x0) * (1.001 if "unit_of_state" in parameters else 1.0)
+        x0 = np.array(x0) * (1.001 if "unit_of_time" in parameters else 1.0)
         return super().simulate(system, x0, t_span, parameters=parameters, **options)
 
 
@@ -89,7 +89,7 @@ def test_a_system_in_other_units_is_the_same_system(state):
     made = units.measured(original)
     assert units.measured(original) is made
     system = made.system
-    assert dict(system.parameters) == {"a": 0.5, "w": 2.0, "unit_of_state": 1.0, "unit_of_time": 1.0}
+    assert dict(system.parameters) == {"a": 0.5, "w": 2.0, "unit_of_state_0": 1.0, "unit_of_time": 1.0}
     p, x, t = original.parameter_values(), np.array([0.75, -1.5]), 0.375
 
     def values(one, function, t, x, p):
@@ -107,7 +107,7 @@ def test_a_system_in_other_units_is_the_same_system(state):
             assert values(system, getattr(other_wall.guard, name), *place).tolist() == expected.tolist()
         landing = values(original, wall.reset.function, t, x, p)
         assert values(system, other_wall.reset.function, *place).tolist() == (space * landing).tolist()
-        given = {"unit_of_state": space, "unit_of_time": time}
+        given = {"unit_of_state_0": space, "unit_of_time": time}
         assert system.forcing_period(given) == time * np.pi
 
 
@@ -127,3 +127,31 @@ def test_what_is_not_there_has_no_units():
 def test_a_period_that_is_a_number_is_in_the_unit_of_time():
     system = units.measured(attrs.evolve(SWING, period=np.pi)).system
     assert system.forcing_period({"unit_of_time": 8.0}) == 8.0 * np.pi
+
+
+def relay(threshold):
+    """A level that two modes fill and empty; one switches at a threshold of its own, the other at 2."""
+    return hybrid.HybridSystem(
+        state=("h",),
+        modes=[
+            hybrid.Mode("fill", lambda t, x, p: (3 - x.h,)),
+            hybrid.Mode("empty", lambda t, x, p: (-x.h,)),
+        ],
+        transitions=[
+            hybrid.Transition("fill", "empty", hybrid.Guard(lambda t, x, p: x.h - 2, +1)),
+            hybrid.Transition("empty", "fill", hybrid.Guard(threshold, -1)),
+        ],
+    )
+
+
+def test_one_mode_may_measure_the_state_in_units_of_its_own():
+    system = relay(lambda t, x, p: x.h - 1)
+    for mode, level in (("fill", 1.5), ("empty", 1.7)):
+        for fraction in (0.1, 0.5, 0.9):
+            case = Case(system, {}, mode, (level,), 0.0, 4.0, fraction)
+            assert len(case.run.arc.jumps) > 2
+            units.check_units(case)
+    made = units.measured(system)
+    mixed = dict(zip(made.state, (1.0, 1024.0), strict=True))
+    arc = hybrid.simulate(made.system, (1.5,), (0.0, 4.0), mode="fill", parameters=mixed)
+    np.testing.assert_allclose(arc.jumps.x_plus[:2, 0], (2048.0, 1.0), rtol=1e-9)
