@@ -14,10 +14,10 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
-from hybrid.orbits.hidden import FINEST_GAP, SAMPLES, hidden_gap
 from hybrid.orbits.labelled import labelled_orbit
-from hybrid.orbits.newton import EPSILON, ROUNDING_OF_GAP, Newton, Point, Shot, length
+from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.periodic_schur import ProductEigenvalues
+from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
@@ -33,6 +33,10 @@ from hybrid.system.growth import growing
 if TYPE_CHECKING:
     import xarray
 
+# Points, besides the solver's own, that show how far an orbit moves.
+SAMPLES = 65
+# The smallest gap that Newton's method can reach, in units in the last place of the largest states.
+FINEST_GAP = 4
 # Newton steps are halved at most to this share.
 SHORTEST_STEP = 1 / 64
 # A period below this share of the guess is a point, not an orbit.
@@ -237,11 +241,10 @@ class _Shooting:
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
         extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
-        at_rest = extent <= ROUNDING_OF_GAP * EPSILON * magnitude
-        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) == 0:
-            hidden = np.where(at_rest, hidden_gap(trajectory, arc, magnitude), 0.0)
-        else:
-            hidden = np.zeros(len(extent))
+        at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
+        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) <= MOST_JUMPS_LOOKED_AT:
+            again, end = self._trajectory(point, self.mode), point.t + point.period
+            carried = drift(again, end, arc.jumps.t, at_rest, magnitude)
         return Shot(
             point,
             mode,
@@ -253,7 +256,7 @@ class _Shooting:
             extent,
             magnitude,
             status_of(trajectory, code),
-            hidden,
+            carried,
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -289,20 +292,23 @@ class _Shooting:
         Where orbits come in families, the step along the family is arbitrary and may be long, so the step
         without it is tried too.
         """
-        full = newton.step(shot)
-        best = self._better(shot, shot, newton, full)
-        if best.size(newton.scale) > NEARER * shot.size(newton.scale):
-            best = self._better(best, shot, newton, newton.step(shot, NEARLY_SINGULAR))
+        full, units = newton.step(shot), newton.measure(shot)
+        best = self._better(shot, shot, units, full)
+        if best.size(units) > NEARER * shot.size(units):
+            best = self._better(best, shot, units, newton.step(shot, NEARLY_SINGULAR))
         part = 1.0
         while best is shot and part > SHORTEST_STEP:
             part /= 2
-            best = self._better(shot, shot, newton, full, part)
+            best = self._better(shot, shot, units, full, part)
         return None if best is shot else best
 
     def _better(
-        self, best: Shot, shot: Shot, newton: Newton, step: tuple[np.ndarray, float], part: float = 1.0
+        self, best: Shot, shot: Shot, units: np.ndarray, step: tuple[np.ndarray, float], part: float = 1.0
     ) -> Shot:
-        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better."""
+        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better.
+
+        Gaps are compared in ``units (n,)``.
+        """
         change, longer = step
         period = shot.point.period + part * longer
         if not period > 0:
@@ -312,7 +318,7 @@ class _Shooting:
         except ArgumentError:
             # No mode allows the point.
             return best
-        return trial if trial.size(newton.scale) < best.size(newton.scale) else best
+        return trial if trial.size(units) < best.size(units) else best
 
     def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
@@ -473,7 +479,7 @@ class _Shooting:
             )
         # A component that is below the solver's absolute tolerance throughout counts as zero.
         nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
-        if not shot.closes(tolerance, np.maximum(shot.rounding, nothing)):
+        if not shot.closes(tolerance, shot.rounding, nothing):
             return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
         noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
         if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
