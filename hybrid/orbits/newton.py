@@ -140,7 +140,9 @@ class Newton:
     def measurable(self, shot: Shot) -> bool:
         """Whether the gap and its derivatives in units of the scale are within the range of floats."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return bool(np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot, self.scale))))
+            return bool(
+                np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot, self.scale)))
+            )
 
     def step(self, shot: Shot, smallest: float | None = None) -> tuple[np.ndarray, float]:
         """Newton step of the state and of the period.
@@ -148,9 +150,7 @@ class Newton:
         It leaves out the directions in which the matrix is smaller than a share ``smallest`` of its largest
         singular value: by default rounding.
         """
-        step = np.linalg.lstsq(
-            self._matrix(shot), self._right(shot, self.measure(shot)), rcond=smallest
-        )[0]
+        step = np.linalg.lstsq(self._matrix(shot), self._right(shot, self.measure(shot)), rcond=smallest)[0]
         longer = step[-1] * shot.point.period if self.free_period else 0.0
         return step[: len(shot.end)] * self.scale, float(longer)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -66,7 +67,7 @@ def drift(
 
 
 def _integrals(trajectory: Trajectory, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Integrals ``(n, 1 + n)`` of the rates of state and tangent vectors, by Simpson's rule and the trapezoidal.
+    """Integrals ``(n, 1 + n)`` of the rates of state and vectors, by Simpson's rule and the trapezoidal one.
 
     Jumps at ``times`` add what they change. The last array is the integral of the rates' moduli. All
     are nan where the run does not reach its end.
@@ -76,7 +77,7 @@ def _integrals(trajectory: Trajectory, times: np.ndarray) -> tuple[np.ndarray, n
     repeats = jumps_at_once(trajectory)
     changed = _jumped(trajectory) if repeats else np.zeros((n, 1 + n))
     fine, coarse = fine + changed, coarse + changed
-    for begin, stop in zip(times[:-1], times[1:], strict=True):
+    for begin, stop in pairwise(times):
         first = _rates(trajectory)
         if _to(trajectory, 0.5 * (begin + stop)) != codes.DONE:
             return fine * np.nan, coarse, size

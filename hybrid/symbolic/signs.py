@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-
 from functools import lru_cache
 
 import sympy
 
 from hybrid.symbolic.expressions import Absolute, Less, LessEqual, Maximum, Minimum, Select, Sign, Step
-from hybrid.symbolic.nodes import MOST_EXPANDED, contains, interned, is_larger_than
+from hybrid.symbolic.nodes import MOST_EXPANDED, contains, expanded, interned, is_larger_than
 
 # Expressions whose terms are remembered: they are compared with every guard.
 MOST_REMEMBERED = 4096
@@ -70,4 +69,4 @@ def sign_of(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> int:
 @lru_cache(MOST_REMEMBERED)
 def _terms(expression: sympy.Expr) -> dict[sympy.Expr, sympy.Expr]:
     """Factors of the terms of an expanded expression; zeros are left out."""
-    return {term: factor for term, factor in expression.expand().as_coefficients_dict().items() if factor}
+    return {term: factor for term, factor in expanded(expression).as_coefficients_dict().items() if factor}

@@ -84,7 +84,7 @@ def arrived(task):
     mode, t, found = run.mode, run.phase, NO_TRANSITION
     model.field(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
-        work.settled[i] = run.scale[i]
+        work.scale_before[i] = run.scale[i]
         run.scale[i] = abs(run.y[i])
     widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -107,7 +107,7 @@ def arrived(task):
         if crossed and allowed(model, transition, t, run.y, work.scalar):
             found = transition
     for i in range(model.dimension):
-        run.scale[i] = max(run.scale[i], work.settled[i])
+        run.scale[i] = max(run.scale[i], work.scale_before[i])
     return found
 
 

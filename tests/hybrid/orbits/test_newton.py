@@ -134,5 +134,3 @@ class TestNewton:
         np.testing.assert_allclose(np.abs(found), [[0.25], [0.0]], atol=1e-14)
         assert begun.drift(run, other, farthest=1e7).shape == (2, 0)
         assert begun.drift(run, other, farthest=0.5).shape == (2, 2)
-
-
