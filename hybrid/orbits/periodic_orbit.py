@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -14,8 +13,8 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
-from hybrid.orbits.labelled import labelled_orbit
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
+from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc
@@ -29,9 +28,6 @@ from hybrid.solvers import DOP853, Solver
 from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
-
-if TYPE_CHECKING:
-    import xarray
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
@@ -63,69 +59,6 @@ NEARER = 0.5
 NEARLY_SINGULAR = 1e-5
 
 
-@attrs.frozen(eq=False, repr=False)
-class PeriodicOrbit:
-    """A periodic orbit, or the best point that Newton's method reached.
-
-    Attributes
-    ----------
-    system, parameters
-        The model, and the values of all its parameters, by name.
-    x0, mode, t0
-        A point of the orbit ``(n,)``, its mode, and the time there.
-    period
-        Time until the orbit closes: for a forced system ``periods`` forcing periods.
-    multipliers
-        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1. Each has its own
-        relative accuracy, however small: they come from the factors of the fundamental matrix along the
-        orbit.
-    log_moduli
-        Natural logarithms of the moduli of the multipliers ``(n,)``, also of those out of the range of
-        floating-point numbers; minus infinity for a multiplier of zero.
-    fundamental
-        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues the multipliers are; for
-        an autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the
-        orbit it is a similar matrix).
-    residual
-        Distance between the two ends over the period, in the units of the state.
-    iterations
-        Newton iterations used.
-    signature
-        Names of the modes in the order they are visited.
-    status
-        Whether Newton's method converged, and how far it got if not.
-    """
-
-    system: HybridSystem
-    parameters: Mapping[str, float]
-    x0: np.ndarray
-    mode: str
-    t0: float
-    period: float
-    multipliers: np.ndarray
-    log_moduli: np.ndarray
-    fundamental: np.ndarray
-    residual: float
-    iterations: int
-    signature: tuple[str, ...]
-    status: Status
-
-    def __repr__(self) -> str:
-        return (
-            f"<PeriodicOrbit period {self.period:.9g}, largest multiplier {abs(self.multipliers[0]):.6g}, "
-            f"residual {self.residual:.1e}, {self.status.code.name}>"
-        )
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
-        return labelled_orbit(self)
-
-    def arc(self, solver: Solver | None = None) -> HybridArc:
-        """The orbit over one period, with the jumps at both ends if it jumps at its point."""
-        span = (self.t0, self.t0 + self.period)
-        return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
-
-
 @growing
 def periodic_orbit(
     system: HybridSystem,
@@ -144,7 +77,7 @@ def periodic_orbit(
 
     A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An
     autonomous system closes after an unknown time near the guess ``period``; the returned point is the
-    solver's own point that is nearest to the guess.
+    solver's own point, away from jumps, that is nearest to the guess.
 
     Parameters
     ----------
@@ -372,12 +305,15 @@ class _Shooting:
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
 
     def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
-        """The same orbit from the point of its arc, both sides of jumps included, nearest to the guess."""
+        """The same orbit from the point of its arc, away from jumps, that is nearest to the guess."""
         arc = orbit.arc(self.solver)
         extent = np.ptp(arc.x, axis=0)
         # Distances in units of the orbit, so that those of the states do not matter.
         apart = (arc.x - guess.x) / np.where(extent > 0, extent, 1.0)
-        i = int(np.argmin(np.linalg.norm(apart, axis=1)))
+        times = arc.jumps.t
+        # On a jump, rounding would decide whether a run from the point makes it.
+        away = [np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t]
+        i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: Shot, iterations: int, status: Status) -> PeriodicOrbit:
@@ -422,10 +358,10 @@ class _Shooting:
 
     def _signature(self, shot: Shot) -> tuple[str, ...]:
         arc = self._follow(shot.point, shot.point.period, shot.mode)
-        jumps, forcing = list(arc.jumps), self.system.forcing_period(self.parameters) or 0.0
-        if jumps and jumps[0].t == shot.point.t:
-            end = shot.point.t + shot.point.period
-            jumps = [jump for jump in jumps if not same_time(jump.t, end, forcing)]
+        jumps, begin, end = list(arc.jumps), shot.point.t, shot.point.t + shot.point.period
+        size = abs(begin) + shot.point.period
+        if jumps and same_time(jumps[0].t, begin, size):
+            jumps = [jump for jump in jumps if not same_time(jump.t, end, size)]
         return (shot.mode, *(jump.target for jump in jumps if jump.target is not None))
 
     def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
