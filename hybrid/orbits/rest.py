@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import attrs
@@ -42,7 +41,7 @@ class Drift:
 
 
 def drift(
-    trajectory: Trajectory, end: float, jumps: Sequence[float], resting: np.ndarray, magnitude: np.ndarray
+    trajectory: Trajectory, end: float, jumps: np.ndarray, resting: np.ndarray, magnitude: np.ndarray
 ) -> Drift | None:
     """The drift of those components for which the integral is more exact than the difference of the ends.
 

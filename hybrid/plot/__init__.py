@@ -5,7 +5,7 @@ from functools import singledispatch
 from typing import Any
 
 from hybrid import arguments
-from hybrid.orbits.periodic_orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
 from hybrid.plot.graph import plot_graph
