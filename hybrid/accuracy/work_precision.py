@@ -412,7 +412,7 @@ def _measured(
 
 
 def _error(value: float, floor: float) -> str:
-    """An error as text; one below that of the reference is not known, for a method that is the reference's too."""
+    """An error as text; one below that of the reference, which may be the same method, is not known."""
     return BELOW if value == 0.0 or value < floor else _figure(value, ".1e")
 
 
