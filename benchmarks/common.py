@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import importlib.metadata
 import os
 import platform
@@ -15,6 +16,21 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("numpy", "scipy", "numba")
+
+
+def options(description: str | None) -> argparse.ArgumentParser:
+    """A command line that says where pictures go: by default to a folder that git ignores."""
+    parser = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--output", type=Path, default=Path("pictures"), help="folder of the picture")
+    return parser
+
+
+def file_in(folder: Path, name: str) -> Path:
+    """Path of a picture in a folder, which is made if it does not exist."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / name
 
 
 def heading(question: str) -> None:

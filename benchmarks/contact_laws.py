@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import matplotlib as mpl
 
 mpl.use("Agg")
@@ -12,14 +14,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import models
-from benchmarks.common import ROOT, heading, least_time, table
+from benchmarks.common import file_in, heading, least_time, options, table
 from hybrid import Taylor
 from hybrid.plot import COLOURS
 from lyapunov import ModelComparison, compare_models, lyapunov_spectrum
 from models.contact import ContactLaw, matched_laws
 from models.vibroimpact import hertz_stiffness
 
-PICTURE = ROOT / "docs" / "contact_laws.png"
+PICTURE = "contact_laws.png"
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
 MASS = 1000 * 100 / 1100
 # Impact speed on the orbit at 7.40, m/s.
@@ -101,7 +103,7 @@ def draw(axes: Any, found: ModelComparison, what: str) -> None:
     axes.set_axisbelow(True)
 
 
-def picture(elastic: ModelComparison, damped: ModelComparison) -> None:
+def picture(path: Path, elastic: ModelComparison, damped: ModelComparison) -> None:
     with plt.rc_context({"font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left"}):
         figure, grid = plt.subplots(1, 3, figsize=(11.4, 3.5), layout="constrained")
         draw(grid[0], elastic, "first exponent")
@@ -114,11 +116,12 @@ def picture(elastic: ModelComparison, damped: ModelComparison) -> None:
         grid[2].set_title("restitution 0.8: the first exponent (1/s)")
         for axes in grid:
             axes.legend(frameon=False, fontsize=8)
-        figure.savefig(PICTURE, dpi=150, metadata={"Software": None})
+        figure.savefig(path, dpi=150, metadata={"Software": None})
         plt.close(figure)
 
 
 def main() -> None:
+    path = file_in(options(__doc__).parse_args().output, PICTURE)
     heading(
         "The founding system with every contact law, omega from 7 to 8 rad/s, four tangent vectors,\n"
         f"rtol = {SOLVER.rtol:.0e}. Distance: largest difference of an exponent from the last law's, in 1/s."
@@ -143,8 +146,8 @@ def main() -> None:
                 f"The cheapest within {tolerance:.0e} up to {LAST_PERIODIC}: {periodic.cheapest(tolerance)}"
             )
         print()
-    picture(found[1.0], found[0.8])
-    print(f"Picture: {PICTURE.relative_to(ROOT)}")
+    picture(path, found[1.0], found[0.8])
+    print(f"Picture: {path}")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import matplotlib as mpl
 
@@ -19,13 +20,13 @@ import numpy as np
 
 import models
 from benchmarks import exponents_beside
-from benchmarks.common import ROOT, heading, table
+from benchmarks.common import file_in, heading, options, table
 from benchmarks.exponents_beside import Beside
 from hybrid import Guard, HybridSystem, Mode, Reset, Taylor, Transition
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from lyapunov.plot import COLOURS, INK, style
 
-PICTURE = ROOT / "docs" / "exponents_work.png"
+PICTURE = "exponents_work.png"
 # The founding system at omega = 7.40, from an independent computation with 60 digits.
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
 REGULAR = -0.05489356622830292
@@ -174,7 +175,7 @@ def draw_work(axes: plt.Axes, curves: Curves) -> None:
     axes.grid(True)
 
 
-def picture(regular: Curves, chaotic: Curves, beside: Beside) -> None:
+def picture(path: Path, regular: Curves, chaotic: Curves, beside: Beside) -> None:
     with style():
         figure, (axes, below) = plt.subplots(2, 3, figsize=(12.0, 8.4), sharey="row")
         draw(axes[0], regular, "Regular: founding system at 7.40")
@@ -184,7 +185,7 @@ def picture(regular: Curves, chaotic: Curves, beside: Beside) -> None:
         exponents_beside.draw(below, beside)
         for side, ax in (("upper", axes[0]), ("lower", below[0])):
             figure.legend(*ax.get_legend_handles_labels(), loc=f"outside {side} center", ncols=5)
-        figure.savefig(PICTURE, metadata={"Software": None})
+        figure.savefig(path, metadata={"Software": None})
 
 
 def summary(curves: Curves) -> None:
@@ -196,6 +197,7 @@ def summary(curves: Curves) -> None:
 
 
 def main() -> None:
+    path = file_in(options(__doc__).parse_args().output, PICTURE)
     heading("Relative error of the first exponent by number of intervals; three digits are 5e-4.")
     regular, chaotic = regular_curves(), chaotic_curves()
     print("Founding system at omega = 7.40, one tangent vector; tapered means unless noted:\n")
@@ -204,8 +206,8 @@ def main() -> None:
     summary(chaotic)
     beside = exponents_beside.beside()
     exponents_beside.summary(beside)
-    picture(regular, chaotic, beside)
-    print(f"Picture: {PICTURE.relative_to(ROOT)}")
+    picture(path, regular, chaotic, beside)
+    print(f"Picture: {path}")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -17,13 +18,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import models
-from benchmarks.common import ROOT, heading, table
+from benchmarks.common import file_in, heading, options, table
 from hybrid import DOP853, simulate, stroboscopic_section
 from hybrid.plot import COLOURS
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
 from models.one_impact import one_impact_orbits
 
-PICTURE = ROOT / "docs" / "grazing_diagram.png"
+PICTURE = "grazing_diagram.png"
 # Overdamped: without impacts small displacements decay like exp(-0.1 t) and exp(-t).
 PARAMETERS = {"k": 0.1, "c": 1.1, "w": 1.0, "d": 1.0, "r": 0.8}
 SLOW, PERIOD = -0.1, 2 * math.pi
@@ -118,7 +119,7 @@ def draw_exponents(axes: Any, points: list[Point], x: np.ndarray) -> None:
     axes.set_ylim(-0.115, 0.065)
 
 
-def picture(sweep: list[Point], before: list[Point], after: list[Point]) -> None:
+def picture(path: Path, sweep: list[Point], before: list[Point], after: list[Point]) -> None:
     figure, grid = plt.subplots(
         2, 3, figsize=(11.4, 5.8), layout="constrained", sharex="col", width_ratios=(1.1, 0.45, 1.25)
     )
@@ -153,7 +154,7 @@ def picture(sweep: list[Point], before: list[Point], after: list[Point]) -> None
     for axes in (strobe, speeds, whole, left, right):
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(which="minor", length=0)
-    figure.savefig(PICTURE, dpi=150, metadata={"Software": None})
+    figure.savefig(path, dpi=150, metadata={"Software": None})
 
 
 def summary(name: str, points: list[Point]) -> list[str]:
@@ -172,6 +173,7 @@ def summary(name: str, points: list[Point]) -> list[str]:
 
 
 def main() -> None:
+    path = file_in(options(__doc__).parse_args().output, PICTURE)
     heading("The largest exponent near a grazing.")
     begin = time.process_time()
     sweep = [point(beyond) for beyond in np.linspace(-0.05, 0.25, 120)]
@@ -184,8 +186,8 @@ def main() -> None:
         [summary(name, points) for name, points in parts.items()],
     )  # fmt: skip
     with plt.rc_context({"font.size": 9, "axes.linewidth": 0.7}):
-        picture(sweep, before, after)
-    print(f"Picture: {PICTURE.relative_to(ROOT)}; {time.process_time() - begin:.0f} s")
+        picture(path, sweep, before, after)
+    print(f"Picture: {path}; {time.process_time() - begin:.0f} s")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 
 import matplotlib as mpl
 
@@ -14,13 +13,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import models
-from benchmarks.common import ROOT, heading, table
+from benchmarks.common import ROOT, file_in, heading, options, table
 from hybrid import DOP853, HybridArc, Tsit5, simulate
 from hybrid.plot import COLOURS
 from hybrid.solvers import Solver
 
 # Tolerance without effect, so that all steps have the given size.
-LOOSE = 1e6
+LOOSE = {"rtol": 1.0, "atol": 1e6}
 STEPS = {DOP853: 2.0 ** -np.arange(-1, 4.5, 0.5), Tsit5: 2.0 ** -np.arange(1, 8.5, 0.5)}
 FLOOR = 2e-12
 
@@ -52,12 +51,13 @@ def slope(steps: np.ndarray, errors: np.ndarray) -> float:
 
 
 def main() -> None:
+    given = options(__doc__).parse_args()
     heading("Global error over 20 impacts of the impact oscillator at a fixed step, against the closed form.")
     error = oscillator_error()
     figure, axes = plt.subplots(figsize=(5.2, 3.8), layout="constrained")
     rows = []
     for index, (method, steps) in enumerate(STEPS.items()):
-        errors = np.array([error(method(rtol=LOOSE, atol=LOOSE, max_step=h)) for h in steps])
+        errors = np.array([error(method(**LOOSE, max_step=h)) for h in steps])
         order = method.tableau.order
         measured = slope(steps, errors)
         rows.append([method.__name__, str(order), f"{measured:.2f}", f"{np.nanmin(errors):.1e}"])
@@ -73,9 +73,9 @@ def main() -> None:
     axes.set_ylabel("error after 20 impacts")
     axes.legend(frameon=False)
     axes.spines[["top", "right"]].set_visible(False)
-    path = Path(__file__).with_name("order.png")
+    path = file_in(given.output, "order.png")
     figure.savefig(path, dpi=150, metadata={"Software": None})
-    print(f"Picture: {path.relative_to(ROOT)}; the slope of a dotted line is the order of the method.")
+    print(f"Picture: {path}; the slope of a dotted line is the order of the method.")
 
 
 if __name__ == "__main__":

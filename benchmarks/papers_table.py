@@ -6,7 +6,6 @@ Each takes some minutes.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import models
-from benchmarks.common import heading, table
+from benchmarks.common import file_in, heading, options, table
 from lyapunov import lyapunov_spectrum
 from lyapunov.study.column import LAST_ROW, printed, running, steady
 from lyapunov.study.impact import by_ode23s, impacts, measure
@@ -147,12 +146,12 @@ def text(value: float | None) -> str:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("part", choices=("rows", "scan", "prediction", "recurrence", "figure"))
-    options.add_argument("--rtol", type=float, default=PAPERS.rtol)
-    options.add_argument("--atol", type=float, default=PAPERS.atol)
-    options.add_argument("--omega", type=float, nargs="+", default=list(PAPER), help="those of the rows")
-    chosen = options.parse_args()
+    parser = options(__doc__)
+    parser.add_argument("part", choices=("rows", "scan", "prediction", "recurrence", "figure"))
+    parser.add_argument("--rtol", type=float, default=PAPERS.rtol)
+    parser.add_argument("--atol", type=float, default=PAPERS.atol)
+    parser.add_argument("--omega", type=float, nargs="+", default=list(PAPER), help="those of the rows")
+    chosen = parser.parse_args()
     started = time.perf_counter()
     heading(f"The founding system by ode23s straight through: {chosen.part}")
     if chosen.part == "rows":
@@ -165,9 +164,9 @@ def main() -> None:
     elif chosen.part == "recurrence":
         recurrence()
     else:
-        from benchmarks.papers_table_figure import figure
+        from benchmarks.papers_table_figure import PICTURE, figure
 
-        figure()
+        figure(file_in(chosen.output, PICTURE))
     print(f"{time.perf_counter() - started:.0f} s")
 
 

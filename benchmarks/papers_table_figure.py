@@ -8,13 +8,14 @@ mpl.use("Agg")
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import models
-from benchmarks.common import ROOT, table
+from benchmarks.common import table
 from hybrid import DOP853, HybridSystem, Taylor
 from hybrid.plot import COLOURS
 from lyapunov import lyapunov_spectrum
@@ -35,7 +36,7 @@ from lyapunov.study.paper import PAPER
 from lyapunov.study.runs import STARTS
 from lyapunov.study.tangents import uncontrolled_exponents, with_tangent
 
-PICTURE = ROOT / "docs" / "papers_table.png"
+PICTURE = "papers_table.png"
 SYSTEM = models.vibroimpact()
 STRAIGHT, EXTENDED = straight_through(SYSTEM), with_tangent(SYSTEM)
 TOLERANCES = tuple(10.0**-digits for digits in range(3, 9))
@@ -136,7 +137,7 @@ def errors(method: Method, tolerance: float, omega: float, windows: list[Impact]
     )
 
 
-def figure() -> None:
+def figure(path: Path) -> None:
     """Compute, print and draw the errors."""
     figure, grid = plt.subplots(4, 3, figsize=(9.6, 10.2), sharex=True, sharey="row", layout="constrained")
     rows = []
@@ -181,7 +182,7 @@ def figure() -> None:
     grid[0, 0].invert_xaxis()
     handles, labels = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2, frameon=False, fontsize=9)
-    figure.savefig(PICTURE, dpi=130, metadata={"Software": None})
+    figure.savefig(path, dpi=130, metadata={"Software": None})
     plt.close(figure)
     table(["omega", "method", "tolerance", *QUANTITIES], rows)
-    print(f"Picture: {PICTURE.relative_to(ROOT)}")
+    print(f"Picture: {path}")

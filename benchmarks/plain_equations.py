@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import statistics
-import sys
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -22,13 +21,13 @@ import numpy as np
 from scipy.integrate import DOP853
 
 import models
-from benchmarks.common import ROOT, heading, table
+from benchmarks.common import file_in, heading, options, table
 from hybrid import HybridSystem, from_equations, simulate
 from lyapunov import lyapunov_spectrum
 from lyapunov.plot import COLOURS, INK, style
 from tests.reference.plain_models import PLAIN, pair
 
-PICTURE = ROOT / "docs" / "plain_equations.png"
+PICTURE = "plain_equations.png"
 WIDTHS = (1e-1, 1e-2, 1e-3, 1e-4)
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 INTERVALS = 200
@@ -184,7 +183,10 @@ def estimates(oscillator: Oscillator) -> Iterator[tuple[str, str, np.ndarray, fl
 
 def main() -> None:
     """Make the picture and print its numbers."""
-    if "--cost" in sys.argv[1:]:
+    parser = options(__doc__)
+    parser.add_argument("--cost", action="store_true", help="only the times of split and written models")
+    given = parser.parse_args()
+    if given.cost:
         cost()
         return
     colours = dict(zip(("straight", "smoothed", "split"), COLOURS, strict=False))
@@ -224,7 +226,7 @@ def main() -> None:
         handles = [plt.Line2D([], [], color=colour, marker="o") for colour in colours.values()]
         names = ["straight through (SciPy, by tolerance)", "smoothed (tanh, by width)", "split"]
         figure.legend(handles, names, loc="outside lower center", ncols=3)
-        figure.savefig(PICTURE, dpi=150)
+        figure.savefig(file_in(given.output, PICTURE), dpi=150)
 
 
 def cost() -> None:

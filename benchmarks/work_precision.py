@@ -118,10 +118,10 @@ def main() -> None:
     parser.add_argument("--peers", nargs="*", choices=PEERS, default=list(PEERS), help="all by default")
     parser.add_argument("--only", nargs="*", default=None, help="beginnings of the short names of problems")
     parser.add_argument("--full", action="store_true", help="also print every run")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder of the pictures")
+    parser.add_argument("--output", type=Path, default=Path("pictures"), help="folder of the pictures")
     arguments = parser.parse_args()
     heading("Error against processor time: this library and its peers, one thread each.")
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    arguments.output.mkdir(parents=True, exist_ok=True)
     found = list(peers(arguments.peers))
     print(f"Load at the start: {os.getloadavg()[0]:.1f}\n")
     results: dict[str, dict[str, WorkPrecision]] = {}
@@ -137,7 +137,7 @@ def main() -> None:
             print(result)
         compare(result)
         # Draw after every problem, so that an interrupted run leaves a picture.
-        draw(results[group], arguments.out / f"work_precision_{group}.png")
+        draw(results[group], arguments.output / f"work_precision_{group}.png")
     print(f"Load at the end: {os.getloadavg()[0]:.1f}")
 
 

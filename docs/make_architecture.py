@@ -115,8 +115,9 @@ def draw(graph: nx.DiGraph, path: Path) -> None:
 def main() -> None:
     """Draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=HERE / "architecture.png")
-    path = parser.parse_args().output
+    parser.add_argument("--output", type=Path, default=Path("pictures"), help="folder of the picture")
+    path = parser.parse_args().output / "architecture.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
     draw(rooms(), path)
     print(path)
 

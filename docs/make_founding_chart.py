@@ -46,6 +46,7 @@ def main() -> None:
     parser.add_argument("--every", type=int, nargs="+", default=[4, 2, 1], help="strides of the grids")
     parser.add_argument("--threads", type=int)
     parser.add_argument("--draw", action="store_true", help="draw what the store holds, compute nothing")
+    parser.add_argument("--output", type=Path, default=Path("pictures"), help="folder of the picture")
     arguments = parser.parse_args()
     for every in () if arguments.draw else arguments.every:
         begin, processor = time.perf_counter(), time.process_time()
@@ -64,10 +65,11 @@ def main() -> None:
             f"{time.process_time() - processor:.0f} s of processor time",
             flush=True,
         )
-    draw(arguments.store)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    draw(arguments.store, arguments.output)
 
 
-def draw(store: Path) -> None:
+def draw(store: Path, folder: Path) -> None:
     """The largest exponent and the kinds of motion, with the paper's regimes as points."""
     swept = hybrid.open_store(store)
     # Lines that are not complete yet are left out.
@@ -89,7 +91,7 @@ def draw(store: Path) -> None:
                     fontsize=8,
                     bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 1},
                 )
-        figure.savefig(HERE / "founding_chart.png", dpi=130)
+        figure.savefig(folder / "founding_chart.png", dpi=130)
 
 
 if __name__ == "__main__":

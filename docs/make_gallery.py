@@ -73,7 +73,9 @@ def page(found: list[Picture]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=HERE, help="folder for gallery.md and gallery/")
+    parser.add_argument(
+        "--output", type=Path, default=Path("pictures"), help="folder of the page and of gallery/"
+    )
     parser.add_argument("models", nargs="*", help="names of models to draw, by default all")
     arguments = parser.parse_args()
     found = pictures()

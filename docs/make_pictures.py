@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ def model_of(page: Path, name: str) -> HybridSystem:
     return namespace[name]
 
 
-def rattler_picture(system: HybridSystem) -> None:
+def rattler_picture(system: HybridSystem, folder: Path) -> None:
     """Time series, phase portrait with an unstable periodic orbit, and section of the chaotic attractor."""
     period = system.forcing_period()
     arc = simulate(system, (0.5, 0.0), (0.0, 16 * period))
@@ -75,22 +76,22 @@ def rattler_picture(system: HybridSystem) -> None:
     strobe.set_xlabel("position q")
     strobe.tick_params(labelleft=False)
     strobe.spines[["top", "right"]].set_visible(False)
-    save(figure, HERE / "rattler.png")
+    save(figure, folder / "rattler.png")
 
 
-def graph_picture(system: HybridSystem) -> None:
+def graph_picture(system: HybridSystem, folder: Path) -> None:
     figure, axes = plt.subplots(figsize=(5.6, 2.3), layout="constrained")
     plot_graph(system, ax=axes)
-    save(figure, HERE / "graph.png")
+    save(figure, folder / "graph.png")
 
 
-def split_picture(system: HybridSystem) -> None:
+def split_picture(system: HybridSystem, folder: Path) -> None:
     figure, axes = plt.subplots(figsize=(6.4, 4.6), layout="constrained")
     plot_graph(system, ax=axes)
-    save(figure, HERE / "split_graph.png")
+    save(figure, folder / "split_graph.png")
 
 
-def chart_picture(system: HybridSystem) -> None:
+def chart_picture(system: HybridSystem, folder: Path) -> None:
     """Sections and exponents over the forcing frequency, with the attractor followed from row to row."""
     with style():
         swept = chart(
@@ -106,7 +107,7 @@ def chart_picture(system: HybridSystem) -> None:
         figure = plot_chart(swept)
         figure.axes[0].set_ylabel("position q, once per period")
         figure.axes[1].set_xlabel("forcing frequency w")
-        save(figure, HERE / "chart.png")
+        save(figure, folder / "chart.png")
 
 
 def save(figure: Any, path: Path) -> None:
@@ -126,12 +127,16 @@ def quantise(path: Path) -> None:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, default=Path("pictures"), help="folder of the pictures")
+    folder = parser.parse_args().output
+    folder.mkdir(parents=True, exist_ok=True)
     with plt.rc_context(STYLE):
         system = model_of(README, "rattler")
-        rattler_picture(system)
-        graph_picture(system)
-        split_picture(model_of(PLAIN, "oscillator"))
-        chart_picture(system)
+        rattler_picture(system, folder)
+        graph_picture(system, folder)
+        split_picture(model_of(PLAIN, "oscillator"), folder)
+        chart_picture(system, folder)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
-from hybrid.orbits.periodic_orbit import PeriodicOrbit, periodic_orbit
+from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section
 from hybrid.simulation.arc import Grazing, HybridArc, Jump
 from hybrid.simulation.saltation import saltation_matrix

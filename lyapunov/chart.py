@@ -166,7 +166,8 @@ class Exponents:
             "jumps_per_interval": spectrum.jumps_per_interval,
             "x_end": spectrum.x,
             "mode_end": spectrum.mode,
-            "section": self._section(rows, point, trajectory, spectrum),
+            # An axis of length zero could not be read back from a file.
+            **({"section": self._section(rows, point, trajectory, spectrum)} if self.points else {}),
             "status": spectrum.status,
         }
 

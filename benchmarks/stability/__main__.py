@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.common import ROOT, heading, table
+from benchmarks.common import file_in, heading, options, table
 from benchmarks.stability.events import grazing_curves, restitution_curves, split_curves
 from benchmarks.stability.methods import Curves
 from benchmarks.stability.periods import phase_curves
@@ -34,9 +33,10 @@ def summary(panels: dict[str, Curves]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = options(__doc__)
     parser.add_argument("--periods", type=int, default=1_000_000, help="periods of panel f")
-    periods = parser.parse_args().periods
+    given = parser.parse_args()
+    periods, path = given.periods, file_in(given.output, PICTURE)
     heading("Where methods fail: errors against closed forms, and miscounted events.")
     jobs: dict[str, Callable[[], Curves]] = {
         "stiffness": stiffness_curves,
@@ -54,8 +54,8 @@ def main() -> None:
     print()
     summary(panels)
     with plt.rc_context({"font.size": 9, "axes.linewidth": 0.7}):
-        picture(panels, periods)
-    print(f"Picture: {PICTURE.relative_to(ROOT)}")
+        picture(panels, periods, path)
+    print(f"Picture: {path}")
 
 
 if __name__ == "__main__":

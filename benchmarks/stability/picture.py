@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -11,12 +12,11 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.common import ROOT
 from benchmarks.stability.events import MOST_EVENTS, NEVER
 from benchmarks.stability.methods import STYLES, Curves
 from hybrid.plot import COLOURS
 
-PICTURE = ROOT / "docs" / "stability.png"
+PICTURE = "stability.png"
 PLAIN = {"linewidth": 1.1, "markersize": 3.4, "markeredgewidth": 0.9}
 
 
@@ -38,7 +38,7 @@ def finish(axes: Any, letter: str, title: str, xlabel: str, ylabel: str) -> None
     axes.tick_params(which="minor", length=0)
 
 
-def picture(panels: dict[str, Curves], periods: int) -> None:
+def picture(panels: dict[str, Curves], periods: int, path: Path) -> None:
     figure, grid = plt.subplots(2, 3, figsize=(11.4, 7.4))
     stiff, grazing, restitution, damping, split, phase = grid.ravel()
 
@@ -96,4 +96,4 @@ def picture(panels: dict[str, Curves], periods: int) -> None:
             shown.setdefault(label, handle)
     figure.tight_layout(rect=(0, 0.095, 1, 1), w_pad=2.0, h_pad=2.0)
     figure.legend(shown.values(), shown.keys(), loc="lower center", ncols=5, frameon=False, fontsize=8.5)
-    figure.savefig(PICTURE, dpi=150, metadata={"Software": None})
+    figure.savefig(path, dpi=150, metadata={"Software": None})

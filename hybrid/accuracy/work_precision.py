@@ -32,6 +32,8 @@ CHECK = DOP853(rtol=1e-13, atol=1e-15)
 # Short runs are repeated for this many seconds: the first ones depend on what ran before them.
 SETTLED = 0.05
 MOST_REPEATS = 1000
+# An error that cannot be told from zero.
+BELOW = "below the reference's"
 
 Method = Solver | Callable[[float], Any]
 
@@ -151,7 +153,7 @@ class WorkPrecision:
             [
                 str(self.method[i]),
                 f"{self.tolerance[i]:.0e}",
-                *(_figure(column[i], ".1e") for column in self.error.values()),
+                *(_error(column[i], self.reference_error[name]) for name, column in self.error.items()),
                 _figure(1e3 * self.seconds[i], ".3f"),
                 _figure(1e3 * self.compile_seconds[i], ".0f"),
                 _figure(self.steps[i], ".0f"),
@@ -408,6 +410,11 @@ def _measured(
         events=np.nan if answer.times is None else len(answer.times),
         status=result.status.code.name if isinstance(result, HybridArc) else "SUCCESS",
     )
+
+
+def _error(value: float, floor: float) -> str:
+    """An error as text; one below that of the reference, which may be the same method, is not known."""
+    return BELOW if value == 0.0 or value < floor else _figure(value, ".1e")
 
 
 def _figure(value: float, form: str) -> str:

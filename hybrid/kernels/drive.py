@@ -150,11 +150,11 @@ def is_full(record):
 
 @njit(**KERNEL)
 def remember_scale(model, run, work):
-    """Keep the sizes of the state's components in ``work.settled`` if the state is on a guard."""
+    """Keep the sizes of the state's components in ``work.scale_before`` if the state is on a guard."""
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         if run.on_guard[model.outgoing[slot]] > 0:
             for i in range(model.dimension):
-                work.settled[i] = run.scale[i]
+                work.scale_before[i] = run.scale[i]
             return True
     return False
 
@@ -173,7 +173,7 @@ def keep_scale(model, run, on_guard, t, work):
     band = rounding_band(model, run, fired, t, run.y, work)
     if on_guard and value > band:
         for i in range(model.dimension):
-            run.scale[i] = max(run.scale[i], work.settled[i])
+            run.scale[i] = max(run.scale[i], work.scale_before[i])
         band = rounding_band(model, run, fired, t, run.y, work)
     bent = model.propagator[run.mode] == RUNGE_KUTTA and model.affine_guard[fired] == 0
     if bent and band < value <= MOST_ROUNDING * band:

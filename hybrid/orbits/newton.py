@@ -5,9 +5,9 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from hybrid.orbits.rest import EPSILON, Drift
 from hybrid.status import Status
 
-EPSILON = float(np.finfo(float).eps)
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
 ROUNDING_OF_GAP = 100
@@ -32,9 +32,9 @@ class Point:
 class Shot:
     """What one integration over the period gives.
 
-    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``hidden
-    (n,)`` is the part of the gap that is lost in the rounding of components that hardly move. ``beyond``
-    names the transitions whose guards the start lies beyond.
+    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``drift``
+    knows how far components at rest are carried. ``beyond`` names the transitions whose guards the start lies
+    beyond.
     """
 
     point: Point
@@ -47,13 +47,24 @@ class Shot:
     extent: np.ndarray
     magnitude: np.ndarray
     status: Status
-    hidden: np.ndarray | float = 0.0
+    drift: Drift | None = None
     beyond: tuple[str, ...] = ()
 
     @property
     def gap(self) -> np.ndarray:
         """Distance ``(n,)`` from the start to the end."""
-        return np.asarray(self.end - self.point.x + self.hidden)
+        gap = self.end - self.point.x
+        if self.drift is not None:
+            gap[self.drift.components] = self.drift.moved
+        return gap
+
+    @property
+    def slopes(self) -> np.ndarray:
+        """Derivatives ``(n, n)`` of the gap in the start."""
+        slopes = self.fundamental - np.eye(len(self.end))
+        if self.drift is not None:
+            slopes[self.drift.components] = self.drift.slopes
+        return slopes
 
     @property
     def whole(self) -> bool:
@@ -74,9 +85,17 @@ class Shot:
         """The residual in units of ``scale (n,)``, infinite where there is none."""
         return length(self.gap / scale) if self.whole else np.inf
 
-    def closes(self, tolerance: float, rounding: np.ndarray) -> bool:
-        """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component."""
-        return self.whole and bool(np.all(np.abs(self.gap) <= np.maximum(tolerance * self.extent, rounding)))
+    def closes(self, tolerance: float, rounding: np.ndarray, nothing: np.ndarray | float = 0.0) -> bool:
+        """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component.
+
+        Components at rest have to be carried nowhere, as far as their integrals and the states are known.
+        ``nothing (n,)`` counts as zero.
+        """
+        most = np.maximum(tolerance * self.extent, rounding)
+        if self.drift is not None:
+            known = np.maximum(tolerance * self.extent, ROUNDING_OF_GAP * EPSILON * self.magnitude)
+            most[self.drift.components] = self.drift.blur + np.abs(self.drift.slopes) @ known
+        return self.whole and bool(np.all(np.abs(self.gap) <= np.maximum(most, nothing)))
 
 
 @attrs.frozen(eq=False)
@@ -108,10 +127,24 @@ class Newton:
         scale = np.maximum(self.scale, better.magnitude)
         return attrs.evolve(self, scale=scale, moved=better.point.x - shot.point.x)
 
+    def measure(self, shot: Shot) -> np.ndarray:
+        """Units ``(n,)`` of the gap in which a step of one scale changes each component by about one.
+
+        A component at rest answers to its start, and to that of the others, by far less than one.
+        """
+        units = self.scale.copy()
+        if shot.drift is not None:
+            answers = np.abs(shot.drift.slopes * self.scale).max(axis=1)
+            own = units[shot.drift.components]
+            units[shot.drift.components] = np.where(answers > 0, answers, own)
+        return units
+
     def measurable(self, shot: Shot) -> bool:
         """Whether the gap and its derivatives in units of the scale are within the range of floats."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return bool(np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot))))
+            return bool(
+                np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot, self.scale)))
+            )
 
     def step(self, shot: Shot, smallest: float | None = None) -> tuple[np.ndarray, float]:
         """Newton step of the state and of the period.
@@ -119,7 +152,7 @@ class Newton:
         It leaves out the directions in which the matrix is smaller than a share ``smallest`` of its largest
         singular value: by default rounding.
         """
-        step = np.linalg.lstsq(self._matrix(shot), self._right(shot), rcond=smallest)[0]
+        step = np.linalg.lstsq(self._matrix(shot), self._right(shot, self.measure(shot)), rcond=smallest)[0]
         longer = step[-1] * shot.point.period if self.free_period else 0.0
         return step[: len(shot.end)] * self.scale, float(longer)
 
@@ -131,10 +164,11 @@ class Newton:
         """
         n = len(shot.end)
         left, sizes, _ = np.linalg.svd(self._matrix(shot))
-        parts = left.T @ self._right(shot)
+        units = self.measure(shot)
+        parts = left.T @ self._right(shot, units)
         far = left[:, np.abs(parts) > farthest * sizes]
-        along = far.T @ self._right(other)
-        return (far * along)[:n] * self.scale[:, None]
+        along = far.T @ self._right(other, units)
+        return (far * along)[:n] * units[:, None]
 
     def led_astray(self, shot: Shot, farthest: float) -> bool:
         """Whether the method went far along a direction in which the matrix is zero to rounding.
@@ -150,15 +184,15 @@ class Newton:
 
     def _matrix(self, shot: Shot) -> np.ndarray:
         """Derivatives of the gap, and of the place in the plane, in the state and in the period."""
-        n, scale = len(shot.end), self.scale
-        matrix = (shot.fundamental - np.eye(n)) / scale[:, None] * scale
+        units = self.measure(shot)
+        matrix = shot.slopes / units[:, None] * self.scale
         if not self.free_period:
             return matrix
-        speed = shot.end_field / scale * shot.point.period
+        speed = shot.end_field / units * shot.point.period
         return np.block([[matrix, speed[:, None]], [self._across()[None, :], np.zeros((1, 1))]])
 
-    def _right(self, shot: Shot) -> np.ndarray:
-        gap = shot.gap / self.scale
+    def _right(self, shot: Shot, units: np.ndarray) -> np.ndarray:
+        gap = shot.gap / units
         if not self.free_period:
             return -gap
         return np.append(-gap, -self._across() @ ((shot.point.x - self.anchor) / self.scale))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -14,10 +13,10 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
-from hybrid.orbits.hidden import FINEST_GAP, SAMPLES, hidden_gap
-from hybrid.orbits.labelled import described_orbit, labelled_orbit
-from hybrid.orbits.newton import EPSILON, ROUNDING_OF_GAP, Newton, Point, Shot, length
+from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
+from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_schur import ProductEigenvalues
+from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc, Jump
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
@@ -30,9 +29,10 @@ from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
 
-if TYPE_CHECKING:
-    import xarray
-
+# Points, besides the solver's own, that show how far an orbit moves.
+SAMPLES = 65
+# The smallest gap that Newton's method can reach, in units in the last place of the largest states.
+FINEST_GAP = 4
 # Newton steps are halved at most to this share.
 SHORTEST_STEP = 1 / 64
 # A period below this share of the guess is a point, not an orbit.
@@ -59,69 +59,6 @@ NEARER = 0.5
 NEARLY_SINGULAR = 1e-5
 
 
-@attrs.frozen(eq=False, repr=False)
-class PeriodicOrbit:
-    """A periodic orbit, or the best point that Newton's method reached.
-
-    Attributes
-    ----------
-    system, parameters
-        The model, and the values of all its parameters, by name.
-    x0, mode, t0
-        A point of the orbit ``(n,)``, its mode, and the time there.
-    period
-        Time until the orbit closes: for a forced system ``periods`` forcing periods.
-    multipliers
-        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1. Each has its own
-        relative accuracy, however small: they come from the factors of the fundamental matrix along the
-        orbit.
-    log_moduli
-        Natural logarithms of the moduli of the multipliers ``(n,)``, also of those out of the range of
-        floating-point numbers; minus infinity for a multiplier of zero.
-    fundamental
-        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues the multipliers are; for
-        an autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the
-        orbit it is a similar matrix).
-    residual
-        Distance between the two ends over the period, in the units of the state.
-    iterations
-        Newton iterations used.
-    signature
-        Names of the modes in the order they are visited.
-    transitions
-        Names of the transitions in the order they fire.
-    status
-        Whether Newton's method converged, and how far it got if not.
-    """
-
-    system: HybridSystem
-    parameters: Mapping[str, float]
-    x0: np.ndarray
-    mode: str
-    t0: float
-    period: float
-    multipliers: np.ndarray
-    log_moduli: np.ndarray
-    fundamental: np.ndarray
-    residual: float
-    iterations: int
-    signature: tuple[str, ...]
-    transitions: tuple[str, ...]
-    status: Status
-
-    def __repr__(self) -> str:
-        return described_orbit(self)
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
-        return labelled_orbit(self)
-
-    def arc(self, solver: Solver | None = None) -> HybridArc:
-        """The orbit over one period, with the jumps at both ends if it jumps at its point."""
-        span = (self.t0, self.t0 + self.period)
-        return simulate(self.system, self.x0, span, mode=self.mode, parameters=self.parameters, solver=solver)
-
-
 @growing
 def periodic_orbit(
     system: HybridSystem,
@@ -140,7 +77,7 @@ def periodic_orbit(
 
     A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An
     autonomous system closes after an unknown time near the guess ``period``; the returned point is the
-    solver's own point that is nearest to the guess.
+    solver's own point, away from jumps, that is nearest to the guess.
 
     Parameters
     ----------
@@ -237,11 +174,10 @@ class _Shooting:
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
         extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
-        at_rest = extent <= ROUNDING_OF_GAP * EPSILON * magnitude
-        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) == 0:
-            hidden = np.where(at_rest, hidden_gap(trajectory, arc, magnitude), 0.0)
-        else:
-            hidden = np.zeros(len(extent))
+        at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
+        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) <= MOST_JUMPS_LOOKED_AT:
+            again, end = self._trajectory(point, self.mode), point.t + point.period
+            carried = drift(again, end, arc.jumps.t, at_rest, magnitude)
         return Shot(
             point,
             mode,
@@ -253,7 +189,7 @@ class _Shooting:
             extent,
             magnitude,
             status_of(trajectory, code),
-            hidden,
+            carried,
             trajectory.beyond,
         )
 
@@ -290,20 +226,23 @@ class _Shooting:
         Where orbits come in families, the step along the family is arbitrary and may be long, so the step
         without it is tried too.
         """
-        full = newton.step(shot)
-        best = self._better(shot, shot, newton, full)
-        if best.size(newton.scale) > NEARER * shot.size(newton.scale):
-            best = self._better(best, shot, newton, newton.step(shot, NEARLY_SINGULAR))
+        full, units = newton.step(shot), newton.measure(shot)
+        best = self._better(shot, shot, units, full)
+        if best.size(units) > NEARER * shot.size(units):
+            best = self._better(best, shot, units, newton.step(shot, NEARLY_SINGULAR))
         part = 1.0
         while best is shot and part > SHORTEST_STEP:
             part /= 2
-            best = self._better(shot, shot, newton, full, part)
+            best = self._better(shot, shot, units, full, part)
         return None if best is shot else best
 
     def _better(
-        self, best: Shot, shot: Shot, newton: Newton, step: tuple[np.ndarray, float], part: float = 1.0
+        self, best: Shot, shot: Shot, units: np.ndarray, step: tuple[np.ndarray, float], part: float = 1.0
     ) -> Shot:
-        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better."""
+        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better.
+
+        Gaps are compared in ``units (n,)``.
+        """
         change, longer = step
         period = shot.point.period + part * longer
         if not period > 0:
@@ -315,7 +254,7 @@ class _Shooting:
             return best
         # A step through a guard leads to other events.
         crossed = set(trial.beyond) - set(shot.beyond)
-        return best if crossed or not trial.size(newton.scale) < best.size(newton.scale) else trial
+        return best if crossed or not trial.size(units) < best.size(units) else trial
 
     def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
@@ -369,12 +308,15 @@ class _Shooting:
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
 
     def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
-        """The same orbit from the point of its arc, both sides of jumps included, nearest to the guess."""
+        """The same orbit from the point of its arc, away from jumps, that is nearest to the guess."""
         arc = orbit.arc(self.solver)
         extent = np.ptp(arc.x, axis=0)
         # Distances in units of the orbit, so that those of the states do not matter.
         apart = (arc.x - guess.x) / np.where(extent > 0, extent, 1.0)
-        i = int(np.argmin(np.linalg.norm(apart, axis=1)))
+        times = arc.jumps.t
+        # On a jump, rounding would decide whether a run from the point makes it.
+        away = [np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t]
+        i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: Shot, iterations: int, status: Status) -> PeriodicOrbit:
@@ -421,10 +363,10 @@ class _Shooting:
     def _jumps(self, shot: Shot) -> list[Jump]:
         """The jumps of one period; those at its point are counted once."""
         arc = self._follow(shot.point, shot.point.period, shot.mode)
-        jumps, forcing = list(arc.jumps), self.system.forcing_period(self.parameters) or 0.0
-        if jumps and jumps[0].t == shot.point.t:
-            end = shot.point.t + shot.point.period
-            jumps = [jump for jump in jumps if not same_time(jump.t, end, forcing)]
+        jumps, begin, end = list(arc.jumps), shot.point.t, shot.point.t + shot.point.period
+        size = abs(begin) + shot.point.period
+        if jumps and same_time(jumps[0].t, begin, size):
+            jumps = [jump for jump in jumps if not same_time(jump.t, end, size)]
         return jumps
 
     def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
@@ -478,7 +420,7 @@ class _Shooting:
             )
         # A component that is below the solver's absolute tolerance throughout counts as zero.
         nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
-        if not shot.closes(tolerance, np.maximum(shot.rounding, nothing)):
+        if not shot.closes(tolerance, shot.rounding, nothing):
             return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
         noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
         if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):

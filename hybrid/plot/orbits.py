@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid import arguments
-from hybrid.orbits.periodic_orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_phase
 from hybrid.plot.style import as_component, axes_for, check_axes, colour_of, dot_area, legend, plain

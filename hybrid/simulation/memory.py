@@ -78,6 +78,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "state": (n,),
         "settled": (n,),
         "departure": (n,),
+        "scale_before": (n,),
         "saltation": (n, n),
         "sizes": (n, n),
         "rounding": (4, n),

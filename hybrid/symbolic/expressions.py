@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 import sympy
 from sympy.codegen.cfunctions import exp2, hypot
+from sympy.core.parameters import distribute
 
 from hybrid.symbolic.nodes import contains, interned, once
 
@@ -108,6 +109,13 @@ def power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
             return Together(base) ** exponent
     if not exponent.is_Rational:
         return base**exponent
+    # SymPy asks for the modulus of a base. That takes a factor -1 out, again and again where SymPy keeps it
+    # outside of sums.
+    with distribute(True):
+        return _rational_power(base, exponent)
+
+
+def _rational_power(base: sympy.Expr, exponent: sympy.Expr) -> sympy.Expr:
     if _is_even_power(base):
         inner, whole = base.args[0], base.exp * exponent
         return sympy.Pow(inner if exponent.is_Integer else Absolute(inner), whole)

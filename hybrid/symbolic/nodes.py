@@ -7,11 +7,12 @@ a loop gives 2^40 branches there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, TypeVar
 
 import sympy
+from sympy.core.parameters import distribute
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # A tree with more operations than this is not expanded: the time may grow with the square of its size.
@@ -157,5 +158,23 @@ def _replaced(
     if made is None:
         args = [_replaced(each, values, known) for each in node.args]
         changed = any(new is not old for new, old in zip(args, node.args, strict=True))
-        made = known[node] = node.func(*args) if changed else node
+        made = known[node] = rebuilt(node, args) if changed else node
     return made
+
+
+def expanded(expression: sympy.Expr) -> sympy.Expr:
+    """The expression with its products written out."""
+    with distribute(True):
+        return expression.expand()
+
+
+def rebuilt(node: sympy.Expr, args: Sequence[sympy.Expr]) -> sympy.Expr:
+    """A node with other arguments.
+
+    A function and a power take a factor -1 out of what they apply to, or ask for its sign. They do so again
+    and again where SymPy keeps such a factor outside of sums.
+    """
+    if not isinstance(node, sympy.Function | sympy.Pow):
+        return node.func(*args)
+    with distribute(True):
+        return node.func(*args)

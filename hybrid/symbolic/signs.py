@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import sympy
 
 from hybrid.symbolic.expressions import Absolute, Less, LessEqual, Maximum, Minimum, Select, Sign, Step
-from hybrid.symbolic.nodes import MOST_EXPANDED, contains, interned, is_larger_than
+from hybrid.symbolic.nodes import MOST_EXPANDED, contains, expanded, interned, is_larger_than
+
+# Expressions whose terms are remembered: they are compared with every guard.
+MOST_REMEMBERED = 4096
 
 
 def simplified(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
@@ -51,8 +55,18 @@ def sign_of(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> int:
     """1 if an expression is in ``known``, -1 if its negative is, else 0."""
     if is_larger_than(MOST_EXPANDED, expression):
         return 0
+    terms = _terms(expression)
     for positive in known:
+        others = _terms(positive)
+        if terms.keys() != others.keys():
+            continue
         for sign in (1, -1):
-            if (expression - sign * positive).expand() == 0:
+            if all(factor == sign * others[term] for term, factor in terms.items()):
                 return sign
     return 0
+
+
+@lru_cache(MOST_REMEMBERED)
+def _terms(expression: sympy.Expr) -> dict[sympy.Expr, sympy.Expr]:
+    """Factors of the terms of an expanded expression; zeros are left out."""
+    return {term: factor for term, factor in expanded(expression).as_coefficients_dict().items() if factor}

@@ -36,7 +36,7 @@ from hybrid.symbolic.expressions import (
     TruncatedRemainder,
     WholeQuotient,
 )
-from hybrid.symbolic.nodes import contains, is_larger_than, mentions, nodes_of, replaced, symbols_of
+from hybrid.symbolic.nodes import contains, expanded, is_larger_than, mentions, nodes_of, replaced, symbols_of
 from hybrid.symbolic.tracing import Symbols
 
 COMPARISONS = (Less, LessEqual, Equal)
@@ -151,14 +151,14 @@ def _monomials(height: sympy.Expr) -> dict[sympy.Expr, float] | None:
     """Coefficients of the products of symbols in a height; None if it is too long to be expanded."""
     if is_larger_than(MOST_TERMS, height):
         return None
-    return {name: float(factor) for name, factor in height.expand().as_coefficients_dict().items()}
+    return {name: float(factor) for name, factor in expanded(height).as_coefficients_dict().items()}
 
 
 def _core(height: sympy.Expr, symbols: Symbols) -> tuple[str, float, int]:
     """Text of a height without its constant and leading factor, the level, and the sign of the factor."""
     if is_larger_than(MOST_TERMS, height):
         return str(height), 0.0, 1
-    coefficients = height.expand().as_coefficients_dict()
+    coefficients = expanded(height).as_coefficients_dict()
     constant = float(coefficients.pop(ONE, ZERO))
     leading = next((float(coefficients[x]) for x in symbols.x if x in coefficients), None)
     terms = sorted((str(term), float(factor)) for term, factor in coefficients.items())
@@ -211,7 +211,8 @@ class Switches:
 
     def __init__(self, entries: Sequence[sympy.Expr], surfaces: Surfaces) -> None:
         self.surfaces = surfaces
-        self._root = self._stage(tuple(entries), {})
+        pulses = tuple(_pulses(entry, surfaces.symbols) for entry in entries)
+        self._root = self._stage(pulses, {})
 
     def resolved(self, sides: Mapping[int, int]) -> Resolved | int:
         """Expressions with the branches on given sides; or the first surface whose side is missing.
@@ -247,7 +248,7 @@ class Switches:
         """The stage that these expressions are in, up to the first switch whose side is not known."""
         with distribute(False):
             while (atom := _first_atom(entries, self.surfaces.symbols)) is not None:
-                branch = _rewritten(atom)
+                branch = _rewritten(atom, self.surfaces.symbols)
                 if branch is None:
                     height, argument = _height(atom)
                     height, sign = self._simpler(height, used)
@@ -309,7 +310,7 @@ def _first_atom(entries: Sequence[sympy.Expr], symbols: Symbols) -> sympy.Expr |
     return None
 
 
-def _rewritten(atom: sympy.Expr) -> sympy.Expr | None:
+def _rewritten(atom: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
     """An atom in terms of simpler ones; None if it is a simple one."""
     if isinstance(atom, Equal):
         # It holds on a surface only, not beside it.
@@ -326,7 +327,63 @@ def _rewritten(atom: sympy.Expr) -> sympy.Expr | None:
     if isinstance(atom, Truncate):
         [u] = atom.args
         return Select(Less(u, ZERO), Ceiling(u), Floor(u))
-    return None
+    return _fixed(atom, symbols)
+
+
+def _fixed(atom: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
+    """An atom that never switches, although it is written with variables; None if it may switch."""
+    if isinstance(atom, Equal):
+        return None
+    height, argument = _height(atom)
+    height = height if argument is None else argument
+    if is_larger_than(MOST_TERMS, height):
+        return None
+    height = expanded(height)
+    if mentions(height, symbols.variables):
+        return None
+    if isinstance(atom, Maximum | Minimum):
+        a, b = atom.args
+        return Select(Less(ZERO, height), *((a, b) if isinstance(atom, Maximum) else (b, a)))
+    return atom.func(*([ZERO] if isinstance(atom, Less | LessEqual) else []), height)
+
+
+def _pulses(entry: sympy.Expr, symbols: Symbols) -> sympy.Expr:
+    """An expression whose comparisons of a fraction with a constant have one surface: both ends of a pulse.
+
+    The fraction of ``u``, as in ``mod(t, 4) > 1``, is above ``d`` where ``cos(pi*d) > cos(2*pi*(u - d/2))``.
+    As a function of ``u`` the right side does not jump where the fraction does.
+    """
+    changes = {}
+    for atom in nodes_of((Less, LessEqual, Sign, Step), entry):
+        height = _height(atom)[0]
+        with distribute(True):
+            pulse = _pulse(height, symbols) if contains(height, (Floor, Remainder)) else None
+        if pulse is not None:
+            changes[atom] = atom.func(*([ZERO] if isinstance(atom, Less | LessEqual) else []), pulse)
+    return replaced(entry, changes) if changes else entry
+
+
+def _pulse(height: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
+    """A smooth height with the sign of ``g*(u - floor(u)) + c``; None if a height is not of this form."""
+    if is_larger_than(MOST_TERMS, height):
+        return None
+    quotients = {node: a - b * Floor(a / b) for node in nodes_of(Remainder, height) for a, b in [node.args]}
+    height = expanded(replaced(height, quotients))
+    floors = nodes_of(Floor, height)
+    if len(floors) != 1 or contains(height, Level):
+        return None
+    [floor] = floors
+    [u], slope = floor.args, -height.coeff(floor)
+    constant = expanded(height - slope * (u - floor))
+    if slope == 0 or contains(u, SWITCHING) or mentions(slope, symbols.variables):
+        return None
+    level = sympy.cancel(-constant / slope)
+    if not level.is_number:
+        return None
+    if not 0 < level < 1:
+        return slope if level <= 0 else -slope
+    middle = 2 * sympy.pi * (u - level / 2)
+    return slope * (sympy.cos(sympy.pi * level).evalf() - sympy.cos(middle))
 
 
 def _height(atom: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr | None]:

@@ -48,8 +48,8 @@ def check_landings(case: Case) -> None:
                     event_told(case, jump),
                     f"the reset gives {case.state_told(wanted)} there",
                     f"the reset gives {case.state_told(got)} at the neighbouring floating-point numbers",
-                    hint="the reset of this transition jumps at its guard, as np.mod, np.floor and comparisons "
-                    "do, but rounds the quantity otherwise. Write the same expression in guard and reset.",
+                    hint="the reset of this transition jumps at its guard, as np.mod and np.floor do, "
+                    "but rounds the quantity otherwise. Write the same expression in guard and reset.",
                 )
     if not seen:
         discard("no event of the flow has a reset")

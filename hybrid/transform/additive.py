@@ -14,7 +14,8 @@ from itertools import product
 import sympy
 from sympy.core.parameters import distribute
 
-from hybrid.symbolic.expressions import HALF, ZERO
+from hybrid.symbolic.expressions import HALF, ONE, ZERO, power
+from hybrid.symbolic.nodes import expanded
 
 Field = list[sympy.Expr]
 Matrix = list[list[sympy.Expr]]
@@ -51,7 +52,7 @@ def sliding_field(
             for i, entry in enumerate(middle)
         ]
     # A state that stays where it is must have the rate 0, not what is left by rounding.
-    return [ZERO if entry.expand() == 0 else entry for entry in field]
+    return [ZERO if expanded(entry) == 0 else entry for entry in field]
 
 
 def _parts(
@@ -63,7 +64,7 @@ def _parts(
     """
     top = vertex_field(dict.fromkeys(on, 2))
     lower = [vertex_field({**dict.fromkeys(on, 2), number: -2}) for number in on]
-    halves = [[(a - b).expand() * HALF for a, b in zip(top, each, strict=True)] for each in lower]
+    halves = [[expanded(a - b) * HALF for a, b in zip(top, each, strict=True)] for each in lower]
     middle = [entry - _sum(half[i] for half in halves) for i, entry in enumerate(top)]
     for signs in product((-1, 1), repeat=len(on)):
         if sum(sign < 0 for sign in signs) < 2:
@@ -71,7 +72,7 @@ def _parts(
         corner = vertex_field({number: 2 * sign for number, sign in zip(on, signs, strict=True)})
         for i, entry in enumerate(corner):
             added = middle[i] + _sum(sign * half[i] for sign, half in zip(signs, halves, strict=True))
-            if (entry - added).expand() != 0:
+            if expanded(entry - added) != 0:
                 return None
     return middle, halves
 
@@ -90,7 +91,7 @@ def _solved(matrix: Matrix, right: Field) -> Field | None:
     size = len(rows)
     for k in range(size):
         # A row with few entries keeps expressions small: mostly each surface has a contact of its own.
-        usable = [i for i in range(k, size) if rows[i][k].expand() != 0]
+        usable = [i for i in range(k, size) if expanded(rows[i][k]) != 0]
         if not usable:
             return None
         best = min(usable, key=lambda i: sum(entry != 0 for entry in rows[i][:size]))
@@ -98,9 +99,9 @@ def _solved(matrix: Matrix, right: Field) -> Field | None:
         pivot = rows[k]
         for i in range(size):
             if i != k and rows[i][k] != 0:
-                factor = rows[i][k] / pivot[k]
+                factor = rows[i][k] * power(pivot[k], -ONE)
                 rows[i] = [
                     ZERO if j == k else entry - factor * pivot[j] if pivot[j] != 0 else entry
                     for j, entry in enumerate(rows[i])
                 ]
-    return [rows[k][size] / rows[k][k] for k in range(size)]
+    return [rows[k][size] * power(rows[k][k], -ONE) for k in range(size)]

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray
 
 import hybrid
 import lyapunov
@@ -385,3 +386,17 @@ def test_without_a_period_the_second_row_starts_where_the_transient_of_the_first
     # Then the second row's own transient and intervals: 3.5 units of time at its own rate.
     size = np.exp(-0.1 * 1.5 - 0.2 * 3.5)
     np.testing.assert_allclose(two.x_end[1], size * np.array([np.cos(5.0), np.sin(5.0)]), atol=1e-8)
+
+
+def test_a_chart_without_sections_can_be_opened_again(tmp_path):
+    system = hybrid.HybridSystem(
+        state=("q",),
+        parameters={"w": 1.0},
+        modes=[hybrid.Mode("on", lambda t, x, p: (np.cos(p.w * t) - x.q,))],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    made = lyapunov.chart(system, {"w": [1.0, 1.2]}, (0.0,), intervals=5, transient=1)
+    made.to_netcdf(tmp_path / "chart.nc")
+    with xarray.open_dataset(tmp_path / "chart.nc") as read:
+        np.testing.assert_array_equal(read.exponents, made.exponents)
+        assert "section" not in read

@@ -11,6 +11,7 @@ import ast
 import gc
 import importlib
 import importlib.util
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ from hybrid.compiler.cache.folder import (
 )
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.interrupts import between_passes
-from hybrid.compiler.llvm.engine import processor
+from hybrid.compiler.llvm.engine import cpu, processor
 from hybrid.kernels.types.kinds import text_of
 from hybrid.symbolic.branches import PARSER
 
@@ -130,6 +131,8 @@ def import_numba() -> None:
     On import, the array functions look for SciPy's BLAS, which takes a fifth of a second. BLAS is available,
     since this package requires SciPy; functions that call BLAS look for it again.
     """
+    if os.environ.get("HYBRID_CPU"):
+        os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = cpu()
     from numba.np import linalg
 
     look = linalg.ensure_blas

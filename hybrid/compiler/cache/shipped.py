@@ -7,6 +7,7 @@ the kernels, so files that do not belong to the sources beside them are never lo
 
 from __future__ import annotations
 
+import os
 import platform
 import sys
 from functools import cache
@@ -36,8 +37,8 @@ class Base:
     needs: frozenset[str] = frozenset()
 
     def environment(self) -> dict[str, str]:
-        """Environment variables with which numba compiles for this processor."""
-        return {"NUMBA_CPU_NAME": self.name, "NUMBA_CPU_FEATURES": ""}
+        """Environment variables with which code is made for this processor."""
+        return {"HYBRID_CPU": self.name}
 
 
 _X86_64 = Base("x86-64-v3", frozenset({"avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"}))
@@ -52,9 +53,9 @@ def base() -> Base | None:
 
 @cache
 def _runs_here() -> bool:
-    """Whether this processor has all instructions of the base of its family."""
+    """Whether code for the base of this machine's family is wanted, and has only instructions known here."""
     family = base()
-    if family is None:
+    if family is None or os.environ.get("HYBRID_CPU", family.name) != family.name:
         return False
     found = binding.get_host_cpu_features()
     return all(found.get(each, False) for each in family.needs)

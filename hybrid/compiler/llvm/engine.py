@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -23,13 +24,27 @@ class Compiled:
     needs: Any = attrs.field(repr=False)
 
 
+def cpu() -> tuple[str, str]:
+    """LLVM's name of the processor that code is made for, and its features.
+
+    This is the processor of this machine, or the one that the environment variable ``HYBRID_CPU`` names: code
+    for ``x86-64``, for example, gives the same last digits on every processor of that family. Code for a
+    processor with more instructions than this machine's does not run here.
+    """
+    chosen = os.environ.get("HYBRID_CPU")
+    if chosen:
+        return chosen, ""
+    return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
 def _new_target(level: int = SPEED) -> Any:
-    """LLVM's description of the processor of this machine, and how much it optimises for it."""
+    """LLVM's description of the processor, and how much it optimises for it."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
+    name, features = cpu()
     return binding.Target.from_default_triple().create_target_machine(
-        cpu=binding.get_host_cpu_name(),
-        features=binding.get_host_cpu_features().flatten(),
+        cpu=name,
+        features=features,
         opt=level,
         reloc="default",
         codemodel="jitdefault",
@@ -44,7 +59,7 @@ target = cache(_new_target)
 def processor() -> str:
     """LLVM's version and the processor, on which machine code depends."""
     version = ".".join(map(str, binding.llvm_version_info))
-    return " ".join([version, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()])
+    return " ".join([version, *cpu()])
 
 
 @between_passes()

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import sympy
 
 from hybrid.compiler.emitted import Propagator
-from hybrid.compiler.propagators.equations import ELEMENTARY, Equations, columns_of_guards
+from hybrid.compiler.propagators.equations import Equations, columns_of_guards
 from hybrid.compiler.propagators.writing import write_series
 from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER
-from hybrid.symbolic.derivatives import partial_derivatives
-from hybrid.symbolic.nodes import contains, degree_of, mentions, replaced, symbols_of
+from hybrid.symbolic.nodes import degree_of
 from hybrid.symbolic.tracing import Symbols
-
-# Matrices are scaled up by at most the inverse of this.
-SMALLEST = 1e-300
-# Powers of a scaled matrix below this are zero but for rounding.
-VANISHED = 1e-13
 
 
 def polynomial(mode: Equations) -> Propagator | str:
@@ -43,33 +36,27 @@ def _polynomial(guard: sympy.Expr, symbols: Symbols) -> int:
 
 
 def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]], symbols: Symbols) -> int:
-    """Degree of the solutions in time if they are polynomials, else 0."""
-    if any(contains(entry, ELEMENTARY) and mentions(entry, (symbols.t,)) for entry in field):
-        return 0
-    if not _may_be_nilpotent(jacobian):
-        return 0
-    # x^(k + 1) = J x^(k) + d^k f/dt^k
-    rate, forcing = list(field), list(field)
-    for degree in range(1, 2 * len(field) + 4):
-        forcing = [row[0] for row in partial_derivatives(forcing, [symbols.t])]
-        rate = [
-            (push + sympy.Add(*(a * r for a, r in zip(row, rate, strict=True)))).expand()
-            for row, push in zip(jacobian, forcing, strict=True)
-        ]
-        if all(entry == 0 for entry in rate):
-            return degree
-    return 0
+    """Degree of the solutions in time if no component acts back on itself, else 0.
 
-
-def _may_be_nilpotent(matrix: Sequence[Sequence[sympy.Expr]]) -> bool:
-    """Whether a matrix of parameters may be nilpotent, tested at one random set of values."""
-    names = sorted({name for row in matrix for entry in row for name in symbols_of(entry)}, key=str)
-    drawn = np.random.default_rng(1).uniform(1.0, 2.0, len(names))
-    values = dict(zip(names, map(sympy.Float, drawn), strict=True))
-    try:
-        numbers = np.array([[float(replaced(entry, values)) for entry in row] for row in matrix])
-    except (TypeError, ValueError):
-        return True
-    scaled = numbers / max(np.abs(numbers).max(), SMALLEST)
-    power = np.linalg.matrix_power(scaled, len(matrix))
-    return not np.abs(power).max() > VANISHED
+    Then each rate is the integral of forcing and of components that come before it. A matrix whose entries
+    cancel may be nilpotent without that; its series is exact, too.
+    """
+    clock = frozenset({symbols.t})
+    forcing = [degree_of(entry, clock) for entry in field]
+    # Components are done once all that act on them are done.
+    acts_on: list[list[int]] = [[] for _ in field]
+    waiting = []
+    for i, row in enumerate(jacobian):
+        sources = [j for j, entry in enumerate(row) if entry != 0]
+        waiting.append(len(sources))
+        for j in sources:
+            acts_on[j].append(i)
+    degrees = [0 if entry == 0 else 1 + (known or 0) for entry, known in zip(field, forcing, strict=True)]
+    ready = [i for i, count in enumerate(waiting) if count == 0]
+    for j in ready:
+        for i in acts_on[j]:
+            degrees[i] = max(degrees[i], degrees[j] + 1)
+            waiting[i] -= 1
+            if waiting[i] == 0:
+                ready.append(i)
+    return max(1, *degrees) if len(ready) == len(field) and None not in forcing else 0

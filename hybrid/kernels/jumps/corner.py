@@ -86,7 +86,7 @@ def arrived(task):
     mode, t, found = run.mode, run.phase, NO_TRANSITION
     model.field(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
-        work.settled[i] = run.scale[i]
+        work.scale_before[i] = run.scale[i]
         run.scale[i] = abs(run.y[i])
     widen_scale(model, run, work)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -109,7 +109,7 @@ def arrived(task):
         if crossed and allowed(model, transition, t, run.y, work.scalar):
             found = transition
     for i in range(model.dimension):
-        run.scale[i] = max(run.scale[i], work.settled[i])
+        run.scale[i] = max(run.scale[i], work.scale_before[i])
     return found
 
 
@@ -181,8 +181,8 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
     """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
 
     The run lands beyond the guards of all that are due. Notes whether order matters. None if ``fired`` may
-    not fire or has only touched, and no other is due: the run then goes on from this point. What comes before the
-    guard there, and what after it, may differ by rounding alone, so its side is left to the next step: the
+    not fire or has only touched, and no other is due: the run then goes on from this point. What comes before
+    the guard there, and what after it, may differ by rounding alone, so its side is left to the next step: the
     crossing is behind, and cannot be found where it was refused.
     """
     _, model, _, run, record, work = task_of(task)

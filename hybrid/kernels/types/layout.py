@@ -290,7 +290,8 @@ class Work(Structure):
     ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
     along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
     (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``departure (n,)``, the state
-    before the step; ``saltation, sizes (n, n)``; ``rounding (4, n)``, how far the rates move, and the place
+    before the step; ``scale_before (n,)``, sizes of the state that the run goes back to;
+    ``saltation, sizes (n, n)``; ``rounding (4, n)``, how far the rates move, and the place
     where a guard's derivatives are asked for; ``path (d + 1, n)``, the powers of the step's interpolant;
     ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
     what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
@@ -320,6 +321,7 @@ class Work(Structure):
     state: VECTOR
     settled: VECTOR
     departure: VECTOR
+    scale_before: VECTOR
     saltation: MATRIX
     sizes: MATRIX
     rounding: MATRIX

@@ -348,3 +348,10 @@ def test_the_plot_has_a_line_a_method_and_its_name(lines):
 def test_arguments_that_do_not_fit(options, text):
     with pytest.raises(ArgumentError, match=text):
         work_precision(*FALL, **{"reference": EXACT, **options})
+
+
+def test_no_error_is_said_to_be_zero():
+    """The exact series is the reference, too: what it is off by is not known."""
+    found = work_precision(*FALL, **HALF, tolerances=(1e-6,), repeats=1)
+    assert "below the reference's" in str(found)
+    assert "0.0e+00" not in str(found).rpartition("the reference ")[0]

@@ -134,8 +134,3 @@ class TestNewton:
         np.testing.assert_allclose(np.abs(found), [[0.25], [0.0]], atol=1e-14)
         assert begun.drift(run, other, farthest=1e7).shape == (2, 0)
         assert begun.drift(run, other, farthest=0.5).shape == (2, 2)
-
-
-def test_what_rounding_hides_of_the_gap_is_added():
-    found = shot([1.0, 2.0], [1.5, 2.0], np.eye(2), hidden=np.array([0.0, 2.0**-60]))
-    assert found.gap.tolist() == [0.5, 2.0**-60]

@@ -45,7 +45,7 @@ def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes, plac
         **dict.fromkeys(("jacobian", "reset_jacobian"), (N, N + 1)),
         "gradient": (N + 1,),
         "scalar": (1,),
-        **dict.fromkeys(("field", "field_after", "state", "settled", "departure"), (N,)),
+        **dict.fromkeys(("field", "field_after", "state", "settled", "departure", "scale_before"), (N,)),
         **dict.fromkeys(("saltation", "sizes"), (N, N)),
         "rounding": (4, N),
         "path": (degree + 1, N),

@@ -127,7 +127,15 @@ def test_both_names_of_a_family_have_one_base():
 
 
 def test_they_are_compiled_for_the_oldest_processor_of_the_family(tmp_path, monkeypatch):
-    tell = "import sys, numba\nopen(sys.argv[1], 'w').write(str(numba.config.CPU_NAME))"
+    tell = "import os, sys\nopen(sys.argv[1], 'w').write(os.environ['HYBRID_CPU'])"
     monkeypatch.setattr(command, "PORTABLE", tell)
     command.compile_portable(1, tmp_path / "name")
     assert (tmp_path / "name").read_text() == shipped.base().name
+
+
+def test_they_are_not_loaded_where_code_for_another_processor_is_wanted(package, monkeypatch):
+    asked = stored(monkeypatch)
+    monkeypatch.setenv("HYBRID_CPU", "x86-64" if shipped.base().name != "x86-64" else "generic")
+    assert not loader.is_shipped(MODULE)
+    load()
+    assert asked == [MODULE]

@@ -1,0 +1,94 @@
+"""A periodic orbit, as the search for it leaves it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.closing import ROUNDING_OF_TIME
+from hybrid.orbits.labelled import described_orbit, labelled_orbit
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.simulate import simulate
+from hybrid.solvers import Solver
+from hybrid.status import Status
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
+
+# Share of the period after which a run is clear of the guards of jumps at its start.
+MOMENT = 1e-8
+
+
+@attrs.frozen(eq=False, repr=False)
+class PeriodicOrbit:
+    """A periodic orbit, or the best point that Newton's method reached.
+
+    Attributes
+    ----------
+    system, parameters
+        The model, and the values of all its parameters, by name.
+    x0, mode, t0
+        A point of the orbit ``(n,)``, its mode, and the time there.
+    period
+        Time until the orbit closes: for a forced system ``periods`` forcing periods.
+    multipliers
+        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1. Each has its own
+        relative accuracy, however small: they come from the factors of the fundamental matrix along the
+        orbit.
+    log_moduli
+        Natural logarithms of the moduli of the multipliers ``(n,)``, also of those out of the range of
+        floating-point numbers; minus infinity for a multiplier of zero.
+    fundamental
+        The saltated fundamental matrix over the period ``(n, n)``, whose eigenvalues the multipliers are; for
+        an autonomous system from the point, away from jumps, where the shooting was done (elsewhere on the
+        orbit it is a similar matrix).
+    residual
+        Distance between the two ends over the period, in the units of the state.
+    iterations
+        Newton iterations used.
+    signature
+        Names of the modes in the order they are visited.
+    transitions
+        Names of the transitions in the order they fire.
+    status
+        Whether Newton's method converged, and how far it got if not.
+    """
+
+    system: HybridSystem
+    parameters: Mapping[str, float]
+    x0: np.ndarray
+    mode: str
+    t0: float
+    period: float
+    multipliers: np.ndarray
+    log_moduli: np.ndarray
+    fundamental: np.ndarray
+    residual: float
+    iterations: int
+    signature: tuple[str, ...]
+    transitions: tuple[str, ...]
+    status: Status
+
+    def __repr__(self) -> str:
+        return described_orbit(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
+        return labelled_orbit(self)
+
+    def arc(self, solver: Solver | None = None) -> HybridArc:
+        """The orbit over one period; if it jumps at its point, from just after these jumps."""
+        after = self.t0 + max(MOMENT * self.period, ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period))
+        start = self._run(self.x0, self.t0, after, self.mode, solver)
+        if len(start.jumps) == 0 or not start.status.ok:
+            return self._run(self.x0, self.t0, self.t0 + self.period, self.mode, solver)
+        # The same jumps come just before the end.
+        return self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
+
+    def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
+        return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)

@@ -1,0 +1,91 @@
+"""Plain equations with switches in unusual places: the same end as an integration from switch to switch."""
+
+import numpy as np
+import pytest
+
+from hybrid import from_equations, simulate
+
+OUTER = [
+    np.sin,
+    np.cos,
+    np.tan,
+    np.tanh,
+    np.sinh,
+    np.cosh,
+    np.arcsin,
+    np.arccos,
+    np.arctan,
+    np.arcsinh,
+    np.arctanh,
+    np.cbrt,
+]
+
+
+@pytest.mark.parametrize("outer", OUTER)
+def test_functions_of_a_switch(outer):
+    """Below the switch the field is that of the lower branch alone."""
+    whole = from_equations(lambda t, x, p: (outer(0.3 * np.sign(x.q) - 0.3 * x.q) - 2,), state=("q",))
+    lower = from_equations(lambda t, x, p: (outer(-0.3 - 0.3 * x.q) - 2,), state=("q",))
+    found, wanted = (simulate(each, (-0.1,), (0.0, 0.3)) for each in (whole, lower))
+    np.testing.assert_allclose(found.x[-1], wanted.x[-1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rate", "wanted"),
+    [
+        (lambda q: np.maximum(q + 0.3, q - 0.2) - 2 * q, 0.3),
+        (lambda q: np.minimum(q + 0.3, q - 0.2) - 2 * q, -0.2),
+        (lambda q: np.where(q + 0.3 > q, 1.0, 2.0) - q, 1.0),
+        (lambda q: np.where(q + 0.3 < q, 1.0, 2.0) - q, 2.0),
+        (lambda q: np.clip(q, q - 1, q + 1) - 2 * q, 0.0),
+        (lambda q: np.floor(q + 1.5 - q) - q, 1.0),
+    ],
+)
+def test_a_switch_that_is_decided_makes_no_modes(rate, wanted):
+    system = from_equations(lambda t, x, p: (rate(x.q),), state=("q",))
+    assert len(system.modes) == 1
+    arc = simulate(system, (0.7,), (0.0, 3.0))
+    np.testing.assert_allclose(arc.x[-1], wanted + (0.7 - wanted) * np.exp(-3.0), rtol=1e-9)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.7, -5.3])
+@pytest.mark.parametrize(("period", "share"), [(4.0, 0.5), (4.0, 0.25), (2.0, 0.825), (3.0, 1e-3)])
+def test_a_duty_cycle_has_two_modes(period, share, offset):
+    """What is carried is the time above the threshold."""
+    pulse = lambda t: np.where(np.mod(t - offset, period) > share * period, 1.0, 0.0)  # noqa: E731
+    system = from_equations(lambda t, x, p: (pulse(t) + 0 * x.q,), state=("q",))
+    assert len(system.modes) == 2
+    end = offset + 7 * period
+    arc = simulate(system, (0.0,), (offset + 0.5 * share * period, end))
+    assert arc.status.ok
+    np.testing.assert_allclose(arc.x[-1], 7 * (1 - share) * period, rtol=1e-11)
+    # The ends of each pulse, but not the end of the run.
+    assert len(arc.jumps) in (13, 14)
+
+
+@pytest.mark.parametrize(
+    ("pulse", "wanted"),
+    [
+        (lambda t: np.mod(t, 4.0) > 5.0, 0.0),
+        (lambda t: np.mod(t, 4.0) < 5.0, 1.0),
+        (lambda t: np.mod(t, 4.0) > -1.0, 1.0),
+        (lambda t: np.mod(t, -4.0) > 0.5, 0.0),
+    ],
+)
+def test_a_threshold_that_is_never_passed_makes_no_modes(pulse, wanted):
+    system = from_equations(lambda t, x, p: (np.where(pulse(t), 1.0, 0.0) + 0 * x.q,), state=("q",))
+    assert len(system.modes) == 1
+    arc = simulate(system, (0.0,), (0.3, 9.0))
+    assert len(arc.jumps) == 0
+    np.testing.assert_allclose(arc.x[-1], wanted * 8.7, rtol=1e-12)
+
+
+def test_levels_of_one_fraction():
+    def level(t, x, p):
+        place = np.mod(t, p.T)
+        return (np.where(place < 0.25 * p.T, 1.0, np.where(place < 0.5 * p.T, 2.0, 0.0)) + 0 * x.q,)
+
+    system = from_equations(level, state=("q",), parameters={"T": 3.0})
+    assert len(system.modes) == 3
+    arc = simulate(system, (0.0,), (0.0, 8.0), parameters={"T": 2.0})
+    np.testing.assert_allclose(arc.x[-1], 4 * (0.5 * 1.0 + 0.5 * 2.0), rtol=1e-11)
