@@ -182,8 +182,8 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
 
     The run lands beyond the guards of all that are due. Notes whether order matters. None if ``fired`` may
     not fire or has only touched, and no other is due: the run then goes on from this point. What comes before
-    the guard there, and what after it, may differ by rounding alone, so its side is left to the next step: the
-    crossing is behind, and cannot be found where it was refused.
+    the guard there, and what comes after it, may differ by rounding alone, so its side is left to the next
+    step: the crossing is behind, and cannot be found where it was refused.
     """
     _, model, _, run, record, work = task_of(task)
     mode = run.mode
