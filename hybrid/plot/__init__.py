@@ -57,8 +57,8 @@ def drawn(result: Any, **options: Any) -> Any:
         # Any sweep has these two, a chart too, so the names above come first.
         return plot_sweep(result, **options)
     wanted = (
-        "be a system, an arc, a section, an orbit, a spectrum, jumps, a GlobalError, a comparison of models, or "
-        "a dataset of chart, simulate_many or sweep; print other results"
+        "be a system, an arc, a section, an orbit, a spectrum, jumps, a GlobalError, a comparison of models, "
+        "or a dataset of chart, simulate_many or sweep; print other results"
     )
     raise arguments.refusal("result", wanted, result)
 

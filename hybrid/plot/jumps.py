@@ -113,12 +113,8 @@ def plot_global_error(
     axes[0].set_xlim(-0.5, system.dimension - 0.5)
     axes[0].set_ylabel("error of the last state")
     if len(bounds):
-        # A run that stops between a jump and its record has fewer times than bounds.
-        t = result.arc.jumps.t[: len(bounds)]
-        known = np.isfinite(bounds[: len(t)])
-        axes[1].plot(
-            t[known], np.maximum(bounds[: len(t)][known], LEAST), "o", color=COLOURS[0], markersize=4
-        )
+        t, known = result.arc.jumps.t, np.isfinite(bounds)
+        axes[1].plot(t[known], np.maximum(bounds[known], LEAST), "o", color=COLOURS[0], markersize=4)
         if not known.all():
             told = "not known: tighter runs jump differently"
             mark(axes[1], t[~known], "|", COLOURS[1], told)

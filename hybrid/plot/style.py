@@ -70,8 +70,8 @@ def axes_for(
 ) -> Rows:
     """The given axes, or those of a new figure in a column, as an array of ``count``.
 
-    The size of the figure is ``figsize`` if a caller gives one, else ``default``. Axes that are ``shared`` have
-    one abscissa.
+    The size of the figure is ``figsize`` if a caller gives one, else ``default``. Axes that are ``shared``
+    have one abscissa.
     """
     if figsize is not None:
         figsize = _as_figsize(figsize)
