@@ -71,6 +71,8 @@ __all__ = [
     "style",
 ]
 
+# Size of a mark of a failed row in points.
+MARK = 8.0
 FAILED = "failed, see chart.message"
 POINTS_OF_A_PORTRAIT = 40_000
 
@@ -125,7 +127,7 @@ def plot_phase_portrait(
     if marks is not None:
         # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
         spread = np.ptp(marks, axis=0) > SAME_POINT * np.ptp(orbit, axis=0) if len(marks) else False
-        area = dot_area(len(marks) if np.any(spread) else 1, size)
+        area = (2.0 if np.any(spread) else 26.0) if size is None else dot_area(1, size)
         ax.scatter(
             marks[:, i], marks[:, j], s=area, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
         )
@@ -170,10 +172,11 @@ def plot_exponents(
     figsize
         Width and height of a new figure in inches.
     size
-        Size of the marks of failed rows in points.
+        Size in points of the marks of failed rows; those of minus infinity have half of it.
     """
     name, values = _only_axis(as_chart(chart))
     exponents, errors = chart.exponents.values, chart.standard_error.values
+    length = MARK if size is None else arguments.positive("size", size, "be a positive size in points")
     (ax,) = axes_for(ax, 1, FIGURE, figsize)
     ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     order = np.argsort(values)
@@ -185,8 +188,8 @@ def plot_exponents(
         ax.fill_between(values[order], middle - error, middle + error, color=colour, alpha=0.25, linewidth=0)
         lost = values[order][np.isneginf(exponents[order, i])]
         if len(lost):
-            mark(ax, lost, "v", colour, f"$\\lambda_{{{i + 1}}}$: {MINUS_INFINITY}", size=4.0)
-    failed = _mark_failures(ax, chart, values, size)
+            mark(ax, lost, "v", colour, f"$\\lambda_{{{i + 1}}}$: {MINUS_INFINITY}", size=length / 2)
+    failed = _mark_failures(ax, chart, values, length)
     ax.set_xlabel(label_of(chart, name))
     ax.set_ylabel(with_unit("Lyapunov exponents", chart.exponents.attrs.get("units")))
     ax.grid(True, axis="y")
@@ -318,11 +321,10 @@ def _only_axis(chart: xarray.Dataset) -> tuple[str, np.ndarray]:
     return name, chart[name].values
 
 
-def _mark_failures(ax: Axes, chart: xarray.Dataset, values: np.ndarray, size: float | None = None) -> bool:
+def _mark_failures(ax: Axes, chart: xarray.Dataset, values: np.ndarray, length: float = MARK) -> bool:
     """Ticks at the bottom of the axes for the rows whose status is not ok; whether there are any."""
     bad = values[chart.status.values != StatusCode.SUCCESS]
     if len(bad):
-        length = 8.0 if size is None else arguments.positive("size", size, "be a positive size in points")
         mark(ax, bad, "|", "#B2182B", FAILED, size=length)
     return len(bad) > 0
 
