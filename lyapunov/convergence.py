@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Distinct for the colour-blind and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
 INK = "#333333"
-MINUS_INFINITY = "minus infinity, a jump takes the direction away"
+MINUS_INFINITY = "minus infinity"
 POINTS_OF_A_LINE = 1500
 FIGURE = (6.4, 3.8)
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from hybrid import ArgumentError, HybridArc, StatusCode, arguments
 from hybrid.display.tables import with_unit
 from hybrid.plot import DATASETS, drawn
-from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark
+from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark, small_legend
 from hybrid.simulation.labelled import Names
 from lyapunov.compare import ModelComparison
 from lyapunov.convergence import (
@@ -194,7 +194,7 @@ def plot_exponents(
     ax.set_ylabel(with_unit("Lyapunov exponents", chart.exponents.attrs.get("units")))
     ax.grid(True, axis="y")
     if exponents.shape[-1] > 1 or failed or np.isneginf(exponents).any():
-        ax.legend()
+        small_legend(ax)
     return ax
 
 
@@ -238,7 +238,7 @@ def plot_bifurcation(
     ax.scatter(across, up, s=area, color=COLOURS[0], linewidths=0, rasterized=True)
     ax.set_xlabel(label_of(chart, name))
     if _mark_failures(ax, chart, values):
-        ax.legend()
+        small_legend(ax)
     units = chart["unit"].values if "unit" in chart.coords else [""] * len(names)
     ax.set_ylabel(with_unit(names[i], str(units[i])))
     return ax

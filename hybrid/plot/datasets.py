@@ -10,7 +10,7 @@ from hybrid import arguments
 from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
 from hybrid.plot.orbits import second
-from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain
+from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain, small_legend
 from hybrid.status import StatusCode
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def plot_ends(
     ax.set_ylabel(labels[i if j is None else j])
     plain(ax)
     if len(set(modes[good])) > 1 or not good.all():
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4, frameon=False, borderaxespad=0.2)
+        small_legend(ax)
     return ax
 
 
@@ -136,7 +136,7 @@ def plot_sweep(
     for row in axes if len(dims) == 2 else axes[-1:]:
         row.set_xlabel(_axis_label(swept, dims[-1]))
     if failed.any():
-        axes[0].legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, borderaxespad=0.2)
+        small_legend(axes[0])
     return axes
 
 

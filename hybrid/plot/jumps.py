@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.tables import with_unit
-from hybrid.plot.style import COLOURS, Rows, axes_for, colour_of, mark, plain
+from hybrid.plot.style import COLOURS, Rows, axes_for, colour_of, mark, plain, small_legend
 from hybrid.simulation.arc import HybridArc, Jumps
 from hybrid.simulation.labelled import Names
 
@@ -71,7 +71,7 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
     if seen and seen != ["transverse"]:
         for kind in seen:
             ax.plot([], [], MARKS[kind], color="0.35", label=kind)
-        ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=len(seen), frameon=False, borderaxespad=0.2)
+        small_legend(ax)
     return ax
 
 
@@ -108,7 +108,7 @@ def plot_global_error(
     axes[0].plot(places[known], np.maximum(result.x[known], LEAST), "o", color=COLOURS[0])
     if not known.all():
         mark(axes[0], places[~known], "^", COLOURS[1], "not known")
-        axes[0].legend()
+        small_legend(axes[0])
     axes[0].set_xticks(places, [names.label(name) for name in names.state])
     axes[0].set_xlim(-0.5, system.dimension - 0.5)
     axes[0].set_ylabel("error of the last state")
@@ -118,7 +118,7 @@ def plot_global_error(
         if not known.all():
             told = "not known: tighter runs jump differently"
             mark(axes[1], t[~known], "|", COLOURS[1], told)
-            axes[1].legend()
+            small_legend(axes[1])
         axes[1].set_xlabel(names.label("t"))
         axes[1].set_ylabel(with_unit("error of jump times", system.units.get("t")))
     for row in axes:

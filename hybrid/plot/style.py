@@ -138,13 +138,14 @@ def dot_area(count: int, size: float | None = None) -> float:
     return float(np.clip(4000 / max(count, 1), 1.0, 20.0))
 
 
-def small_legend(ax: Axes, handles: list[Any]) -> None:
-    """A legend above the axes that explains marks, in one row."""
+def small_legend(ax: Axes, handles: list[Any] | None = None) -> None:
+    """A legend above the axes, in one row, of the given handles or of what the axes hold."""
+    found = ax.get_legend_handles_labels()[0] if handles is None else handles
     ax.legend(
-        handles=handles,
+        handles=found,
         loc="lower right",
         bbox_to_anchor=(1, 1),
-        ncols=len(handles),
+        ncols=len(found),
         frameon=False,
         borderaxespad=0.2,
         fontsize=8,
