@@ -104,10 +104,10 @@ def chart_picture(system: HybridSystem, folder: Path) -> None:
             continue_from="w",
             solver=DOP853(rtol=1e-8, atol=1e-10),
         )
-        figure = plot_chart(swept)
-        figure.axes[0].set_ylabel("position q, once per period")
-        figure.axes[1].set_xlabel("forcing frequency w")
-        save(figure, folder / "chart.png")
+        above, below = axes = plot_chart(swept)
+        above.set_ylabel("position q, once per period")
+        below.set_xlabel("forcing frequency w")
+        save(axes.figure, folder / "chart.png")
 
 
 def save(figure: Any, path: Path) -> None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid import ArgumentError, StatusCode, arguments
-from hybrid.plot.style import axes_for, check_axes
+from hybrid.display.tables import with_unit
+from hybrid.plot.style import axes_for, check_axes, small_legend
 
 if TYPE_CHECKING:
     import xarray
@@ -17,6 +18,8 @@ FIGURE = (5.6, 4.4)
 KINDS = ("not known", "at rest", "periodic", "torus", "chaotic")
 # Grey where nothing is known; the others are distinct for the colour-blind, and in grey.
 COLOURS_OF_KINDS = ("#BFBFBF", "#FFFFFF", "#56B4E9", "#F0E442", "#B2182B")
+# Exponents of minus infinity; darker than any blue of the scale.
+LOST = "#10103F"
 # Share of the values that the colours tell apart: a few large exponents do not leave the rest pale.
 SHOWN = 0.98
 # Share of a step by which equally spaced values may differ.
@@ -37,8 +40,7 @@ def axes_of(chart: Any) -> tuple[str, ...]:
 
 def label_of(chart: xarray.Dataset, name: str) -> str:
     """Name of an axis, with its unit if that is known."""
-    unit = chart[name].attrs.get("units", "")
-    return f"{name} ({unit})" if unit else name
+    return with_unit(name, chart[name].attrs.get("units"))
 
 
 def settled(chart: xarray.Dataset) -> np.ndarray:
@@ -74,9 +76,16 @@ def kinds(chart: xarray.Dataset) -> xarray.DataArray:
     return chart.status.copy(data=np.where(known, found, 0)).assign_attrs(flags).rename("kind")
 
 
-def plot_map(chart: xarray.Dataset, exponent: int = 0, *, ax: Axes | None = None) -> Axes:
-    """Map of an exponent over two axes: red if positive, blue if negative, grey if not computed.
+def plot_map(
+    chart: xarray.Dataset,
+    exponent: int = 0,
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Axes:
+    """Map of an exponent over two axes: red if positive, blue if negative.
 
+    Rows that failed are grey, and exponents of minus infinity dark blue; a legend says so.
     An exponent within two standard errors of zero is drawn as zero, in white: noise does not look like chaos.
     The scale ends at the value that 98 % of the others do not exceed.
 
@@ -88,28 +97,44 @@ def plot_map(chart: xarray.Dataset, exponent: int = 0, *, ax: Axes | None = None
         Index of the exponent, 0 for the largest.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
 
     Raises
     ------
     ArgumentError
         If the chart is not over two axes.
     """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
     check_axes(ax)
     exponent = arguments.count("exponent", exponent, 0, as_chart(chart).sizes["exponent"] - 1)
     two_axes(chart)
     values = settled(chart)[..., exponent]
+    failed = (chart.status.values != StatusCode.SUCCESS) | np.isnan(values) | np.isposinf(values)
+    lost = np.isneginf(values) & ~failed
+    values = np.where(failed | lost, np.nan, values)
     sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
     limit = float(np.quantile(sizes, SHOWN)) if sizes.size else 1.0
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
     shades = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
     picture = _drawn(chart, np.ma.masked_invalid(values), ax, shades)
-    unit = chart.exponents.attrs.get("units", "")
-    label = f"$\\lambda_{{{exponent + 1}}}$" + (f" ({unit})" if unit else "")
+    label = with_unit(f"$\\lambda_{{{exponent + 1}}}$", chart.exponents.attrs.get("units"))
     ax.figure.colorbar(picture, ax=ax, extend="both", label=label)
+    marked = [(failed, COLOURS_OF_KINDS[0], "failed, see chart.message"), (lost, LOST, "minus infinity")]
+    if lost.any():
+        shade = {"cmap": ListedColormap([LOST]), "vmin": 0.0, "vmax": 1.0}
+        _drawn(chart, np.ma.masked_array(np.ones(lost.shape), ~lost), ax, shade)
+    handles = [Patch(facecolor=colour, label=text) for where, colour, text in marked if where.any()]
+    if handles:
+        small_legend(ax, handles)
     return ax
 
 
-def plot_kinds(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
+def plot_kinds(
+    chart: xarray.Dataset, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
+) -> Axes:
     """Map of the kinds of motion over two axes: periodic, torus, chaotic (see :func:`kinds`).
 
     Parameters
@@ -118,6 +143,8 @@ def plot_kinds(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
         From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
 
     Raises
     ------
@@ -130,7 +157,7 @@ def plot_kinds(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
     check_axes(ax)
     two_axes(as_chart(chart))
     found = kinds(chart).values
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
     shades = {"cmap": ListedColormap(COLOURS_OF_KINDS), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
     _drawn(chart, found, ax, shades)
     patches = [
@@ -168,8 +195,10 @@ def two_axes(chart: xarray.Dataset) -> tuple[str, str]:
     """Names of the two axes of a chart, or an ArgumentError."""
     names = axes_of(chart)
     if len(names) != 2:
+        taken = ", ".join(f"{name}=0" for name in names[:-2])
+        remedy = f"Take a plane: chart.isel({taken})." if taken else "Use plot_exponents."
         raise ArgumentError(
             f"chart must be over two parameters for a map; this one is over {' and '.join(names) or 'none'}. "
-            "Use plot_exponents for one, and take a plane of more with chart.sel."
+            f"{remedy}"
         )
     return names[0], names[1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
@@ -10,19 +10,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridArc, StatusCode, arguments
+from hybrid.display.tables import with_unit
 from hybrid.plot import DATASETS, drawn
-from hybrid.plot.style import as_component, axes_for, dot_area
+from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark, small_legend
+from hybrid.simulation.labelled import Names
+from lyapunov.compare import ModelComparison
+from lyapunov.convergence import (
+    COLOURS,
+    FIGURE,
+    INK,
+    MINUS_INFINITY,
+    numbers,
+    plot_convergence,
+    plot_spectrum,
+    plot_two_orbits,
+)
 from lyapunov.maps import as_chart, axes_of, kinds, label_of, plot_kinds, plot_map, two_axes
 from lyapunov.spectrum import LyapunovSpectrum
+from lyapunov.two_orbit import TwoOrbitExponents
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-# Distinct for the colour-blind and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
-INK = "#333333"
 # Points of a section that spread less than this share of the orbit are drawn as one fixed point.
 SAME_POINT = 1e-6
 STYLE: Any = {
@@ -50,18 +60,21 @@ __all__ = [
     "kinds",
     "plot_bifurcation",
     "plot_chart",
+    "plot_comparison",
     "plot_convergence",
     "plot_exponents",
     "plot_kinds",
     "plot_map",
     "plot_phase_portrait",
     "plot_spectrum",
+    "plot_two_orbits",
     "style",
 ]
 
-POINTS_OF_A_LINE = 1500
+# Size of a mark of a failed row in points.
+MARK = 8.0
+FAILED = "failed, see chart.message"
 POINTS_OF_A_PORTRAIT = 40_000
-FIGURE = (6.4, 3.8)
 
 
 def style() -> AbstractContextManager[None]:
@@ -69,64 +82,6 @@ def style() -> AbstractContextManager[None]:
     import matplotlib
 
     return matplotlib.rc_context(STYLE)
-
-
-def plot_convergence(
-    estimates: Mapping[str, ArrayLike],
-    *,
-    points: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
-    points_label: str = "published",
-    truth: float | None = None,
-    truth_label: str = "exact",
-    ax: Axes | None = None,
-) -> Axes:
-    """Estimates of an exponent against the number of intervals.
-
-    Parameters
-    ----------
-    estimates
-        Maps each label to its history ``(M,)`` over 1, 2, ..., M intervals.
-    points
-        Maps a label to a pair, numbers of intervals and values: other estimates, drawn in the label's colour.
-    truth
-        Exact value, drawn as a line.
-    points_label, truth_label
-        Names of the points and of the line in the legend.
-    ax
-        Axes to draw into; by default those of a new figure.
-    """
-    histories = {
-        label: _numbers(f"estimates[{arguments.shown(label)}]", estimate, 1)
-        for label, estimate in arguments.mapping("estimates", estimates, "map labels to histories").items()
-    }
-    points = {
-        label: _pair(f"points[{arguments.shown(label)}]", pair)
-        for label, pair in arguments.mapping("points", points, "map labels to numbers and values").items()
-    }
-    for name, text in (("points_label", points_label), ("truth_label", truth_label)):
-        arguments.instance(name, text, str)
-    truth = None if truth is None else arguments.number("truth", truth)
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
-    # Later lines are thinner, so that both of two coinciding lines are visible.
-    widths = (2.2, 0.9) if len(histories) > 1 else (1.3,)
-    if truth is not None:
-        ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
-    for i, (label, history) in enumerate(histories.items()):
-        at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
-        at = at[(at > 0) & (at <= len(history))]
-        width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
-        ax.plot(at, history[at - 1], color=colour, label=label, linewidth=width)
-        if label in points:
-            ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white")
-    if points:
-        ax.plot([], [], "o", color=INK, markersize=4.5, markerfacecolor="white", label=points_label)
-    ax.set_xscale("log")
-    ax.set_xlabel("intervals $M$")
-    ax.set_ylabel("exponent estimate")
-    ax.grid(True, axis="y")
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend()
-    return ax
 
 
 def plot_phase_portrait(
@@ -137,6 +92,8 @@ def plot_phase_portrait(
     section: ArrayLike | None = None,
     labels: tuple[str, str] | None = None,
     ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+    size: float | None = None,
 ) -> Axes:
     """Orbit in the plane of two state components, with jumps as straight lines and points of a section.
 
@@ -149,50 +106,34 @@ def plot_phase_portrait(
     section
         Points ``(N, n)`` to mark.
     labels
-        Labels of the axes; by default the names.
+        Labels of the axes; by default the names, with their units.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    size
+        Diameter of the dots of the section in points.
     """
     system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
     i, j = as_component("x", system.state_names, x), as_component("y", system.state_names, y)
-    marks = None if section is None else _numbers("section", section, 2)
+    marks = None if section is None else numbers("section", section, 2)
     if marks is not None and marks.shape[1] != system.dimension:
         raise arguments.refusal("section", f"hold points of {system.dimension} components", section)
-    across, up = axis_labels(labels, system.state_names[i], system.state_names[j])
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    names = Names(system.state_names, system.units)
+    across, up = axis_labels(labels, names.label(names.state[i]), names.label(names.state[j]))
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
     orbit = _dense(arc)
     ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
     if marks is not None:
         # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
         spread = np.ptp(marks, axis=0) > SAME_POINT * np.ptp(orbit, axis=0) if len(marks) else False
-        size = 2.0 if np.any(spread) else 26.0
+        area = (2.0 if np.any(spread) else 26.0) if size is None else dot_area(1, size)
         ax.scatter(
-            marks[:, i], marks[:, j], s=size, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
+            marks[:, i], marks[:, j], s=area, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
         )
     ax.set_xlabel(across)
     ax.set_ylabel(up)
     return ax
-
-
-def _numbers(name: str, value: object, axes: int) -> np.ndarray:
-    """An array of numbers with the given number of axes."""
-    wanted = f"be an array of numbers of {axes} dimension{'s' if axes > 1 else ''}"
-    found = arguments.numbers(name, value, wanted)
-    if found.ndim != axes:
-        raise arguments.refusal(name, wanted, value)
-    return found
-
-
-def _pair(name: str, value: object) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of intervals, and the values after them."""
-    wanted = "be two lists of numbers of one length"
-    both = arguments.items(name, value, wanted)
-    if len(both) != 2:
-        raise arguments.refusal(name, wanted, value)
-    at, values = (_numbers(name, each, 1) for each in both)
-    if len(at) != len(values):
-        raise arguments.refusal(name, wanted, value)
-    return at, values
 
 
 def axis_labels(labels: object, *names: str) -> tuple[str, str]:
@@ -213,48 +154,13 @@ def _dense(arc: HybridArc) -> np.ndarray:
     return np.concatenate([arc.x, arc(times)])[order]
 
 
-def plot_spectrum(spectrum: LyapunovSpectrum, *, ax: Axes | None = None) -> Axes:
-    """Estimates of the exponents against the number of intervals, with a bar of two standard errors.
-
-    Parameters
-    ----------
-    spectrum
-        From :func:`lyapunov.lyapunov_spectrum`, with its history.
-    ax
-        Axes to draw into; by default those of a new figure.
-
-    Raises
-    ------
-    ArgumentError
-        If the spectrum has no history.
-    """
-    arguments.instance("spectrum", spectrum, LyapunovSpectrum, "Make one with lyapunov.lyapunov_spectrum.")
-    if not len(spectrum.growths):
-        raise ArgumentError("spectrum must have a history; this one has none. Compute it with history=True.")
-    labels = [f"$\\lambda_{{{i + 1}}}$ = {value:.5g}" for i, value in enumerate(spectrum.exponents)]
-    history = {label: spectrum.history[:, i] for i, label in enumerate(labels)}
-    ax = plot_convergence(history, truth=0.0, truth_label="zero", ax=ax)
-    values, errors = spectrum.exponents, 2 * spectrum.standard_error
-    shown = np.isfinite(values)
-    for i in np.flatnonzero(shown):
-        ax.errorbar(
-            len(spectrum.growths),
-            values[i],
-            errors[i],
-            color=COLOURS[i % len(COLOURS)],
-            capsize=3,
-            linewidth=1,
-        )
-    # The first estimates are far off, so the limits fit the later nine tenths.
-    late = spectrum.history[len(spectrum.growths) // 10 :, shown].ravel()
-    inside = [*(values - errors)[shown], *(values + errors)[shown], *late, 0.0]
-    bottom, top = min(inside), max(inside)
-    margin = 0.1 * (top - bottom) or 1.0
-    ax.set_ylim(bottom - margin, top + margin)
-    return ax
-
-
-def plot_exponents(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
+def plot_exponents(
+    chart: xarray.Dataset,
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+    size: float | None = None,
+) -> Axes:
     """Exponents of a chart over one axis, with bands of two standard errors and a line at zero.
 
     Parameters
@@ -263,10 +169,15 @@ def plot_exponents(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
         From :func:`lyapunov.chart`, over one axis; ``.sel`` takes a line of a grid.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    size
+        Size in points of the marks of failed rows; those of minus infinity have half of it.
     """
     name, values = _only_axis(as_chart(chart))
     exponents, errors = chart.exponents.values, chart.standard_error.values
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
+    length = MARK if size is None else arguments.positive("size", size, "be a positive size in points")
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
     ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     order = np.argsort(values)
     for i in range(exponents.shape[-1]):
@@ -275,16 +186,26 @@ def plot_exponents(chart: xarray.Dataset, *, ax: Axes | None = None) -> Axes:
         colour = COLOURS[i % len(COLOURS)]
         ax.plot(values[order], middle, color=colour, linewidth=0.9, label=f"$\\lambda_{{{i + 1}}}$")
         ax.fill_between(values[order], middle - error, middle + error, color=colour, alpha=0.25, linewidth=0)
-    _mark_failures(ax, values[chart.status.values != StatusCode.SUCCESS])
+        lost = values[order][np.isneginf(exponents[order, i])]
+        if len(lost):
+            mark(ax, lost, "v", colour, f"$\\lambda_{{{i + 1}}}$: {MINUS_INFINITY}", size=length / 2)
+    failed = _mark_failures(ax, chart, values, length)
     ax.set_xlabel(label_of(chart, name))
-    ax.set_ylabel("Lyapunov exponents")
+    ax.set_ylabel(with_unit("Lyapunov exponents", chart.exponents.attrs.get("units")))
     ax.grid(True, axis="y")
-    if exponents.shape[-1] > 1:
-        ax.legend()
+    if exponents.shape[-1] > 1 or failed or np.isneginf(exponents).any():
+        small_legend(ax)
     return ax
 
 
-def plot_bifurcation(chart: xarray.Dataset, component: str | None = None, *, ax: Axes | None = None) -> Axes:
+def plot_bifurcation(
+    chart: xarray.Dataset,
+    component: str | None = None,
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+    size: float | None = None,
+) -> Axes:
     """Bifurcation diagram: points of the section over the parameter.
 
     Parameters
@@ -295,6 +216,10 @@ def plot_bifurcation(chart: xarray.Dataset, component: str | None = None, *, ax:
         Name of the state component to show; by default the first.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    size
+        Diameter of the dots in points; by default smaller for more dots.
 
     Raises
     ------
@@ -307,16 +232,27 @@ def plot_bifurcation(chart: xarray.Dataset, component: str | None = None, *, ax:
         raise ArgumentError("chart must have section points; this one has none. Compute it with section=100.")
     names = _state_names(chart)
     i = 0 if component is None else as_component("component", names, component)
-    (ax,) = axes_for(ax, 1, figsize=FIGURE)
     across, up = np.repeat(values, points), chart.section.values[:, :, i].ravel()
-    ax.scatter(across, up, s=dot_area(len(up)), color=COLOURS[0], linewidths=0, rasterized=True)
+    area = dot_area(len(up), size)
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    ax.scatter(across, up, s=area, color=COLOURS[0], linewidths=0, rasterized=True)
     ax.set_xlabel(label_of(chart, name))
-    ax.set_ylabel(names[i])
+    if _mark_failures(ax, chart, values):
+        small_legend(ax)
+    units = chart["unit"].values if "unit" in chart.coords else [""] * len(names)
+    ax.set_ylabel(with_unit(names[i], str(units[i])))
     return ax
 
 
-def plot_chart(chart: xarray.Dataset, component: str | None = None) -> Figure:
-    """A figure of a chart: exponents below a bifurcation diagram, or a map of the largest exponent.
+def plot_chart(
+    chart: xarray.Dataset,
+    component: str | None = None,
+    *,
+    ax: Axes | Iterable[Axes] | None = None,
+    figsize: tuple[float, float] | None = None,
+    size: float | None = None,
+) -> Rows:
+    """Draw a chart: exponents below a bifurcation diagram, or a map of the largest exponent.
 
     Parameters
     ----------
@@ -325,24 +261,42 @@ def plot_chart(chart: xarray.Dataset, component: str | None = None) -> Figure:
         diagram.
     component
         Name of the state component in the diagram; by default the first.
-    """
-    import matplotlib.pyplot as plt
+    ax
+        Axes to draw into, two if the chart has a section and one axis, else one; by default those of a new
+        figure.
+    figsize
+        Width and height of a new figure in inches.
+    size
+        Diameter of the dots of the diagram in points; by default smaller for more dots.
 
+    Returns
+    -------
+    numpy.ndarray
+        The axes from the top; ``.figure`` is their figure.
+
+    Raises
+    ------
+    ArgumentError
+        If the chart is over more than two axes; the text says how to take a plane.
+    """
+    if size is not None:
+        dot_area(1, size)
     if component is not None:
         as_component("component", _state_names(as_chart(chart)), component)
     if len(axes_of(as_chart(chart))) > 1:
         two_axes(chart)
-        figure, ax = plt.subplots(figsize=(5.6, 4.4), layout="constrained")
-        plot_map(chart, ax=ax)
-        return figure
-    if not chart.sizes.get("sample", 0):
-        figure, ax = plt.subplots(figsize=(7.2, 3.2), layout="constrained")
-        plot_exponents(chart, ax=ax)
-        return figure
-    figure, (above, below) = plt.subplots(2, figsize=(7.2, 5.4), sharex=True, layout="constrained")
-    plot_bifurcation(chart, component, ax=above).set_xlabel("")
-    plot_exponents(chart, ax=below)
-    return figure
+        axes = axes_for(ax, 1, (5.6, 4.4), figsize)
+        plot_map(chart, ax=axes[0])
+    elif not chart.sizes.get("sample", 0):
+        _only_axis(chart)
+        axes = axes_for(ax, 1, (7.2, 3.2), figsize)
+        plot_exponents(chart, ax=axes[0])
+    else:
+        _only_axis(chart)
+        axes = axes_for(ax, 2, (7.2, 5.4), figsize)
+        plot_bifurcation(chart, component, ax=axes[0], size=size).set_xlabel("")
+        plot_exponents(chart, ax=axes[1])
+    return axes
 
 
 def _state_names(chart: xarray.Dataset) -> tuple[str, ...]:
@@ -352,30 +306,67 @@ def _state_names(chart: xarray.Dataset) -> tuple[str, ...]:
 def _only_axis(chart: xarray.Dataset) -> tuple[str, np.ndarray]:
     names = axes_of(chart)
     if len(names) != 1:
+        taken = ", ".join(f"{name}=0" for name in names[:-1])
+        remedy = f"Use plot_map for two, or take a line: chart.isel({taken})." if names else "Print it."
         raise ArgumentError(
-            f"chart must be over one parameter; this one is over {' and '.join(names) or 'none'}. Use "
-            "plot_map, or take a line with chart.sel."
+            f"chart must be over one parameter; this one is over {' and '.join(names) or 'none'}. {remedy}"
         )
     (name,) = names
     if name not in chart.coords:
-        raise ArgumentError("chart must be over one parameter; this one is over a table of points.")
+        columns = [str(each) for each, values in chart.coords.items() if values.dims == (name,)]
+        raise ArgumentError(
+            f"chart must be over one parameter; this one is over a table of points of {', '.join(columns)}. "
+            f"Name the one to draw over: chart.swap_dims({name}={columns[0]!r})."
+        )
     return name, chart[name].values
 
 
-def _mark_failures(ax: Axes, bad: np.ndarray) -> None:
-    """Ticks at the bottom of the axes for the rows whose status is not ok."""
+def _mark_failures(ax: Axes, chart: xarray.Dataset, values: np.ndarray, length: float = MARK) -> bool:
+    """Ticks at the bottom of the axes for the rows whose status is not ok; whether there are any."""
+    bad = values[chart.status.values != StatusCode.SUCCESS]
     if len(bad):
-        ax.plot(
-            bad,
-            np.zeros(len(bad)),
-            "|",
-            color=COLOURS[1],
-            markersize=8,
-            transform=ax.get_xaxis_transform(),
-            label="not to be trusted",
-            clip_on=False,
-        )
+        mark(ax, bad, "|", "#B2182B", FAILED, size=length)
+    return len(bad) > 0
 
 
+def plot_comparison(
+    result: ModelComparison, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
+) -> Axes:
+    """Models by cost and by the largest distance of their exponents from the reference.
+
+    Parameters
+    ----------
+    result
+        From :func:`lyapunov.compare_models`.
+    ax
+        Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    """
+    arguments.instance("result", result, ModelComparison, "Make one with lyapunov.compare_models.")
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    unit = ""
+    for i, name in enumerate(result.names):
+        colour, cost = COLOURS[i % len(COLOURS)], result.cost(name)
+        unit = result.spectra[name][0].names.rate.get("units", "")
+        distance = result.distance(name)
+        good = distance[np.isfinite(distance) & (distance > 0)]
+        if name == result.reference:
+            ax.axvline(cost, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=f"{name}, the reference")
+        elif len(good):
+            ax.plot(cost, good.max(), "o", color=colour, label=name)
+        else:
+            told = "the same exponents" if np.any(distance == 0) else "every run failed"
+            mark(ax, [cost], "v", colour, f"{name}: {told}")
+    ax.set_yscale("log")
+    ax.set_xlabel("steps per interval")
+    ax.set_ylabel(with_unit("largest distance of exponents", unit))
+    ax.grid(True, axis="y")
+    ax.legend()
+    return ax
+
+
+drawn.register(TwoOrbitExponents, plot_two_orbits)
+drawn.register(ModelComparison, plot_comparison)
 drawn.register(LyapunovSpectrum, plot_spectrum)
 DATASETS["exponents"] = plot_chart

@@ -117,7 +117,7 @@ class LyapunovSpectrum:
             "intervals": self.intervals,
             "jumps_per_interval": self.jumps_per_interval,
             "steps_per_interval": self.steps_per_interval,
-            "x_end": ("state", self.x),
+            "x_end": ("state", self.x, self.names.states),
             "mode_end": self.mode,
         }
         coords = {"exponent": np.arange(1, len(self.exponents) + 1), **self.names.coords()}

@@ -16,6 +16,7 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
+from hybrid.simulation.labelled import Names
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
@@ -68,6 +69,8 @@ class TwoOrbitExponents:
     status
         How the runs ended; the histories hold the completed intervals. INDISTINCT_TANGENTS if the
         renormalised companion came within rounding of the orbit, or as far from it as two orbits can be.
+    unit
+        Unit of the exponents, if the system names that of the time.
 
     References
     ----------
@@ -82,6 +85,7 @@ class TwoOrbitExponents:
     separation: float
     interval: float
     status: Status
+    unit: str = ""
 
     @property
     def intervals(self) -> int:
@@ -196,13 +200,14 @@ def two_orbit_exponents(
     reference = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
     offset = separation * _unit_vector(direction, system)
     length = interval_length(reference, interval, transient + intervals)
+    unit = Names(system.state_names, system.units).rate.get("units", "")
     load_kernels("lyapunov.kernels")
     with reference.stop, progress_bar(transient + intervals, "Two orbits", progress) as bar:
         code = _skip(reference, transient, length)
         bar.update(transient)
         if code != codes.DONE:
             nothing = np.empty(0)
-            return TwoOrbitExponents(nothing, nothing, separation, length, status_of(reference, code))
+            return TwoOrbitExponents(nothing, nothing, separation, length, status_of(reference, code), unit)
         companions = [_companion(reference, offset, parameters, solver) for _ in range(2)]
         distances, status = _follow(reference, companions, separation, length, intervals, bar)
     free, renormalised = distances.T
@@ -210,7 +215,7 @@ def two_orbit_exponents(
     if status.ok:
         size = float(np.linalg.norm(reference.run.scale))
         status = _judged(status, free, renormalised, separation, size)
-    return TwoOrbitExponents(free.copy(), growths, separation, length, status)
+    return TwoOrbitExponents(free.copy(), growths, separation, length, status, unit)
 
 
 def _judged(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -19,6 +20,9 @@ from hybrid.solvers import Solver
 from hybrid.solvers.solver import LEAST_RTOL
 from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TIGHTER = (10.0, 100.0)
 EPSILON = float(np.finfo(float).eps)
@@ -49,6 +53,14 @@ class GlobalError:
     x: np.ndarray
     jumps: np.ndarray
     status: Status
+
+    def plot(
+        self, *, ax: Axes | list[Axes] | None = None, figsize: tuple[float, float] | None = None
+    ) -> np.ndarray:
+        """Draw the bounds, see :func:`hybrid.plot.plot_global_error`."""
+        from hybrid.plot import plot_global_error
+
+        return plot_global_error(self, ax=ax, figsize=figsize)
 
     def __repr__(self) -> str:
         times = f", {self.jumps.max():.1e} in time of jumps" if len(self.jumps) else ""

@@ -122,11 +122,17 @@ class WorkPrecision:
         logs = np.log(np.array(points))
         return float(np.exp(np.interp(np.log(error), logs[:, 0], logs[:, 1])))
 
-    def plot(self, quantity: str = "state", *, ax: Axes | None = None) -> Axes:
+    def plot(
+        self,
+        quantity: str = "state",
+        *,
+        ax: Axes | None = None,
+        figsize: tuple[float, float] | None = None,
+    ) -> Axes:
         """Draw error over time, see :func:`hybrid.plot.plot_work_precision`."""
         from hybrid.plot import plot_work_precision
 
-        return plot_work_precision(self, quantity, ax=ax)
+        return plot_work_precision(self, quantity, ax=ax, figsize=figsize)
 
     def error_of(self, quantity: str) -> np.ndarray:
         """Column ``(rows,)`` of the errors of a quantity.

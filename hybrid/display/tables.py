@@ -28,6 +28,11 @@ def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table><thead>{row_of('th', headings)}</thead><tbody>{body}</tbody></table>"
 
 
+def with_unit(name: str, unit: str | None) -> str:
+    """A name with its unit, if there is one: ``q (m)``."""
+    return f"{name} ({unit})" if unit else name
+
+
 def counted(number: int, noun: str) -> str:
     """A number with its noun: ``1 jump``, ``2 jumps``."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

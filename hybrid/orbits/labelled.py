@@ -18,7 +18,7 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
 
     names = Names(orbit.system.state_names, orbit.system.units)
     variables: dict[str, Any] = {
-        "x0": ("state", orbit.x0),
+        "x0": ("state", orbit.x0, names.states),
         "mode": orbit.mode,
         "t0": ((), orbit.t0, names.of("t")),
         "period": ((), orbit.period, names.of("t")),

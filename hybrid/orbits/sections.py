@@ -76,7 +76,7 @@ class Section:
         names = Names(self.state_names, self.units)
         return xarray.Dataset(
             {
-                "x": (("sample", "state"), self.x),
+                "x": (("sample", "state"), self.x, names.states),
                 "mode": ("sample", self.mode),
                 "jumps": ("sample", self.jumps),
             },

@@ -13,11 +13,13 @@ from hybrid import arguments
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
+from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
+from hybrid.plot.jumps import plot_global_error, plot_jumps
 from hybrid.plot.orbits import plot_orbit, plot_section
 from hybrid.plot.style import COLOURS
 from hybrid.plot.work_precision import plot_work_precision
-from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.arc import HybridArc, Jumps
 from hybrid.system.graph import HybridSystem
 
 __all__ = [
@@ -26,10 +28,14 @@ __all__ = [
     "drawn",
     "plot",
     "plot_arc",
+    "plot_ends",
+    "plot_global_error",
     "plot_graph",
+    "plot_jumps",
     "plot_orbit",
     "plot_phase",
     "plot_section",
+    "plot_sweep",
     "plot_work_precision",
 ]
 
@@ -47,22 +53,31 @@ def drawn(result: Any, **options: Any) -> Any:
     # A dataset has an attribute plot that only says that it cannot be called.
     if callable(getattr(result, "plot", None)) and not hasattr(result, "data_vars"):
         return result.plot(**options)
-    wanted = "be a system, an arc, a section, an orbit, a spectrum or a chart"
+    if {"status", "message"} <= set(getattr(result, "data_vars", ())):
+        # Any sweep has these two, a chart too, so the names above come first.
+        return plot_sweep(result, **options)
+    wanted = (
+        "be a system, an arc, a section, an orbit, a spectrum, jumps, a GlobalError, a comparison of models, "
+        "or a dataset of chart, simulate_many or sweep; print other results"
+    )
     raise arguments.refusal("result", wanted, result)
 
 
 drawn.register(HybridArc, plot_arc)
 drawn.register(HybridSystem, plot_graph)
+drawn.register(Jumps, plot_jumps)
 drawn.register(Section, plot_section)
 drawn.register(PeriodicOrbit, plot_orbit)
+DATASETS["t_end"] = plot_ends
 
 
 def plot(result: Any, **options: Any) -> Any:
     """Draw a system or a result with the function for its type.
 
     An arc is drawn by :func:`plot_arc`, a system by :func:`plot_graph`, a section by :func:`plot_section`,
-    and a periodic orbit by :func:`plot_orbit`. A spectrum or a chart is drawn by ``lyapunov.plot``, and any
-    other object by its method ``plot``.
+    a periodic orbit by :func:`plot_orbit`, jumps by :func:`plot_jumps`, a dataset of ``simulate_many`` by
+    :func:`plot_ends` and one of ``sweep`` by :func:`plot_sweep`. A spectrum, a chart, a comparison of models
+    and exponents from two orbits are drawn by ``lyapunov.plot``, and any other object by its method ``plot``.
 
     Parameters
     ----------
@@ -73,7 +88,7 @@ def plot(result: Any, **options: Any) -> Any:
 
     Returns
     -------
-    matplotlib.axes.Axes, or an array of them for an arc, or a figure for a chart
+    matplotlib.axes.Axes, or an array of them for an arc, a chart, a sweep or a GlobalError
 
     Raises
     ------

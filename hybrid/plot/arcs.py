@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid import arguments
-from hybrid.plot.style import as_component, axes_for, colour_of, legend, plain
+from hybrid.plot.style import Rows, as_component, axes_for, colour_of, legend, plain
 from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.labelled import Names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +28,8 @@ def plot_arc(
     components: Iterable[str | int] | None = None,
     *,
     ax: Axes | Iterable[Axes] | None = None,
-) -> np.ndarray:
+    figsize: tuple[float, float] | None = None,
+) -> Rows:
     """Draw an arc over time: one row per component, one colour per mode, dotted lines for resets.
 
     Parameters
@@ -38,11 +40,13 @@ def plot_arc(
         Names or indices of the state's components; by default all.
     ax
         Axes to draw into, one per component; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
 
     Returns
     -------
     numpy.ndarray
-        The axes, one per component.
+        The axes, one per component; ``.figure`` is their figure.
 
     Raises
     ------
@@ -51,7 +55,8 @@ def plot_arc(
     """
     names = _as_arc(arc).system.state_names
     chosen = range(len(names)) if components is None else _components(names, components)
-    axes = axes_for(ax, len(chosen))
+    axes = axes_for(ax, len(chosen), figsize=figsize)
+    labels = Names(names, arc.system.units)
     lines = _lines(arc)
     for row, i in zip(axes, chosen, strict=True):
         for mode, (t, x) in lines.items():
@@ -61,16 +66,23 @@ def plot_arc(
             ends = _with_gaps(arc.jumps.x_minus[:, i], arc.jumps.x_plus[:, i])
             row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
         _shade(row, lines)
-        row.set_ylabel(names[i])
+        row.set_ylabel(labels.label(names[i]))
         row.margins(x=0)
         plain(row)
     if len(axes):
-        axes[-1].set_xlabel("t")
+        axes[-1].set_xlabel(labels.label("t"))
         legend(axes[0], arc.system.mode_names, lines)
     return axes
 
 
-def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = None) -> Axes:
+def plot_phase(
+    arc: HybridArc,
+    x: str | int,
+    y: str | int,
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Axes:
     """Draw one component of an arc over another: one colour per mode, jumps dashed, a dot at the start.
 
     Parameters
@@ -81,6 +93,8 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
         Names or indices of the state's components.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -93,7 +107,8 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
     """
     names = _as_arc(arc).system.state_names
     i, j = as_component("x", names, x), as_component("y", names, y)
-    (ax,) = axes_for(ax, 1, figsize=(5.0, 4.2))
+    (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
+    labels = Names(names, arc.system.units)
     lines = _lines(arc)
     for mode, (_, states) in lines.items():
         ax.plot(states[:, i], states[:, j], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
@@ -109,8 +124,8 @@ def plot_phase(arc: HybridArc, x: str | int, y: str | int, *, ax: Axes | None = 
         )
     if len(arc.x):
         ax.plot(arc.x[0, i], arc.x[0, j], "o", color="black", markersize=4)
-    ax.set_xlabel(names[i])
-    ax.set_ylabel(names[j])
+    ax.set_xlabel(labels.label(names[i]))
+    ax.set_ylabel(labels.label(names[j]))
     plain(ax)
     legend(ax, arc.system.mode_names, lines)
     return ax

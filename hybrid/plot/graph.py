@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import attrs
 import numpy as np
 
 from hybrid.plot.style import axes_for, colour_of
@@ -28,13 +29,16 @@ Ends = tuple[str, str]
 LABEL: dict[str, Any] = {"fontsize": 10, "bbox": {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}}
 
 
-def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
+def plot_graph(
+    system: HybridSystem, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
+) -> Axes:
     """Draw the mode graph: modes as boxes, transitions as arrows, with the directions of their guards.
 
     A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. Dashed
-    edges reset the state. Modes have the same colours as in the other plots. A dot is the end of a run.
-    Transitions that only fire at the start of a run are left out. In a graph of more than a few modes, the
-    transitions between the same two modes share an arrow, and names such as ``a->b`` are not repeated on it.
+    edges reset the state; grey edges of dashes and dots lead to the limit of a chatter. Modes have the same
+    colours as in the other plots. A dot is the end of a run. Transitions that only fire at the start of a run
+    are left out. In a graph of more than a few modes, the transitions between the same two modes share an
+    arrow, and names such as ``a->b`` are not repeated on it.
 
     Parameters
     ----------
@@ -42,6 +46,8 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
         The model.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -49,7 +55,7 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
     """
     graph = as_system("system", system).graph
     crowd = len(graph)
-    (ax,) = axes_for(ax, 1, figsize=SIZES[min(crowd, len(SIZES)) - 1])
+    (ax,) = axes_for(ax, 1, SIZES[min(crowd, len(SIZES)) - 1], figsize)
     where = _places(graph)
     boxes = {
         mode: _draw_mode(ax, mode, where[mode], colour_of(system.mode_index(mode)))
@@ -64,44 +70,85 @@ def plot_graph(system: HybridSystem, *, ax: Axes | None = None) -> Axes:
         parallel[ends] += 1
         # With many modes the edges cross near their middles, so the labels are placed nearer the source.
         along = 0.5 if crowd <= 2 else 0.38
-        label = "\n".join(dict.fromkeys(_label(each, short=crowd >= CROWD) for each in bundle))
-        style = _arrow(bundle[0])
-        _draw_edge(ax, label, style, [where[end] for end in ends], bend, along, [boxes[end] for end in ends])
+        label = "\n".join(dict.fromkeys(each.label(short=crowd >= CROWD) for each in bundle))
+        _draw_edge(
+            ax,
+            label,
+            bundle[0].style,
+            [where[end] for end in ends],
+            bend,
+            along,
+            [boxes[end] for end in ends],
+        )
     for mode, around in loops.items():
         outward = where[mode] if crowd > 2 else np.array([0.0, 1.0])
         middle = np.degrees(np.arctan2(outward[1], outward[0]))
-        for slot, transition in enumerate(around):
+        for slot, edge in enumerate(around):
             angle = middle + FAN * (slot - (len(around) - 1) / 2)
-            _draw_loop(ax, transition, where[mode], np.radians(angle))
+            _draw_loop(ax, edge, where[mode], np.radians(angle))
     _frame(ax, np.array(list(where.values())), bool(loops))
     ax.text(0.5, 0.0, _key(system), transform=ax.transAxes, ha="center", va="top", fontsize=8, color="0.35")
     return ax
 
 
-def _edges_and_loops(
-    system: HybridSystem,
-) -> tuple[dict[Ends, list[Transition]], dict[str, list[Transition]]]:
-    """The transitions between each two modes, and those from each mode to itself."""
-    edges: defaultdict[Ends, list[Transition]] = defaultdict(list)
-    loops: defaultdict[str, list[Transition]] = defaultdict(list)
-    for transition in system.transitions:
-        if transition.guard.at_start:
-            continue
-        ends = (transition.source, END if transition.target is None else transition.target)
-        if ends[0] == ends[1]:
-            loops[ends[0]].append(transition)
+@attrs.frozen
+class _Edge:
+    """A transition as an arrow, or the way to the limit of its chatter."""
+
+    transition: Transition
+    is_limit: bool = False
+
+    @property
+    def ends(self) -> Ends:
+        """The modes that the arrow joins."""
+        target = self.transition.accumulates_to if self.is_limit else self.transition.target
+        return self.transition.source, END if target is None else target
+
+    def label(self, *, short: bool = False) -> str:
+        """The name and the direction of the guard; short without the modes in the name."""
+        transition = self.transition
+        if self.is_limit:
+            return f"limit of {transition.name}"
+        direction = DIRECTIONS[transition.guard.direction]
+        name = transition.name
+        if short and name.startswith(f"{transition.source}->{transition.target}"):
+            return direction
+        return f"{name.removeprefix(f'{transition.source}: ')} {direction}"
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """Properties of the arrow."""
+        found: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 13, "linewidth": 1.2}
+        if self.is_limit:
+            return {**found, "color": "0.5", "linestyle": (0, (6, 2, 1, 2))}
+        plain = self.transition.reset is None
+        return {**found, "color": "0.25", "linestyle": "-" if plain else (0, (4, 2.5))}
+
+
+def _edges_and_loops(system: HybridSystem) -> tuple[dict[Ends, list[_Edge]], dict[str, list[_Edge]]]:
+    """The arrows between each two modes, and those from each mode to itself."""
+    edges: defaultdict[Ends, list[_Edge]] = defaultdict(list)
+    loops: defaultdict[str, list[_Edge]] = defaultdict(list)
+    drawn = [_Edge(each) for each in system.transitions if not each.guard.at_start]
+    limits = [_Edge(each, is_limit=True) for each in system.transitions if each.accumulates_to is not None]
+    for edge in drawn + limits:
+        if edge.ends[0] == edge.ends[1]:
+            loops[edge.ends[0]].append(edge)
         else:
-            edges[ends].append(transition)
+            edges[edge.ends].append(edge)
     return edges, loops
 
 
-def _bundles(edges: Mapping[Ends, list[Transition]], crowd: int) -> Iterator[tuple[Ends, list[Transition]]]:
-    """The transitions that share an arrow."""
-    for ends, transitions in edges.items():
+def _bundles(edges: Mapping[Ends, list[_Edge]], crowd: int) -> Iterator[tuple[Ends, list[_Edge]]]:
+    """The edges that share an arrow: in a crowd all of one kind between two modes."""
+    for ends, between in edges.items():
         if crowd < CROWD:
-            yield from ((ends, [transition]) for transition in transitions)
-        else:
-            yield ends, transitions
+            yield from ((ends, [edge]) for edge in between)
+            continue
+        for is_limit in (False, True):
+            same = [edge for edge in between if edge.is_limit is is_limit]
+            if same:
+                yield ends, same
 
 
 def _places(graph: nx.MultiDiGraph) -> dict[str, np.ndarray]:
@@ -121,6 +168,8 @@ def _key(system: HybridSystem) -> str:
         key += "   ↕ either"
     if any(transition.reset is not None for transition in system.transitions):
         key += "   dashed: resets the state"
+    if any(transition.accumulates_to is not None for transition in system.transitions):
+        key += "   dashes and dots: limit of chatter"
     return key
 
 
@@ -161,7 +210,7 @@ def _draw_edge(
     ax.text(middle[0], middle[1], label, ha="center", va="center", zorder=3, **LABEL)
 
 
-def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float) -> None:
+def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
     """A loop of fixed size, in points, that leaves and enters the box on the side at ``angle``."""
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.path import Path
@@ -169,7 +218,9 @@ def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float
 
     out, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     # Distance at which a ray leaves the box, whose width follows from the name and its margins.
-    foot = min((3.6 * len(transition.source) + 9) / max(abs(out[0]), 1e-9), 15 / max(abs(out[1]), 1e-9)) + 2
+    foot = (
+        min((3.6 * len(edge.transition.source) + 9) / max(abs(out[0]), 1e-9), 15 / max(abs(out[1]), 1e-9)) + 2
+    )
     far = foot + 46
     vertices = [
         (foot - 4) * out - 8 * side,
@@ -181,11 +232,11 @@ def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float
     figure = ax.get_figure(root=True)
     assert figure is not None
     points = Affine2D().scale(1 / 72) + figure.dpi_scale_trans
-    patch = FancyArrowPatch(path=path, **_arrow(transition), zorder=2, clip_on=False)
+    patch = FancyArrowPatch(path=path, **edge.style, zorder=2, clip_on=False)
     patch.set_transform(points + ScaledTranslation(place[0], place[1], ax.transData))  # type: ignore[arg-type]
     ax.add_patch(patch)
     ax.annotate(
-        _label(transition),
+        edge.label(),
         xy=tuple(place),
         xytext=tuple((far - 6) * out),
         textcoords="offset points",
@@ -194,24 +245,6 @@ def _draw_loop(ax: Axes, transition: Transition, place: np.ndarray, angle: float
         zorder=3,
         **LABEL,
     )
-
-
-def _arrow(transition: Transition) -> dict[str, Any]:
-    return {
-        "arrowstyle": "-|>",
-        "mutation_scale": 13,
-        "linewidth": 1.2,
-        "color": "0.25",
-        "linestyle": "-" if transition.reset is None else (0, (4, 2.5)),
-    }
-
-
-def _label(transition: Transition, *, short: bool = False) -> str:
-    direction = DIRECTIONS[transition.guard.direction]
-    name = transition.name
-    if short and name.startswith(f"{transition.source}->{transition.target}"):
-        return direction
-    return f"{name.removeprefix(f'{transition.source}: ')} {direction}"
 
 
 def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:

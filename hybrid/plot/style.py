@@ -12,6 +12,7 @@ from hybrid.errors import ArgumentError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # One colour per mode: the palette of Okabe and Ito, distinguishable with any colour vision, faint hues last.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -44,13 +45,43 @@ def _as_axes(value: object) -> Axes:
     return arguments.instance("ax", value, Axes, "Make them with matplotlib.pyplot.subplots.")
 
 
-def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) -> np.ndarray:
-    """The given axes, or those of a new figure, as an array of ``count``."""
+class Rows(np.ndarray):
+    """Axes of one figure, from the top; short to print, as a notebook does with the last value of a cell."""
+
+    @property
+    def figure(self) -> Figure:
+        """The figure that the axes belong to, for instance to save it."""
+        return self.ravel()[0].get_figure(root=True)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        names = [each.get_ylabel() for each in self.ravel().tolist()]
+        return f"<{len(names)} axes: {', '.join(names)}>"
+
+    __str__ = __repr__
+
+
+def axes_for(
+    ax: Any,
+    count: int,
+    default: tuple[float, float] | None = None,
+    figsize: tuple[float, float] | None = None,
+    *,
+    shared: bool = True,
+) -> Rows:
+    """The given axes, or those of a new figure in a column, as an array of ``count``.
+
+    The size of the figure is ``figsize`` if a caller gives one, else ``default``. Axes that are ``shared``
+    have one abscissa.
+    """
+    if figsize is not None:
+        figsize = _as_figsize(figsize)
     if ax is None:
+        # pyplot knows the figure, so a notebook and plt.show() show it: once, since no plot returns it.
         import matplotlib.pyplot as plt
 
-        size = figsize or (7.0, 0.8 + 1.5 * count)
-        return plt.subplots(count, 1, sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
+        size = figsize or default or (7.0, 0.8 + 1.5 * count)
+        _, made = plt.subplots(count, 1, sharex=shared, squeeze=False, figsize=size, layout="constrained")
+        return made[:, 0].view(Rows)
     try:
         axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
     except Exception:  # whatever an object that is no array of axes raises when it is converted
@@ -58,8 +89,16 @@ def axes_for(ax: Any, count: int, figsize: tuple[float, float] | None = None) ->
     for each in axes:
         _as_axes(each)
     if len(axes) != count:
-        raise ArgumentError(f"ax must hold {count} axes, one per component; got {len(axes)}.")
-    return axes
+        raise ArgumentError(f"ax must hold {count} axes, one per row of the picture; got {len(axes)}.")
+    return axes.view(Rows)
+
+
+def _as_figsize(value: object) -> tuple[float, float]:
+    wanted = "be a width and a height in inches, both positive"
+    found = arguments.numbers("figsize", value, wanted)
+    if found.shape != (2,) or not np.all(np.isfinite(found) & (found > 0)):
+        raise arguments.refusal("figsize", wanted, value)
+    return float(found[0]), float(found[1])
 
 
 def colour_of(mode: int) -> str:
@@ -89,6 +128,39 @@ def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
     )
 
 
-def dot_area(count: int) -> float:
-    """Area of each dot in square points: larger for few dots, smaller for many."""
-    return float(np.clip(4000 / max(count, 1), 0.6, 20.0))
+def dot_area(count: int, size: float | None = None) -> float:
+    """Area of each dot, as the square of its diameter in points.
+
+    The diameter is ``size``; by default larger for few dots, smaller for many, and a point at least.
+    """
+    if size is not None:
+        return arguments.positive("size", size, "be a positive diameter in points") ** 2
+    return float(np.clip(4000 / max(count, 1), 1.0, 20.0))
+
+
+def small_legend(ax: Axes, handles: list[Any] | None = None) -> None:
+    """A legend above the axes, in one row, of the given handles or of what the axes hold."""
+    found = ax.get_legend_handles_labels()[0] if handles is None else handles
+    ax.legend(
+        handles=found,
+        loc="lower right",
+        bbox_to_anchor=(1, 1),
+        ncols=len(found),
+        frameon=False,
+        borderaxespad=0.2,
+        fontsize=8,
+    )
+
+
+def mark(ax: Axes, at: Any, marker: str, colour: str, label: str, *, size: float = 7.0) -> None:
+    """Marks at the bottom of the axes, for values that have no place in them."""
+    ax.plot(
+        at,
+        np.full(len(at), 0.02),
+        marker,
+        color=colour,
+        markersize=size,
+        transform=ax.get_xaxis_transform(),
+        label=label,
+        clip_on=False,
+    )

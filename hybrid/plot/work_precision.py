@@ -45,7 +45,13 @@ class Measurement(Protocol):
         ...
 
 
-def plot_work_precision(result: Measurement, quantity: str = "state", *, ax: Axes | None = None) -> Axes:
+def plot_work_precision(
+    result: Measurement,
+    quantity: str = "state",
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Axes:
     """Draw error over time on logarithmic scales: one line per method, the reference's own error in grey.
 
     Nearer to the lower left is better. Failed runs and errors of exactly zero are not drawn.
@@ -58,6 +64,8 @@ def plot_work_precision(result: Measurement, quantity: str = "state", *, ax: Axe
         Which error: ``"state"``, ``"times"``, ``"saltation"``, ``"fundamental"`` or ``"exponents"``.
     ax
         Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -71,7 +79,7 @@ def plot_work_precision(result: Measurement, quantity: str = "state", *, ax: Axe
     if not hasattr(result, "error_of"):
         raise arguments.refusal("result", "be a WorkPrecision, from hybrid.work_precision", result)
     error = result.error_of(quantity)
-    (ax,) = axes_for(ax, 1, figsize=(6.4, 4.6))
+    (ax,) = axes_for(ax, 1, (6.4, 4.6), figsize)
     ends = []
     for index, method in enumerate(result.methods):
         rows = result.rows_of(method) & np.isfinite(error) & (error > 0)

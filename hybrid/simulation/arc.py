@@ -178,8 +178,8 @@ class Jumps(Sequence[Jump]):
             "t": ("jump", self.t, names.of("t")),
             "transition": ("jump", self.transition),
             "kind": ("jump", self.kind),
-            "x_minus": (("jump", "state"), self.x_minus),
-            "x_plus": (("jump", "state"), self.x_plus),
+            "x_minus": (("jump", "state"), self.x_minus, names.states),
+            "x_plus": (("jump", "state"), self.x_plus, names.states),
             "transversality": ("jump", self.transversality),
         }
         return xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
@@ -388,7 +388,7 @@ class HybridArc:
 
         names = Names(self.system.state_names, self.system.units)
         variables: dict[str, Any] = {
-            "x": (("t", "state"), self.x),
+            "x": (("t", "state"), self.x, names.states),
             "j": ("t", self.j),
             "mode": ("t", self.mode),
         }

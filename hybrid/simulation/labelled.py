@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from hybrid.display.tables import with_unit
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -29,6 +30,18 @@ class Names:
     def of(self, name: str) -> dict[str, str]:
         """Attributes of a variable: its unit, if known."""
         return {"units": self.units[name]} if name in self.units else {}
+
+    @property
+    def states(self) -> dict[str, str]:
+        """Attributes of an array of states: the unit that its components share, or one per component."""
+        listed = [self.units.get(name, "") for name in self.state]
+        if not any(listed):
+            return {}
+        return {"units": listed[0] if len(set(listed)) == 1 else ", ".join(unit or "1" for unit in listed)}
+
+    def label(self, name: str) -> str:
+        """The name with its unit, for an axis of a picture."""
+        return with_unit(name, self.units.get(name))
 
     @property
     def rate(self) -> dict[str, str]:

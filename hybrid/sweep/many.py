@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
+from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
@@ -52,6 +53,7 @@ def simulate_many(
     samples: ArrayLike | None = None,
     max_jumps: int = 100_000,
     executor: int | None = None,
+    progress: bool | None = None,
 ) -> xarray.Dataset:
     """Run a system from many starts: where each run ends, and its state at the samples.
 
@@ -69,6 +71,9 @@ def simulate_many(
         Increasing times at which to store the state. A step ends at each of them.
     executor
         Number of threads; by default all cores.
+    progress
+        Whether to show a progress bar with the time left; by default in a terminal or a notebook, after two
+        seconds.
 
     Returns
     -------
@@ -96,6 +101,7 @@ def simulate_many(
     t0, t1 = arguments.time_span("t_span", t_span)
     times = np.empty(0) if samples is None else arguments.increasing_times("samples", samples, t0, t1)
     origins = _origins(system, x0)
+    progress = None if progress is None else arguments.flag("progress", progress)
     most = arguments.count("max_jumps", max_jumps, 0)
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
     system.parameter_values(parameters)
@@ -109,18 +115,19 @@ def simulate_many(
         work = _Runs(system, (t0, t1), options, most, found)
     size = -(-len(origins) // (BLOCKS_PER_THREAD * threads))
     blocks = [range(i, min(i + size, len(origins))) for i in range(0, len(origins), max(size, 1))]
-    with CTRL_C:
+    with CTRL_C, progress_bar(len(origins), "Runs", progress, "start") as bar:
         if threads == 1 or len(blocks) == 1:
             for block in blocks:
                 work.run(block)
+                bar.update(len(block))
         else:
-            _in_threads(work.run, blocks, threads)
+            _in_threads(work.run, blocks, threads, bar)
         # An interrupt that came too late to stop anything is not raised either.
         CTRL_C.is_set()
     return found.dataset(system, overrides)
 
 
-def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int) -> None:
+def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int, bar: Progress) -> None:
     """Run all blocks; an interrupt in the main thread stops the others."""
     stop = threading.Event()
 
@@ -129,7 +136,8 @@ def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int)
             run(block)
 
     with ThreadPoolExecutor(threads) as pool:
-        waiting: set[Future[None]] = {pool.submit(work, block) for block in blocks}
+        counts: dict[Future[None], int] = {pool.submit(work, block): len(block) for block in blocks}
+        waiting = set(counts)
         try:
             while waiting:
                 done, waiting = wait(waiting, timeout=LOOK)
@@ -137,6 +145,7 @@ def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int)
                     stop.set()
                 for future in done:
                     future.result()
+                    bar.update(counts[future])
         finally:
             stop.set()
 
@@ -184,15 +193,15 @@ class _Found:
 
         names = Names(system.state_names, system.units)
         variables: dict[str, Any] = {
-            "x0": (("start", "state"), self.origins),
-            "x_end": (("start", "state"), self.states[:, -1]),
+            "x0": (("start", "state"), self.origins, names.states),
+            "x_end": (("start", "state"), self.states[:, -1], names.states),
             "t_end": ("start", self.t_end, names.of("t")),
             "mode_end": ("start", self.mode),
             "jumps": ("start", self.jumps),
         }
         coords = {"start": np.arange(len(self.origins)), **names.coords()}
         if len(self.times):
-            variables["x"] = (("start", "t", "state"), self.states[:, :-1])
+            variables["x"] = (("start", "t", "state"), self.states[:, :-1], names.states)
             coords["t"] = ("t", self.times, names.of("t"))
         variables["status"] = ("start", self.codes, flags())
         variables["message"] = ("start", self.messages)

@@ -181,7 +181,9 @@ class Rows:
         names = Names(self.system.state_names, self.system.units)
         coords = {name: ((dim,), values) for name, (dim, values) in names.coords().items()}
         rates = dict.fromkeys(("exponents", "standard_error", "sum_rule"), names.rate)
-        return Labels(dims, coords, {**{name: names.of(name) for name in self.system.units}, **rates})
+        states = dict.fromkeys(("x_end", "section"), names.states)
+        own = {name: names.of(name) for name in self.system.units}
+        return Labels(dims, coords, {**own, **rates, **states})
 
 
 def rows_of(

@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import html_table, table
+from hybrid.display.tables import html_table, table, with_unit
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_functions
 from hybrid.system.elements import END, Mode, Transition
@@ -148,14 +148,21 @@ class HybridSystem(Portable):
         return f"<p>{heading}</p>\n{html_table(TRANSITION_COLUMNS, self._transition_rows())}"
 
     def _heading(self) -> list[str]:
-        state = f"{self.state} components" if isinstance(self.state, int) else ", ".join(self.state)
-        parameters = ", ".join(f"{name} = {value:.6g}" for name, value in self.parameters.items())
+        units = self.units
+        state = ", ".join(with_unit(name, units.get(name)) for name in self.state_names)
+        if isinstance(self.state, int) and not any(name in units for name in self.state_names):
+            state = f"{self.state} components"
+        parameters = ", ".join(
+            f"{name} = {value:.6g} {units.get(name, '')}".rstrip() for name, value in self.parameters.items()
+        )
         lines = [
             f"HybridSystem {self.name}".rstrip(),
             f"state: {state}",
             f"parameters: {parameters or 'none'}",
             f"modes: {', '.join(map(repr, self.mode_names))}",
         ]
+        if "t" in units:
+            lines.insert(2, f"time: {with_unit('t', units['t'])}")
         if self.start is not None:
             lines.append(f"start: {self.start!r}")
         if self.period is not None:

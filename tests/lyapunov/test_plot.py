@@ -202,16 +202,17 @@ def test_the_kind_needs_no_forcing():
 
 
 def test_a_figure_of_each_kind(line, grid):
-    above, below = plot_chart(line).axes
+    above, below = plot_chart(line)
     assert above.get_shared_x_axes().joined(above, below)
     # The first component, unless another one is asked for.
     assert above.get_ylabel() == "x"
-    # The map and its colour bar.
-    assert len(plot_chart(grid).axes) == 2
+    # The map and its colour bar, of one figure.
+    assert len(plot_chart(grid)) == 1
+    assert len(plot_chart(grid).figure.axes) == 2
     bare = lyapunov.chart(models.impact_oscillator(), {"d": [1.0, 0.5]}, (0.0, 0.0), **SHORT)
     # Whether the axis of section points is empty or absent.
     for without in (bare, bare.drop_dims("sample", errors="ignore")):
-        assert len(plot_chart(without).axes) == 1
+        assert len(plot_chart(without)) == 1
         with pytest.raises(ArgumentError, match="chart must have section points"):
             plot_bifurcation(without)
     # One exponent needs no legend.
@@ -328,3 +329,53 @@ def test_limits_hold_bars_that_reach_beyond_the_history(error):
     bottom, top = min(values) - 2 * error, max(values) + 2 * error
     margin = 0.1 * (top - bottom)
     np.testing.assert_allclose(plot_spectrum(wide).get_ylim(), [bottom - margin, top + margin])
+
+
+def test_minus_infinity_and_failed_rows_are_marked_and_explained():
+    chart = made(ROWS, 0.2).isel(b=0, drop=True)
+    chart["status"][1] = int(hybrid.StatusCode.MAX_STEPS)
+    chart.exponents[2, 1] = -np.inf
+    ax = plot_exponents(chart, figsize=(4.0, 3.0))
+    assert tuple(ax.figure.get_size_inches()) == (4.0, 3.0)
+    *_, lost, failed = ax.lines
+    assert (lost.get_xdata().tolist(), failed.get_xdata().tolist()) == ([1.0], [0.5])
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "minus infinity" in told[-2]
+    assert "failed" in told[-1]
+    assert ax.get_ylabel() == "Lyapunov exponents (1/s)"
+
+
+def test_a_map_tells_minus_infinity_from_failed_rows():
+    chart = made([[(-1.0, -np.inf), (0.5, -2.0)], [(-np.inf, -np.inf), (1.0, -2.0)]], 0.1)
+    chart["status"][1, 1] = int(hybrid.StatusCode.MAX_STEPS)
+    ax = plot_map(chart)
+    values, lost = (image.get_array() for image in ax.images)
+    assert values.mask.tolist() == [[False, False], [True, True]]
+    assert lost.mask.tolist() == [[True, True], [False, True]]
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {
+        "failed, see chart.message",
+        "minus infinity",
+    }
+
+
+def test_a_chart_over_three_axes_names_the_plane_to_take():
+    chart = made(ROWS, 0.2).expand_dims(c=[1.0, 2.0])
+    with pytest.raises(ArgumentError, match=r"over c and b and a\. Take a plane: chart\.isel\(c=0\)"):
+        hybrid.plot.plot(chart)
+    hybrid.plot.plot(chart.isel(c=0))
+
+
+def test_estimates_from_two_orbits_and_comparisons_are_drawn():
+    system = models.impact_oscillator()
+    two = lyapunov.two_orbit_exponents(system, (0.3, 0.1), intervals=10)
+    assert [text.get_text() for text in hybrid.plot.plot(two).get_legend().get_texts()] == [
+        "zero",
+        "renormalised, converges",
+        "one piece, saturates",
+        "undivided, saturates",
+    ]
+    compared = lyapunov.compare_models(
+        {"stiff": system, "same": system}, (0.3, 0.1), reference="stiff", intervals=5, transient=1
+    )
+    told = {text.get_text() for text in hybrid.plot.plot(compared).get_legend().get_texts()}
+    assert told == {"stiff, the reference", "same: the same exponents"}

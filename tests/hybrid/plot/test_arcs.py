@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate, stroboscopic_section
 from hybrid.plot import arcs, plot_arc, plot_phase, plot_section
-from hybrid.plot.orbits import _second
+from hybrid.plot.orbits import second as _second
 from hybrid.plot.style import COLOURS
 
 # A point on a circle that goes on at twice the speed below the axis, and counts its turns.

@@ -72,7 +72,7 @@ def test_each_component_adds_the_same_height_to_a_figure(contacts):
 def test_axes_may_be_given_one_a_component(bounces):
     _, given = plt.subplots(2, 1)
     assert list(plot_arc(bounces, ax=given)) == list(given)
-    with pytest.raises(ArgumentError, match="ax must hold 1 axes, one per component; got 2"):
+    with pytest.raises(ArgumentError, match="ax must hold 1 axes, one per row of the picture; got 2"):
         plot_arc(bounces, ["v"], ax=given)
 
 

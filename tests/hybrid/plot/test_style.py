@@ -47,7 +47,7 @@ def test_given_axes_are_taken():
     _, grid = plt.subplots(2, 2)
     assert axes_for(grid, 4).tolist() == grid.ravel().tolist()
     assert axes_for(grid[0, 0], 1).tolist() == [grid[0, 0]]
-    with pytest.raises(ArgumentError, match="ax must hold 3 axes, one per component; got 4"):
+    with pytest.raises(ArgumentError, match="ax must hold 3 axes, one per row of the picture; got 4"):
         axes_for(grid, 3)
     with pytest.raises(ArgumentError, match="ax"):
         axes_for([grid[0, 0], 3], 2)

@@ -1,0 +1,198 @@
+"""Datasets of many runs, and of a task at every point of a grid."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.display.tables import with_unit
+from hybrid.errors import ArgumentError
+from hybrid.plot.orbits import second
+from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain, small_legend
+from hybrid.status import StatusCode
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
+FAILED = "failed, see .message"
+FAILED_COLOUR = "#B2182B"
+
+
+def plot_ends(
+    ends: xarray.Dataset,
+    x: str | int = 0,
+    y: str | int | None = None,
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+    size: float | None = None,
+) -> Axes:
+    """Draw where many runs end, in the plane of two components: one colour per mode, crosses for failures.
+
+    Parameters
+    ----------
+    ends
+        From :func:`hybrid.simulate_many`.
+    x, y
+        Names or indices of the components; by default the first two. The ends of a state with one component
+        are drawn over the starts.
+    ax
+        Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    size
+        Diameter of the dots in points; by default smaller for more dots.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ArgumentError
+        If a component does not exist.
+    """
+    if not {"x0", "x_end", "mode_end", "status"} <= set(getattr(ends, "data_vars", ())):
+        raise arguments.refusal("ends", "be a dataset made with hybrid.simulate_many", ends)
+    names = tuple(map(str, ends.state.values))
+    i = as_component("x", names, x)
+    j = second(len(names), i) if y is None else as_component("y", names, y)
+    labels = [with_unit(name, unit) for name, unit in zip(names, _units(ends, names), strict=True)]
+    area = dot_area(ends.sizes["start"], size)
+    (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
+    states = ends.x_end.values
+    across, up = (ends.x0.values[:, i], states[:, i]) if j is None else (states[:, i], states[:, j])
+    modes, good = ends.mode_end.values.astype(str), ends.status.values == StatusCode.SUCCESS
+    for index, mode in enumerate(sorted(set(modes[good]))):
+        there = good & (modes == mode)
+        colour = COLOURS[index % len(COLOURS)]
+        ax.scatter(across[there], up[there], s=area, color=colour, linewidths=0, label=mode, rasterized=True)
+    if not good.all():
+        ax.scatter(across[~good], up[~good], s=25.0, color=FAILED_COLOUR, marker="x", label=FAILED)
+    ax.set_xlabel(f"start of {labels[i]}" if j is None else labels[i])
+    ax.set_ylabel(labels[i if j is None else j])
+    plain(ax)
+    if len(set(modes[good])) > 1 or not good.all():
+        small_legend(ax)
+    return ax
+
+
+def plot_sweep(
+    swept: xarray.Dataset,
+    *,
+    ax: Any = None,
+    figsize: tuple[float, float] | None = None,
+    size: float | None = None,
+) -> Rows:
+    """Draw each number of a sweep: over one axis as dots on a line, over two axes as a map.
+
+    Parameters
+    ----------
+    swept
+        From :func:`hybrid.sweep`, over one or two axes.
+    ax
+        Axes to draw into, one per number; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    size
+        Diameter of the dots in points; by default smaller for more dots.
+
+    Returns
+    -------
+    numpy.ndarray
+        The axes, one per number; ``.figure`` is their figure.
+
+    Raises
+    ------
+    ArgumentError
+        If the sweep is over other than one or two axes, or no result is one real number per point.
+    """
+    if not {"status", "message"} <= set(getattr(swept, "data_vars", ())):
+        raise arguments.refusal("swept", "be a dataset made with hybrid.sweep", swept)
+    dims = tuple(map(str, swept.status.dims))
+    _check_axes(swept, dims)
+    numbers = [
+        str(name)
+        for name, values in swept.data_vars.items()
+        if values.dims == dims and values.dtype.kind in "fiu" and name != "status"
+    ]
+    if not numbers:
+        raise ArgumentError(f"swept must hold one real number per point to be drawn; {_instead(swept, dims)}")
+    area = dot_area(swept.status.size, size)
+    high = 1.5 if len(dims) == 1 else 3.0
+    axes = axes_for(ax, len(numbers), (6.4, 0.8 + high * len(numbers)), figsize)
+    failed = swept.status.values != StatusCode.SUCCESS
+    for row, name in zip(axes, numbers, strict=True):
+        label = with_unit(name, swept[name].attrs.get("units"))
+        if len(dims) == 1:
+            _draw_line(row, swept, dims[0], name, failed, area)
+            row.set_ylabel(label)
+        else:
+            _draw_map(row, swept, dims, name, failed, label)
+        plain(row)
+    for row in axes if len(dims) == 2 else axes[-1:]:
+        row.set_xlabel(_axis_label(swept, dims[-1]))
+    if failed.any():
+        small_legend(axes[0])
+    return axes
+
+
+def _draw_line(ax: Axes, swept: xarray.Dataset, dim: str, name: str, failed: np.ndarray, area: float) -> None:
+    at, values = swept[dim].values, swept[name].values
+    order = np.argsort(at)
+    ax.plot(at[order], values[order], "o-", color=COLOURS[0], linewidth=0.9, markersize=np.sqrt(area))
+    if failed.any():
+        mark(ax, at[failed], "|", FAILED_COLOUR, FAILED)
+
+
+def _draw_map(
+    ax: Axes, swept: xarray.Dataset, dims: tuple[str, ...], name: str, failed: np.ndarray, label: str
+) -> None:
+    down, across = dims
+    x, y = swept[across].values, swept[down].values
+    values = np.ma.masked_invalid(np.where(failed, np.nan, swept[name].values.astype(float)))
+    picture = ax.pcolormesh(x, y, values, shading="nearest", cmap="viridis", rasterized=True)
+    ax.figure.colorbar(picture, ax=ax, label=label)
+    if failed.any():
+        rows, columns = np.nonzero(failed)
+        ax.plot(x[columns], y[rows], "x", color=FAILED_COLOUR, markersize=5, label=FAILED, clip_on=False)
+    ax.set_ylabel(_axis_label(swept, down))
+
+
+def _check_axes(swept: xarray.Dataset, dims: tuple[str, ...]) -> None:
+    if len(dims) not in (1, 2):
+        taken = ", ".join(f"{name}=0" for name in dims[:-2])
+        remedy = f"Take a plane: swept.isel({taken})." if dims else "Print it."
+        raise ArgumentError(
+            f"swept must be over one or two axes to be drawn; this one is over {', '.join(dims) or 'none'}. "
+            f"{remedy}"
+        )
+    for dim in dims:
+        columns = [str(name) for name, values in swept.coords.items() if values.dims == (dim,)]
+        if dim not in swept.coords and columns:
+            raise ArgumentError(
+                f"swept must be over axes with values; this one is over a table of points of "
+                f"{', '.join(columns)}. Name the one to draw over: swept.swap_dims({dim}={columns[0]!r})."
+            )
+
+
+def _instead(swept: xarray.Dataset, dims: tuple[str, ...]) -> str:
+    """What the dataset holds instead, and how to get one number per point."""
+    for name, values in swept.data_vars.items():
+        inner = [str(dim) for dim in values.dims if dim not in dims]
+        if inner and values.dtype.kind in "fiu":
+            taken = ", ".join(f"{dim}=0" for dim in inner)
+            return f"{name} is an array per point. Take an entry: swept.isel({taken})."
+    return "this one holds none. Let the task return a mapping of names to numbers."
+
+
+def _axis_label(swept: xarray.Dataset, name: str) -> str:
+    return with_unit(name, swept[name].attrs.get("units"))
+
+
+def _units(dataset: xarray.Dataset, names: tuple[str, ...]) -> list[str]:
+    """Units of the components of the state, empty where there are none."""
+    return [str(unit) for unit in dataset["unit"].values] if "unit" in dataset.coords else [""] * len(names)

@@ -1,0 +1,128 @@
+"""The jumps of an arc over time, and the bounds of the errors of a run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.display.tables import with_unit
+from hybrid.plot.style import COLOURS, Rows, axes_for, colour_of, mark, plain, small_legend
+from hybrid.simulation.arc import HybridArc, Jumps
+from hybrid.simulation.labelled import Names
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARKS = {"transverse": "|", "grazing": "o", "limit": ">"}
+# The least error drawn on a logarithmic scale.
+LEAST = 1e-300
+
+
+class ErrorBounds(Protocol):
+    """The data to draw: a run and the bounds of its errors, from :func:`hybrid.global_error`."""
+
+    @property
+    def arc(self) -> HybridArc:
+        """The run."""
+        ...
+
+    @property
+    def x(self) -> np.ndarray:
+        """Bounds of the errors of the last state."""
+        ...
+
+    @property
+    def jumps(self) -> np.ndarray:
+        """Bounds of the errors of the times of the jumps."""
+        ...
+
+
+def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None) -> Axes:
+    """Draw jumps over time: one row per transition, dots for grazings, triangles for limits of chatter.
+
+    Parameters
+    ----------
+    jumps
+        From an arc, ``arc.jumps``.
+    ax
+        Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    arguments.instance("jumps", jumps, Jumps, "Take those of an arc: arc.jumps.")
+    fired = [name for name in jumps.system.transition_names if np.any(jumps.transition == name)]
+    (ax,) = axes_for(ax, 1, (7.0, 1.0 + 0.4 * max(len(fired), 1)), figsize)
+    for row, name in enumerate(fired):
+        for kind, marker in MARKS.items():
+            at = jumps.t[(jumps.transition == name) & (jumps.kind == kind)]
+            if len(at):
+                ax.plot(at, np.full(len(at), row), marker, color=colour_of(row), markersize=7)
+    seen = [kind for kind in MARKS if np.any(jumps.kind == kind)]
+    ax.set_yticks(range(len(fired)), fired)
+    ax.set_ylim(max(len(fired), 1) - 0.5, -0.5)
+    ax.set_xlabel(Names(jumps.system.state_names, jumps.system.units).label("t"))
+    plain(ax)
+    if seen and seen != ["transverse"]:
+        for kind in seen:
+            ax.plot([], [], MARKS[kind], color="0.35", label=kind)
+        small_legend(ax)
+    return ax
+
+
+def plot_global_error(
+    result: ErrorBounds,
+    *,
+    ax: Axes | list[Axes] | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Rows:
+    """Draw the bounds of the errors: of the last state per component, below of the times of the jumps.
+
+    Parameters
+    ----------
+    result
+        From :func:`hybrid.global_error`.
+    ax
+        Axes to draw into, two if the run has jumps, else one; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+
+    Returns
+    -------
+    numpy.ndarray
+        The axes; ``.figure`` is their figure.
+    """
+    if not isinstance(getattr(result, "arc", None), HybridArc):
+        raise arguments.refusal("result", "be a GlobalError, from hybrid.global_error", result)
+    system, bounds = result.arc.system, result.jumps
+    names = Names(system.state_names, system.units)
+    count = 2 if len(bounds) else 1
+    axes = axes_for(ax, count, (6.4, 0.8 + 2.2 * count), figsize, shared=False)
+    places = np.arange(system.dimension)
+    known = np.isfinite(result.x)
+    axes[0].plot(places[known], np.maximum(result.x[known], LEAST), "o", color=COLOURS[0])
+    if not known.all():
+        mark(axes[0], places[~known], "^", COLOURS[1], "not known")
+        small_legend(axes[0])
+    axes[0].set_xticks(places, [names.label(name) for name in names.state])
+    axes[0].set_xlim(-0.5, system.dimension - 0.5)
+    axes[0].set_ylabel("error of the last state")
+    if len(bounds):
+        t, known = result.arc.jumps.t, np.isfinite(bounds)
+        axes[1].plot(t[known], np.maximum(bounds[known], LEAST), "o", color=COLOURS[0], markersize=4)
+        if not known.all():
+            told = "not known: tighter runs jump differently"
+            mark(axes[1], t[~known], "|", COLOURS[1], told)
+            small_legend(axes[1])
+        axes[1].set_xlabel(names.label("t"))
+        axes[1].set_ylabel(with_unit("error of jump times", system.units.get("t")))
+    for row in axes:
+        row.set_yscale("log")
+        row.grid(True, axis="y", color="0.9")
+        plain(row)
+    return axes

@@ -1,0 +1,190 @@
+"""Estimates of exponents over the number of intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import ArgumentError, arguments
+from hybrid.display.tables import with_unit
+from hybrid.plot.style import axes_for, mark
+from lyapunov.spectrum import LyapunovSpectrum
+from lyapunov.two_orbit import TwoOrbitExponents
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Distinct for the colour-blind and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
+INK = "#333333"
+MINUS_INFINITY = "minus infinity"
+POINTS_OF_A_LINE = 1500
+FIGURE = (6.4, 3.8)
+
+
+def plot_convergence(
+    estimates: Mapping[str, ArrayLike],
+    *,
+    points: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    points_label: str = "published",
+    truth: float | None = None,
+    truth_label: str = "exact",
+    unit: str = "",
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Axes:
+    """Estimates of an exponent against the number of intervals.
+
+    Parameters
+    ----------
+    estimates
+        Maps each label to its history ``(M,)`` over 1, 2, ..., M intervals.
+    points
+        Maps a label to a pair, numbers of intervals and values: other estimates, drawn in the label's colour.
+    truth
+        Exact value, drawn as a line.
+    points_label, truth_label
+        Names of the points and of the line in the legend.
+    unit
+        Unit of the estimates, for the axis.
+    ax
+        Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    """
+    histories = {
+        label: numbers(f"estimates[{arguments.shown(label)}]", estimate, 1)
+        for label, estimate in arguments.mapping("estimates", estimates, "map labels to histories").items()
+    }
+    points = {
+        label: _pair(f"points[{arguments.shown(label)}]", pair)
+        for label, pair in arguments.mapping("points", points, "map labels to numbers and values").items()
+    }
+    for name, text in (("points_label", points_label), ("truth_label", truth_label), ("unit", unit)):
+        arguments.instance(name, text, str)
+    truth = None if truth is None else arguments.number("truth", truth)
+    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    # Later lines are thinner, so that both of two coinciding lines are visible.
+    widths = (2.2, 0.9) if len(histories) > 1 else (1.3,)
+    if truth is not None:
+        ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
+    for i, (label, history) in enumerate(histories.items()):
+        at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
+        at = at[(at > 0) & (at <= len(history))]
+        width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
+        ax.plot(at, history[at - 1], color=colour, label=label, linewidth=width)
+        if label in points:
+            ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white")
+    if points:
+        ax.plot([], [], "o", color=INK, markersize=4.5, markerfacecolor="white", label=points_label)
+    ax.set_xscale("log")
+    ax.set_xlabel("intervals $M$")
+    ax.set_ylabel(with_unit("exponent estimate", unit))
+    ax.grid(True, axis="y")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend()
+    return ax
+
+
+def plot_spectrum(
+    spectrum: LyapunovSpectrum, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
+) -> Axes:
+    """Estimates of the exponents against the number of intervals, with a bar of two standard errors.
+
+    Parameters
+    ----------
+    spectrum
+        From :func:`lyapunov.lyapunov_spectrum`, with its history.
+    ax
+        Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+
+    Raises
+    ------
+    ArgumentError
+        If the spectrum has no history.
+    """
+    arguments.instance("spectrum", spectrum, LyapunovSpectrum, "Make one with lyapunov.lyapunov_spectrum.")
+    if not len(spectrum.growths):
+        raise ArgumentError("spectrum must have a history; this one has none. Compute it with history=True.")
+    labels = [f"$\\lambda_{{{i + 1}}}$ = {value:.5g}" for i, value in enumerate(spectrum.exponents)]
+    history = {label: spectrum.history[:, i] for i, label in enumerate(labels)}
+    ax = plot_convergence(
+        history,
+        truth=0.0,
+        truth_label="zero",
+        unit=spectrum.names.rate.get("units", ""),
+        ax=ax,
+        figsize=figsize,
+    )
+    values, errors = spectrum.exponents, 2 * spectrum.standard_error
+    shown = np.isfinite(values)
+    if np.isneginf(values).any():
+        mark(ax, [len(spectrum.growths)], "v", INK, MINUS_INFINITY)
+        ax.legend()
+    for i in np.flatnonzero(shown):
+        ax.errorbar(
+            len(spectrum.growths),
+            values[i],
+            errors[i],
+            color=COLOURS[i % len(COLOURS)],
+            capsize=3,
+            linewidth=1,
+        )
+    # The first estimates are far off, so the limits fit the later nine tenths.
+    late = spectrum.history[len(spectrum.growths) // 10 :, shown].ravel()
+    inside = [*(values - errors)[shown], *(values + errors)[shown], *late, 0.0]
+    bottom, top = min(inside), max(inside)
+    margin = 0.1 * (top - bottom) or 1.0
+    ax.set_ylim(bottom - margin, top + margin)
+    return ax
+
+
+def plot_two_orbits(
+    result: TwoOrbitExponents, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
+) -> Axes:
+    """Estimates from two orbits over the number of intervals: two that saturate, one that converges.
+
+    Parameters
+    ----------
+    result
+        From :func:`lyapunov.two_orbit_exponents`.
+    ax
+        Axes to draw into; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+    """
+    arguments.instance("result", result, TwoOrbitExponents, "Make one with lyapunov.two_orbit_exponents.")
+    histories = {
+        "renormalised, converges": result.renormalised,
+        "one piece, saturates": result.single_piece,
+        "undivided, saturates": result.undivided,
+    }
+    return plot_convergence(
+        histories, truth=0.0, truth_label="zero", unit=result.unit, ax=ax, figsize=figsize
+    )
+
+
+def numbers(name: str, value: object, axes: int) -> np.ndarray:
+    """An array of numbers with the given number of axes."""
+    wanted = f"be an array of numbers of {axes} dimension{'s' if axes > 1 else ''}"
+    found = arguments.numbers(name, value, wanted)
+    if found.ndim != axes:
+        raise arguments.refusal(name, wanted, value)
+    return found
+
+
+def _pair(name: str, value: object) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of intervals, and the values after them."""
+    wanted = "be two lists of numbers of one length"
+    both = arguments.items(name, value, wanted)
+    if len(both) != 2:
+        raise arguments.refusal(name, wanted, value)
+    at, values = (numbers(name, each, 1) for each in both)
+    if len(at) != len(values):
+        raise arguments.refusal(name, wanted, value)
+    return at, values
