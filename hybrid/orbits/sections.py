@@ -108,8 +108,8 @@ def stroboscopic_section(
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`; the system must declare a period.
     periods, transient
-        Number of points, and number of forcing periods to run before the first point: none by default, since a
-        section may show how an orbit settles. (Exponents leave out 200 intervals by default.)
+        Number of points, and number of forcing periods to run before the first point: none by default,
+        since a section may show how an orbit settles. (Exponents leave out 200 intervals by default.)
     t0
         Time at the start; its phase is that of the section.
     progress

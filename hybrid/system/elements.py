@@ -92,9 +92,10 @@ class Guard(Portable):
 
 @attrs.frozen
 class Reset(Portable):
-    """The map ``R(t, x, p)`` applied at the crossing; it returns one value per state, or a dict of those that change.
+    """The map ``R(t, x, p)`` applied at the crossing.
 
-    The state that it receives lies beyond the guard, by a few units in the last place.
+    It returns one value per state, or a dict of those that change. The state that it receives lies beyond the
+    guard, by a few units in the last place.
 
     Parameters
     ----------
