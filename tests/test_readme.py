@@ -28,7 +28,7 @@ LINK = re.compile(r"\]\((?!https?://)([^)#]+)\)")
 
 
 def run(page):
-    """The namespace after the page's blocks, the printed text, and the comments with numbers that do not hold."""
+    """The namespace after the page's blocks, the printed text, and the comments whose numbers do not hold."""
     text = page.read_text(encoding="utf-8")
     namespace, printed, wrong = {"__name__": "page"}, io.StringIO(), []
     with contextlib.redirect_stdout(printed):
@@ -37,28 +37,23 @@ def run(page):
             source = "\n" * text.count("\n", 0, block.start(1)) + block[1]
             comments = comments_of(source)
             for statement in ast.parse(source).body:
-                start = printed.tell()
                 if not isinstance(statement, ast.Expr):
                     exec(compile(ast.Module([statement], []), str(page), "exec"), namespace)
                     continue
+                start = printed.tell()
                 value = eval(compile(ast.Expression(statement.value), str(page), "eval"), namespace)
+                shown = [*numbers_of(value), *map(float, NUMBER.findall(printed.getvalue()[start:]))]
                 comment = comments.get(statement.end_lineno, "")
-                found = [*numbers_of(value), *map(float, NUMBER.findall(printed.getvalue()[start:]))]
-                missing = [number for number in NUMBER.findall(comment) if not is_among(number, found)]
-                if missing:
-                    wrong.append(f"{page.name}:{statement.end_lineno}: {missing} of: {comment}; found {found[:20]}")
+                if not all(is_among(number, shown) for number in NUMBER.findall(comment)):
+                    wrong.append((statement.end_lineno, comment, shown[:20]))
     plt.close("all")
     return namespace, printed.getvalue(), wrong
 
 
 def comments_of(source):
-    """The comments of a block by the number of their line; a statement has the comment of its last line."""
-    comments = {}
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type == tokenize.COMMENT:
-            line = token.start[0]
-            comments[line] = token.string
-    return comments
+    """The comments of a block by their lines; that of a statement's last line says what the statement gives."""
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    return {token.start[0]: token.string for token in tokens if token.type == tokenize.COMMENT}
 
 
 def numbers_of(value):
