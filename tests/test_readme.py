@@ -51,7 +51,7 @@ def run(page):
 
 
 def comments_of(source):
-    """The comments of a block by their lines; that of a statement's last line says what the statement gives."""
+    """The comments of a block by their lines; that of an expression's last line says what it gives."""
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     return {token.start[0]: token.string for token in tokens if token.type == tokenize.COMMENT}
 
