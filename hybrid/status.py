@@ -44,8 +44,9 @@ class StatusCode(IntEnum):
 class Status:
     """Code, message and remedy of a result.
 
-    ``status.ok`` is true only for a complete and valid result. If a run ended early, the result holds
-    everything that was computed before.
+    ``status.ok`` is true for ``SUCCESS`` alone: the result is complete and valid. It is false for
+    ``TERMINAL``, also where the model plans this end. If a run ended early, the result holds everything that
+    was computed before.
     """
 
     code: StatusCode

@@ -74,7 +74,8 @@ def chart(
     parameters
         Values of the other parameters.
     k
-        Number of exponents, 1 to n, or None for all.
+        Number of exponents, 1 to n, or None for all. By default the largest alone, where
+        :func:`lyapunov.lyapunov_spectrum` computes all.
     intervals, interval, transient, solver
         As for :func:`lyapunov.lyapunov_spectrum`.
     section

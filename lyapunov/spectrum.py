@@ -172,13 +172,14 @@ def lyapunov_spectrum(
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`.
     k
-        Number of exponents, 1 to n; all by default.
+        Number of exponents, 1 to n; all by default, since only all of them have a sum rule.
     intervals, interval
         Number of intervals to average over, and their length; by default the forcing period, or for an
         autonomous system the time scale of its field at the start: the reciprocal of the spectral radius of
         ``abs(D_x f)`` there.
     transient
-        Number of intervals to run first, with tangent vectors, and discard.
+        Number of intervals to run first, with tangent vectors, and discard: 200 by default, since exponents
+        belong to the attractor.
     t0
         Time at the start.
     history

@@ -1,8 +1,10 @@
 """Every Python block of the documentation runs, in order, in one namespace per page."""
 
+import ast
 import contextlib
 import io
 import re
+import tokenize
 from pathlib import Path
 
 import matplotlib as mpl
@@ -21,29 +23,65 @@ import models
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "README.md"]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 LINK = re.compile(r"\]\((?!https?://)([^)#]+)\)")
 
 
 def run(page):
-    """The namespace after the page's blocks, and the printed text."""
+    """The namespace after the page's blocks, the printed text, and the comments whose numbers do not hold."""
     text = page.read_text(encoding="utf-8")
-    namespace, printed = {"__name__": "page"}, io.StringIO()
+    namespace, printed, wrong = {"__name__": "page"}, io.StringIO(), []
     with contextlib.redirect_stdout(printed):
         for block in BLOCK.finditer(text):
             # Keep the line numbers of the page, for tracebacks.
             source = "\n" * text.count("\n", 0, block.start(1)) + block[1]
-            exec(compile(source, str(page), "exec"), namespace)
+            comments = comments_of(source)
+            for statement in ast.parse(source).body:
+                if not isinstance(statement, ast.Expr):
+                    exec(compile(ast.Module([statement], []), str(page), "exec"), namespace)
+                    continue
+                start = printed.tell()
+                value = eval(compile(ast.Expression(statement.value), str(page), "eval"), namespace)
+                shown = [*numbers_of(value), *map(float, NUMBER.findall(printed.getvalue()[start:]))]
+                comment = comments.get(statement.end_lineno, "")
+                if not all(is_among(number, shown) for number in NUMBER.findall(comment)):
+                    wrong.append((statement.end_lineno, comment, shown[:20]))
     plt.close("all")
-    return namespace, printed.getvalue()
+    return namespace, printed.getvalue(), wrong
+
+
+def comments_of(source):
+    """The comments of a block by their lines; that of an expression's last line says what it gives."""
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    return {token.start[0]: token.string for token in tokens if token.type == tokenize.COMMENT}
+
+
+def numbers_of(value):
+    """All numbers of a value: of an array its shape too, of other objects those that they print."""
+    if isinstance(value, (list, tuple)):
+        return [len(value), *(number for item in value for number in numbers_of(item))]
+    array = np.asarray(value)
+    if array.dtype.kind in "iufc":
+        return [*array.shape, *array.real.ravel().tolist(), *array.imag.ravel().tolist()]
+    return [float(number) for number in NUMBER.findall(repr(value))]
+
+
+def is_among(text, numbers):
+    """Whether one of the numbers is the one that is written, within one unit of its last digit."""
+    digits, _, exponent = text.partition("e")
+    unit = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
+    exact = "." not in text and not exponent
+    return any(abs(float(text) - number) <= (1e-9 if exact else 1.0001 * unit) for number in numbers)
 
 
 @pytest.mark.parametrize("page", PAGES[1:], ids=lambda page: page.name)
-def test_blocks_run(page):
-    run(page)
+def test_blocks_run_and_print_what_their_comments_say(page):
+    assert run(page)[2] == []
 
 
 def test_the_readme_shows_what_it_says():
-    names, printed = run(PAGES[0])
+    names, printed, wrong = run(PAGES[0])
+    assert wrong == []
     assert names["spectrum"].exponents == pytest.approx([0.298, -0.578], abs=0.02)
     assert names["spectrum"].sum_defect == pytest.approx(0.0, abs=1e-10)
     np.testing.assert_allclose(names["touch"].saltation, np.eye(2), atol=1e-10)
@@ -85,10 +123,15 @@ def test_the_readme_names_all_there_is():
     public = [*hybrid.__all__, *(name for name in lyapunov.__all__ if name.islower())]
     public += hybrid.testing.__all__
     public += [name for name in vars(models) if callable(getattr(models, name))]
-    public += [code.name for code in hybrid.StatusCode]
     missing = [name for name in public if f"`{name}`" not in text and f"{name}`" not in text]
     results = {"HybridArc", "Jump", "PeriodicOrbit", "Section"}
     assert not set(missing) - results, missing
+
+
+def test_the_page_on_statuses_has_one_row_per_code():
+    text = (ROOT / "docs" / "status.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([A-Z_]+)` \| .+ \| .+ \|$", text, re.MULTILINE)
+    assert sorted(rows) == sorted(code.name for code in hybrid.StatusCode)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

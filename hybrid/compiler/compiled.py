@@ -360,6 +360,13 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
         the Python function.
     ArgumentError
         If ``system`` is not a HybridSystem.
+
+    Examples
+    --------
+    >>> import models
+    >>> print(compile_system(models.bouncing_ball()))
+    CompiledSystem of ...: 2 states
+      mode flight: exact (polynomials of degree 2)...
     """
     as_system("system", system)
     compiled: CompiledSystem | None = system._compiled

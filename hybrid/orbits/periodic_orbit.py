@@ -91,7 +91,8 @@ def periodic_orbit(
     period
         Guess of the period (autonomous systems).
     solver
-        By default ``DOP853(rtol=1e-12, atol=1e-14)``.
+        By default ``DOP853(rtol=1e-12, atol=1e-14)``, where :func:`hybrid.simulate` has ``Taylor``: Newton's
+        method needs tighter tolerances than one run.
     tolerance
         Newton's method stops when the residual of each component is below ``tolerance`` times the distance
         that this component moves over the period, or is at the level of rounding.

@@ -108,7 +108,8 @@ def stroboscopic_section(
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`; the system must declare a period.
     periods, transient
-        Number of points, and number of forcing periods to run before the first point.
+        Number of points, and number of forcing periods to run before the first point: none by default,
+        since a section may show how an orbit settles. (Exponents leave out 200 intervals by default.)
     t0
         Time at the start; its phase is that of the section.
     progress
@@ -223,7 +224,7 @@ def poincare_section(
     section
         Guard whose zeros are the surface; its direction says which crossings count.
     points, transient
-        Number of points, and number of crossings to skip before the first point.
+        Number of points, and number of crossings to skip before the first point: none by default.
     t0
         Time at the start.
     progress

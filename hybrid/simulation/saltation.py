@@ -61,6 +61,13 @@ def saltation_matrix(
     ----------
     N. J. Kong, J. J. Payne, J. Zhu, A. M. Johnson, Saltation matrices: the essential tool for linearizing
     hybrid dynamical systems, Proceedings of the IEEE, 2024, arXiv:2306.06862.
+
+    Examples
+    --------
+    >>> import models
+    >>> matrix = saltation_matrix(models.bouncing_ball(), "bounce", 0.0, (0.0, -2.0), parameters={"e": 0.5})
+    >>> matrix.diagonal().tolist()
+    [-0.5, -0.5]
     """
     compiled = compile_system(system)
     index = system.transition_index(transition)

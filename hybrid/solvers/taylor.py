@@ -28,7 +28,8 @@ class Taylor(Solver):
     - **Runge-Kutta pair** DOP853: fields that cannot be traced or have kinks inside the mode.
 
     ``print(hybrid.compile_system(system))`` shows the method of each mode, and the reason. Crossings are
-    isolated on the guards' own series; in exact modes no crossing is missed unless rounding hides it.
+    isolated on the guards' own series: in exact modes no crossing is missed unless rounding hides it, in
+    other modes none of the computed solution.
 
     The recurrences follow from the traced expressions. The tolerances bound the last terms of the state's
     series as those of :class:`DOP853` bound its error estimate; the bound for tangent vectors is a tenth of

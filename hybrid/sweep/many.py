@@ -57,8 +57,9 @@ def simulate_many(
 ) -> xarray.Dataset:
     """Run a system from many starts: where each run ends, and its state at the samples.
 
-    The ends are those of :func:`hybrid.simulate` to the last bit. A run that fails does so alone. Ctrl-C ends
-    the call, not the program: runs that are not complete have the status ``NOT_RUN``.
+    The ends are those of :func:`hybrid.simulate` to the last bit, except with ``samples``, where steps end at
+    the samples. A run that fails does so alone. Ctrl-C ends the call, not the program: runs that are not
+    complete have the status ``NOT_RUN``.
 
     Parameters
     ----------

@@ -214,6 +214,15 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
     ------
     ArgumentError
         If there is no store.
+
+    Examples
+    --------
+    >>> import tempfile, hybrid
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     squares = hybrid.sweep(lambda point: {"square": point["a"] ** 2}, {"a": [1.0, 2.0, 3.0]})
+    ...     squares.to_netcdf(f"{folder}/squares.nc")
+    ...     open_store(f"{folder}/squares.nc").load().square.values.tolist()
+    [1.0, 4.0, 9.0]
     """
     import xarray
 

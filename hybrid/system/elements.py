@@ -54,8 +54,8 @@ class Guard(Portable):
         ``n`` if the guard does not depend on time. Derived from ``function`` if omitted.
     when
         Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if the condition
-        is positive (or true) there, and is ignored otherwise. The condition is evaluated only at crossings
-        and on entry to the mode, and need not be continuous.
+        is positive (or true) there, and is ignored otherwise. The condition is evaluated only at crossings,
+        and on entry to the mode if the state is already on or beyond the guard. It need not be continuous.
     at_start
         If True, crossings are not searched for: the transition fires only if a run starts in the mode with
         the state beyond the guard by more than rounding. ``direction`` says which side is beyond.
@@ -92,12 +92,15 @@ class Guard(Portable):
 
 @attrs.frozen
 class Reset(Portable):
-    """The map ``R(t, x, p)`` applied at the crossing; it returns one value per state.
+    """The map ``R(t, x, p)`` applied at the crossing.
+
+    It returns one value per state, or a dict of those that change. The state that it receives lies beyond the
+    guard, by a few units in the last place.
 
     Parameters
     ----------
     function
-        ``R(t, x, p)``, ``n`` values.
+        ``R(t, x, p)``, ``n`` values, or a dict of the components that change, such as ``{"v": -p.e * x.v}``.
     jacobian
         Optional ``(t, x, p)`` function that returns the rows of ``D_x R``, each of ``n`` values, or of
         ``n + 1`` with ``D_t R`` last. Derived from ``function`` if omitted.

@@ -128,6 +128,14 @@ def split(system: HybridSystem) -> HybridSystem:
     L. Dieci, L. Lopez, Sliding motion on discontinuity surfaces of high co-dimension, Numerische Mathematik
     117, 2011, doi:10.1007/s00211-011-0365-4.
     V. I. Utkin, Sliding Modes in Control and Optimization, Springer, 1992, doi:10.1007/978-3-642-84379-2.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hybrid import HybridSystem, Mode
+    >>> block = Mode("block", lambda t, x, p: (x.v, -x.q - 0.3 * np.sign(x.v)))
+    >>> split(HybridSystem(state=("q", "v"), modes=[block])).mode_names
+    ('v<0', 'v>0', 'v=0')
     """
     as_system("split: system", system)
     # SymPy is slow to import, so it is not imported with the library.
