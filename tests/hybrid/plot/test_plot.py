@@ -280,9 +280,15 @@ def test_a_section_of_one_component_is_drawn_over_time():
     assert plot(circle) is not None
 
 
-def test_axes_come_last_and_by_keyword():
+def test_axes_and_sizes_come_last_and_by_keyword():
     for module in (hybrid.plot, lyapunov.plot):
         for name, function in vars(module).items():
             if name.startswith("plot_") and "ax" in inspect.signature(function).parameters:
-                last = list(inspect.signature(function).parameters.values())[-1]
-                assert (last.name, last.kind, last.default) == ("ax", inspect.Parameter.KEYWORD_ONLY, None)
+                options = list(inspect.signature(function).parameters.values())
+                first = [option.name for option in options].index("ax")
+                assert [option.name for option in options[first:]] in (
+                    ["ax", "figsize"],
+                    ["ax", "figsize", "size"],
+                )
+                for option in options[first:]:
+                    assert (option.kind, option.default) == (inspect.Parameter.KEYWORD_ONLY, None)
