@@ -108,7 +108,7 @@ def plot_map(
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    check_axes(ax)
+    check_axes(ax, figsize)
     exponent = arguments.count("exponent", exponent, 0, as_chart(chart).sizes["exponent"] - 1)
     two_axes(chart)
     values = settled(chart)[..., exponent]
@@ -154,7 +154,7 @@ def plot_kinds(
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    check_axes(ax)
+    check_axes(ax, figsize)
     two_axes(as_chart(chart))
     found = kinds(chart).values
     (ax,) = axes_for(ax, 1, FIGURE, figsize)

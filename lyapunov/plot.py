@@ -121,13 +121,14 @@ def plot_phase_portrait(
         raise arguments.refusal("section", f"hold points of {system.dimension} components", section)
     names = Names(system.state_names, system.units)
     across, up = axis_labels(labels, names.label(names.state[i]), names.label(names.state[j]))
+    large, small = (26.0, 2.0) if size is None else (dot_area(1, size),) * 2
     (ax,) = axes_for(ax, 1, FIGURE, figsize)
     orbit = _dense(arc)
     ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
     if marks is not None:
         # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
         spread = np.ptp(marks, axis=0) > SAME_POINT * np.ptp(orbit, axis=0) if len(marks) else False
-        area = (2.0 if np.any(spread) else 26.0) if size is None else dot_area(1, size)
+        area = small if np.any(spread) else large
         ax.scatter(
             marks[:, i], marks[:, j], s=area, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
         )

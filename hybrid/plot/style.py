@@ -33,10 +33,12 @@ def as_component(name: str, names: Sequence[str], component: object) -> int:
     )
 
 
-def check_axes(value: object) -> None:
-    """Raise an ArgumentError if an argument ``ax`` is neither None nor matplotlib axes."""
-    if value is not None:
-        _as_axes(value)
+def check_axes(ax: object, figsize: object = None) -> None:
+    """Raise an ArgumentError if ``ax`` is neither None nor matplotlib axes, or ``figsize`` no size."""
+    if ax is not None:
+        _as_axes(ax)
+    if figsize is not None:
+        _as_figsize(figsize)
 
 
 def _as_axes(value: object) -> Axes:

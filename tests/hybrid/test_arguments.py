@@ -45,6 +45,10 @@ def made():
             BALL, (1.0, 0.0), (0.0, 0.3), methods={"T": hybrid.Taylor()}, tolerances=[1e-6], repeats=1
         ),
         "section": hybrid.stroboscopic_section(OSCILLATOR, (0.0, 0.0), periods=3),
+        "ends": hybrid.simulate_many(BALL, [(1.0, 0.0), (2.0, 0.0)], (0.0, 0.1)),
+        "error": hybrid.global_error(BALL, (1.0, 0.0), (0.0, 0.1)),
+        "swept": hybrid.sweep(lambda point: {"square": point["a"] ** 2}, {"a": [1.0, 2.0]}),
+        "two": lyapunov.two_orbit_exponents(OSCILLATOR, (0.0, 0.0), intervals=5),
         "spectrum": lyapunov.lyapunov_spectrum(OSCILLATOR, (0.0, 0.0), intervals=5),
     }
 
@@ -94,7 +98,7 @@ def public_functions():
     for module in (hybrid, hybrid.testing, lyapunov):
         found += [getattr(module, name) for name in module.__all__]
     plots = [each for name, each in vars(lyapunov.plot).items() if name.startswith("plot_")]
-    assert len(plots) == 8
+    assert len(plots) == 10
     found += [*plots, lyapunov.plot.style, lyapunov.study.regimes.plot_regimes]
     found += [getattr(hybrid.plot, name) for name in hybrid.plot.__all__ if name.startswith("plot")]
     found += [each for name, each in vars(models).items() if inspect.isfunction(each)]

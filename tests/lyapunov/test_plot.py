@@ -169,19 +169,19 @@ def test_a_spectrum_without_finite_exponents_is_drawn_too(lost, shown):
     """Each period a reset takes all of a state, or nothing."""
     system = hybrid.HybridSystem(
         state=("q", "v"),
-        parameters={"q": 1.0, "v": 1.0},
+        parameters={"a": 1.0, "b": 1.0},
         modes=[hybrid.Mode("on", lambda t, x, p: (-x.q, -2 * x.v))],
         transitions=[
             hybrid.Transition(
                 "on",
                 "on",
                 hybrid.Guard(lambda t, x, p: np.sin(2 * np.pi * (t - 0.5)), +1),
-                hybrid.Reset(lambda t, x, p: (p.q * x.q, p.v * x.v)),
+                hybrid.Reset(lambda t, x, p: (p.a * x.q, p.b * x.v)),
             )
         ],
         period=1.0,
     )
-    values = dict(zip("qv", lost, strict=True))
+    values = dict(zip("ab", lost, strict=True))
     spectrum = lyapunov.lyapunov_spectrum(system, (0.1, 0.2), parameters=values, intervals=10)
     assert np.isfinite(spectrum.exponents).sum() == shown
     ax = hybrid.plot.plot(spectrum)

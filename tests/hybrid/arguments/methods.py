@@ -6,6 +6,7 @@ import hybrid
 import lyapunov
 from hybrid import HybridSystem
 from models import contact
+from tests.hybrid.arguments.plots import FIGSIZE
 from tests.hybrid.arguments.values import (
     AXES,
     BALL,
@@ -47,7 +48,11 @@ def methods(made):
                 "quantity": [None, *NAME],
             },
         ),
-        (call(hybrid.WorkPrecision.plot, made["work"]), {"ax": AXES, "quantity": [None, *NAME]}),
+        (
+            call(hybrid.WorkPrecision.plot, made["work"]),
+            {"ax": AXES, "quantity": [None, *NAME], "figsize": FIGSIZE},
+        ),
+        (call(hybrid.GlobalError.plot, made["error"]), {"ax": AXES, "figsize": FIGSIZE}),
         (call(lyapunov.ModelComparison.cost, made["comparison"], "a"), {"name": [None, *NAME]}),
         (call(lyapunov.ModelComparison.distance, made["comparison"], "a"), {"name": [None, *NAME]}),
         *(

@@ -15,10 +15,13 @@ from tests.hybrid.arguments.values import (
     LABELS,
     NAME,
     OPTIONAL_NUMBER,
+    POSITIVE,
     SYSTEM,
     TEXT,
     call,
 )
+
+FIGSIZE = [3, "a", (1.0,), (1.0, -2.0), (1.0, np.inf), ("a", "b")]
 
 
 def plots(made):
@@ -30,6 +33,7 @@ def plots(made):
                 "arc": [None, "a", 3, BALL],
                 "components": [["nope"], "nope", 3, [2], [1.5], [None], [True]],
                 "ax": AXES,
+                "figsize": FIGSIZE,
             },
         ),
         (
@@ -39,23 +43,32 @@ def plots(made):
                 "x": COMPONENT,
                 "y": COMPONENT,
                 "ax": AXES,
+                "figsize": FIGSIZE,
             },
         ),
-        (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, "ax": AXES}),
+        (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, "ax": AXES, "figsize": FIGSIZE}),
         (call(hybrid.plot.plot, BALL), {"result": [None, "a", 3]}),
         (
             call(hybrid.plot.plot_section, made["section"]),
-            {"section": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES},
+            {
+                "size": POSITIVE,
+                "section": [None, "a", 3, arc],
+                "x": COMPONENT,
+                "y": COMPONENT,
+                "ax": AXES,
+                "figsize": FIGSIZE,
+            },
         ),
         (
             call(hybrid.plot.plot_orbit, made["orbit"]),
-            {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES},
+            {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES, "figsize": FIGSIZE},
         ),
         (
             call(hybrid.plot.plot_work_precision, made["work"]),
             {
                 "result": [None, "a", 3, BALL],
                 "ax": AXES,
+                "figsize": FIGSIZE,
                 "quantity": [None, *NAME],
             },
         ),
@@ -63,20 +76,24 @@ def plots(made):
             call(lyapunov.plot.plot_convergence, {"a": [1.0, 2.0]}),
             {
                 "ax": AXES,
+                "figsize": FIGSIZE,
                 "estimates": [[1], "a", {"a": "b"}, {"a": 1.0}, {"a": [[1.0]]}, {"a": [True]}],
                 "points": [[1], "a", {"a": 1.0}, {"a": ([1.0], [1.0, 2.0])}, {"a": ("a", "b")}],
                 "points_label": TEXT,
                 "truth": OPTIONAL_NUMBER,
                 "truth_label": TEXT,
+                "unit": TEXT,
             },
         ),
         (
             call(lyapunov.plot.plot_phase_portrait, arc, "q", "v"),
             {
                 "ax": AXES,
+                "figsize": FIGSIZE,
                 "arc": [None, "a", 3, BALL],
                 "x": COMPONENT,
                 "y": COMPONENT,
+                "size": POSITIVE,
                 "section": ["a", [1.0], [[True, False]], [["a", "b"]], 3.0],
                 "labels": LABELS,
             },
@@ -95,28 +112,77 @@ def plots(made):
                 "labels": LABELS,
             },
         ),
-        (call(lyapunov.plot.plot_exponents, chart), {"ax": AXES, "chart": [None, "a", 3, arc]}),
+        (
+            call(lyapunov.plot.plot_exponents, chart),
+            {"size": POSITIVE, "ax": AXES, "figsize": FIGSIZE, "chart": [None, "a", 3, arc]},
+        ),
         (
             call(lyapunov.plot.plot_bifurcation, chart),
             {
+                "size": POSITIVE,
                 "ax": AXES,
+                "figsize": FIGSIZE,
                 "chart": [None, "a", 3, arc],
                 "component": COMPONENT,
             },
         ),
         (
             call(lyapunov.plot.plot_kinds, chart),
-            {"ax": AXES, "chart": [None, "a", 3, arc, chart]},
+            {"ax": AXES, "figsize": FIGSIZE, "chart": [None, "a", 3, arc, chart]},
         ),
         (
             call(lyapunov.plot.plot_map, chart),
             {
                 "ax": AXES,
+                "figsize": FIGSIZE,
                 "chart": [None, "a", 3, arc],
                 "exponent": [1, *COUNT],
             },
         ),
-        (call(lyapunov.plot.plot_chart, chart), {"chart": [None, "a", 3, arc], "component": COMPONENT}),
-        (call(lyapunov.plot.plot_spectrum, made["spectrum"]), {"spectrum": [None, "a", 3, arc], "ax": AXES}),
+        (
+            call(lyapunov.plot.plot_chart, chart),
+            {
+                "size": POSITIVE,
+                "ax": AXES,
+                "figsize": FIGSIZE,
+                "chart": [None, "a", 3, arc],
+                "component": COMPONENT,
+            },
+        ),
+        (
+            call(lyapunov.plot.plot_spectrum, made["spectrum"]),
+            {"spectrum": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+        ),
         (call(lyapunov.plot.style), {}),
+        (
+            call(hybrid.plot.plot_ends, made["ends"]),
+            {
+                "ends": [None, "a", 3, arc],
+                "x": COMPONENT,
+                "y": COMPONENT,
+                "ax": AXES,
+                "figsize": FIGSIZE,
+                "size": POSITIVE,
+            },
+        ),
+        (
+            call(hybrid.plot.plot_sweep, made["swept"]),
+            {"swept": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": POSITIVE},
+        ),
+        (
+            call(hybrid.plot.plot_jumps, arc.jumps),
+            {"jumps": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+        ),
+        (
+            call(hybrid.plot.plot_global_error, made["error"]),
+            {"result": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+        ),
+        (
+            call(lyapunov.plot.plot_two_orbits, made["two"]),
+            {"result": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+        ),
+        (
+            call(lyapunov.plot.plot_comparison, made["comparison"]),
+            {"result": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+        ),
     ]

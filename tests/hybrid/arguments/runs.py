@@ -71,6 +71,7 @@ def runs(made):
                 "samples": SAMPLES,
                 "max_jumps": COUNT,
                 "executor": EXECUTOR[:-2],
+                "progress": FLAG[1:],
             },
         ),
         (call(hybrid.global_error, *start, (0.0, 1.0)), {**RUN, "t_span": SPAN, "max_jumps": COUNT}),

@@ -68,12 +68,7 @@ def test_sweeps_without_a_picture_say_what_has_one():
     with pytest.raises(ArgumentError, match=r"many is an array per point.*swept\.isel\(many_0=0\)"):
         plot(arrays)
     plot(arrays.isel(many_0=0))
-    table = (
-        swept((4,))
-        .rename(a="point")
-        .reset_coords("point", drop=True)
-        .assign_coords(e=("point", np.arange(4.0)))
-    )
+    table = swept((4,)).rename(a="point").drop_vars("point").assign_coords(e=("point", np.arange(4.0)))
     with pytest.raises(ArgumentError, match=r"table of points of e.*swap_dims\(point='e'\)"):
         plot(table)
     plot(table.swap_dims(point="e"))

@@ -51,7 +51,8 @@ def test_time_series_follow_the_dense_output_and_show_the_jumps(bounces):
     assert len(t) > 3 * len(bounces.t)
     np.testing.assert_array_equal(jumps[::3], np.column_stack([bounces.jumps.t, bounces.jumps.x_minus[:, 1]]))
     np.testing.assert_array_equal(jumps[1::3], np.column_stack([bounces.jumps.t, bounces.jumps.x_plus[:, 1]]))
-    assert (height.get_ylabel(), velocity.get_ylabel(), velocity.get_xlabel()) == ("q", "v", "t")
+    assert (height.get_ylabel(), velocity.get_ylabel()) == ("q (m)", "v (m/s)")
+    assert velocity.get_xlabel() == "t (s)"
     assert height.get_legend() is None
 
 
@@ -84,7 +85,7 @@ def test_an_arc_of_samples_is_drawn_through_them():
 
 def test_phase_portrait_names_its_axes(bounces):
     axes = plot_phase(bounces, 1, "q")
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("v", "q")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("v (m/s)", "q (m)")
     with pytest.raises(ArgumentError, match="State component 'height' does not exist"):
         plot_phase(bounces, "height", "v")
     with pytest.raises(ArgumentError, match="State component 2 does not exist; the state has 2"):
@@ -144,6 +145,15 @@ def test_an_orbit_of_one_component_is_drawn_over_itself():
     axes = plot(orbit)
     np.testing.assert_array_equal(curves(axes)[-1], [[orbit.x0[0]] * 2])
     assert "largest multiplier 0.001867" in axes.get_title(loc="left")
+
+
+def test_the_legend_of_an_orbit_is_not_over_its_title():
+    walk = models.simplest_walker()
+    orbit = hybrid.periodic_orbit(walk, (0.2003, 0.4006, -0.1998, -0.0158), mode="behind", period=3.88)
+    ax = plot(orbit, figsize=(4.0, 3.0))
+    ax.figure.draw_without_rendering()
+    boxes = [ax.get_legend().get_window_extent(), ax._left_title.get_window_extent()]
+    assert not boxes[0].overlaps(boxes[1])
 
 
 def test_graph_shows_modes_transitions_and_directions():
@@ -270,9 +280,15 @@ def test_a_section_of_one_component_is_drawn_over_time():
     assert plot(circle) is not None
 
 
-def test_axes_come_last_and_by_keyword():
+def test_axes_and_sizes_come_last_and_by_keyword():
     for module in (hybrid.plot, lyapunov.plot):
         for name, function in vars(module).items():
             if name.startswith("plot_") and "ax" in inspect.signature(function).parameters:
-                last = list(inspect.signature(function).parameters.values())[-1]
-                assert (last.name, last.kind, last.default) == ("ax", inspect.Parameter.KEYWORD_ONLY, None)
+                options = list(inspect.signature(function).parameters.values())
+                first = [option.name for option in options].index("ax")
+                assert [option.name for option in options[first:]] in (
+                    ["ax", "figsize"],
+                    ["ax", "figsize", "size"],
+                )
+                for option in options[first:]:
+                    assert (option.kind, option.default) == (inspect.Parameter.KEYWORD_ONLY, None)

@@ -83,4 +83,5 @@ def test_the_frame_is_open():
 
 
 def test_dots_share_an_area_within_limits():
-    assert [dot_area(count) for count in (0, 1, 200, 400, 4000, 10_000)] == [20.0, 20.0, 20.0, 10.0, 1.0, 0.6]
+    assert [dot_area(count) for count in (0, 1, 200, 400, 4000, 10_000)] == [20.0, 20.0, 20.0, 10.0, 1.0, 1.0]
+    assert dot_area(10_000, 3.0) == 9.0

@@ -218,8 +218,9 @@ def test_a_system_is_shown_as_a_table():
     system = models.vibroimpact()
     text = repr(system)
     assert text.splitlines()[0] == "HybridSystem vibro-impact"
-    assert "state: x1, x2, v1, v2" in text
-    assert "P = 500" in text
+    assert "state: x1 (m), x2 (m), v1 (m/s), v2 (m/s)" in text
+    assert "time: t (s)" in text
+    assert "P = 500 N" in text
     assert "modes: 'free', 'contact'" in text
     assert ", a function of the parameters" in text
     assert [line.split() for line in text.splitlines()[-2:]] == [
