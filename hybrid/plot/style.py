@@ -53,7 +53,7 @@ class Rows(np.ndarray):
     @property
     def figure(self) -> Figure:
         """The figure that the axes belong to, for instance to save it."""
-        return self.ravel()[0].get_figure(root=True)  # type: ignore[no-any-return]
+        return self.ravel()[0].get_figure(root=True)
 
     def __repr__(self) -> str:
         names = [each.get_ylabel() for each in self.ravel().tolist()]
