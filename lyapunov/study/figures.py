@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lyapunov.convergence import COLOURS, INK
 from lyapunov.floquet import floquet_exponents
-from lyapunov.plot import COLOURS, INK, plot_convergence, plot_phase_portrait, style
+from lyapunov.plot import plot_convergence, plot_phase_portrait, style
 from lyapunov.study.paper import ROWS
 from lyapunov.study.regimes import Panel, plot_regimes
 from lyapunov.study.report import histories, paper_columns

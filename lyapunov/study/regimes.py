@@ -10,7 +10,8 @@ import numpy as np
 
 from hybrid import HybridArc, arguments
 from hybrid.plot.style import as_component
-from lyapunov.plot import COLOURS, axis_labels, plot_convergence, plot_phase_portrait
+from lyapunov.convergence import COLOURS
+from lyapunov.plot import axis_labels, plot_convergence, plot_phase_portrait
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
