@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 # One colour per mode: the palette of Okabe and Ito, distinguishable with any colour vision, faint hues last.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
+# Diameter in points of a dot that fills a page.
+LARGEST_DOT = 1000.0
+
 
 def as_component(name: str, names: Sequence[str], component: object) -> int:
     """Index of a component of the state, given by name or index in the argument ``name``."""
@@ -136,7 +139,11 @@ def dot_area(count: int, size: float | None = None) -> float:
     The diameter is ``size``; by default larger for few dots, smaller for many, and a point at least.
     """
     if size is not None:
-        return arguments.positive("size", size, "be a positive diameter in points") ** 2
+        wanted = "be a positive diameter in points, at most 1000"
+        diameter = arguments.positive("size", size, wanted)
+        if diameter > LARGEST_DOT:
+            raise arguments.refusal("size", wanted, size)
+        return diameter**2
     return float(np.clip(4000 / max(count, 1), 1.0, 20.0))
 
 

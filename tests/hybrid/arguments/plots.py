@@ -21,6 +21,7 @@ from tests.hybrid.arguments.values import (
     call,
 )
 
+SIZE = [value for value in POSITIVE if value is not None]
 FIGSIZE = [3, "a", (1.0,), (1.0, -2.0), (1.0, np.inf), ("a", "b")]
 
 
@@ -51,7 +52,7 @@ def plots(made):
         (
             call(hybrid.plot.plot_section, made["section"]),
             {
-                "size": POSITIVE,
+                "size": SIZE,
                 "section": [None, "a", 3, arc],
                 "x": COMPONENT,
                 "y": COMPONENT,
@@ -93,7 +94,7 @@ def plots(made):
                 "arc": [None, "a", 3, BALL],
                 "x": COMPONENT,
                 "y": COMPONENT,
-                "size": POSITIVE,
+                "size": SIZE,
                 "section": ["a", [1.0], [[True, False]], [["a", "b"]], 3.0],
                 "labels": LABELS,
             },
@@ -114,12 +115,12 @@ def plots(made):
         ),
         (
             call(lyapunov.plot.plot_exponents, chart),
-            {"size": POSITIVE, "ax": AXES, "figsize": FIGSIZE, "chart": [None, "a", 3, arc]},
+            {"size": SIZE, "ax": AXES, "figsize": FIGSIZE, "chart": [None, "a", 3, arc]},
         ),
         (
             call(lyapunov.plot.plot_bifurcation, chart),
             {
-                "size": POSITIVE,
+                "size": SIZE,
                 "ax": AXES,
                 "figsize": FIGSIZE,
                 "chart": [None, "a", 3, arc],
@@ -142,7 +143,7 @@ def plots(made):
         (
             call(lyapunov.plot.plot_chart, chart),
             {
-                "size": POSITIVE,
+                "size": SIZE,
                 "ax": AXES,
                 "figsize": FIGSIZE,
                 "chart": [None, "a", 3, arc],
@@ -162,12 +163,12 @@ def plots(made):
                 "y": COMPONENT,
                 "ax": AXES,
                 "figsize": FIGSIZE,
-                "size": POSITIVE,
+                "size": SIZE,
             },
         ),
         (
             call(hybrid.plot.plot_sweep, made["swept"]),
-            {"swept": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": POSITIVE},
+            {"swept": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": SIZE},
         ),
         (
             call(hybrid.plot.plot_jumps, arc.jumps),
