@@ -45,8 +45,9 @@ class GlobalError:
     jumps
         ``(jumps,)``: those of the times of the jumps; infinite from the first jump on which the runs differ.
     status
-        That of the arc, or ``NOT_CONVERGED`` if tighter runs jump differently: then the tolerances do not
-        decide which events occur.
+        That of the arc, which says if a pulse may have been stepped over: the bounds do not cover that. Or
+        ``NOT_CONVERGED`` if tighter runs jump differently: then the tolerances do not decide which events
+        occur.
     """
 
     arc: HybridArc
@@ -64,7 +65,7 @@ class GlobalError:
 
     def __repr__(self) -> str:
         times = f", {self.jumps.max():.1e} in time of jumps" if len(self.jumps) else ""
-        return f"<GlobalError {self.x.max():.1e} in the last state{times}, {self.status.code.name}>"
+        return f"<GlobalError {self.x.max():.1e} in the last state{times}, {self.status.brief}>"
 
 
 @arguments.without_tolerances

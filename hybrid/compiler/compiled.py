@@ -283,6 +283,7 @@ class CompiledSystem:
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
             abrupt=_indices(self.emitted.abrupt),
+            bounded=_indices([self.emitted.pulses_excluded(mode) for mode in range(len(system.modes))]),
             fragile=_indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
             steep=_indices(bool(powers) for powers in self.emitted.steep),
             root=_indices(propagator.root for propagator in self.emitted.propagators),

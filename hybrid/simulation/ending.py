@@ -52,7 +52,7 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
 def _notes(trajectory: Trajectory, code: int) -> list[str]:
     """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
     notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory, code)]
-    return [*notes, *_unproved(trajectory), *_unresolved(trajectory)]
+    return [*notes, *_unproved(trajectory), *_unresolved(trajectory), *_unbounded(trajectory)]
 
 
 def _grow(trajectory: Trajectory, code: int) -> None:
@@ -164,6 +164,18 @@ def _unresolved(trajectory: Trajectory) -> Iterator[str]:
             f"On {steps} steps the forcing is not resolved: it changes, or its bounds are wide, over times "
             "as short as the rounding of time. A pulse may have been stepped over there."
         )
+
+
+def _unbounded(trajectory: Trajectory) -> Iterator[str]:
+    """A note on modes of the run whose forcing cannot be bounded."""
+    model, run = trajectory.model, trajectory.run
+    for mode, name in enumerate(trajectory.system.mode_names):
+        if not model.bounded[mode] and (mode == run.mode or run.stay[mode] > 0.0):
+            yield (
+                f"The forcing of mode {name!r} cannot be bounded. The solver sees its field at single points "
+                "of each step, so a pulse or a jump between them may have been stepped over. Write the field "
+                "with NumPy functions (np.where, np.clip), or shorten the steps with max_step= of the solver."
+            )
 
 
 def _kinks(trajectory: Trajectory) -> Iterator[str]:

@@ -73,7 +73,7 @@ def _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, wor
         # The guard jumps, or is flat.
         span = EPSILON * max(size_of_time(model, run.phase), farthest)
     cycle, phase, low = run.cycle, run.phase, run.phase_low
-    while span <= farthest:
+    while 0.0 < span <= farthest:
         for i in range(n):
             work.state[i] = run.y[i] + span * work.field[i]
         forward(run, model.period, span)

@@ -59,7 +59,8 @@ class Model(Structure):
     surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0. ``fragile``
     is 1 for a mode whose series may be undefined where its field is not, ``abrupt`` for one whose field may
-    change abruptly. ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of
+    change abruptly, ``bounded`` for one whose forcing can be bounded, so that no pulse in it is stepped over.
+    ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of
     all transitions; ``forcing_component`` is the component of the state whose rate a forcing is a term of, or
     -1; ``forcing_kind`` is one of those in ``codes``. Residues are rates that may cancel to their rounding:
     ``first_residue[m]`` is the first of mode ``m``, their programs are behind those of all forcings, and
@@ -114,6 +115,7 @@ class Model(Structure):
     degree: INDICES
     fragile: INDICES
     abrupt: INDICES
+    bounded: INDICES
     steep: INDICES
     root: INDICES
     field_before: INDICES

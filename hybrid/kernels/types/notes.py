@@ -23,6 +23,9 @@ def is_plain(model, run, beyond):
     for i in range(model.dimension):
         if run.trail[HELD, i] != 0.0:
             held += 1
+    for mode in range(model.bounded.shape[0]):
+        if model.bounded[mode] == 0 and (mode == run.mode or run.stay[mode] > 0.0):
+            return False
     may_run_dry = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA
     uncertain = run.unknown_time != 0.0 or run.lateness > MOST_LATENESS or may_run_dry
     return steps + run.order_mattered + held + beyond == 0 and not uncertain
