@@ -20,7 +20,7 @@ from hybrid.kernels.types.options import KERNEL
 BEYOND = 0.125
 # The next number beyond a guard that is exactly zero, and so has no rounding.
 NEXT_TO_ZERO = 1e-200
-# A jump lies no farther from where it was found than the state moves in so many times its rounding.
+# A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
 FARTHEST = 64.0
 # The flow goes on through the guard if its speed keeps this share on the way.
 KEPT = 0.5
@@ -61,13 +61,13 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, work):
+def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, farthest, work):
     """``land_beyond``, at most the time ``farthest`` on; ``run.scale`` has the sizes of the state itself."""
     n, mode = model.dimension, run.mode
     if _is_beyond(model, run, transition, side, run.y, work):
         return
     speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient) * side
-    span = _way_beyond(model, run, transition, side, work)
+    span = 0.0 if jumps else _way_beyond(model, run, transition, side, work)
     farthest = max(2.0 * span, farthest)
     if span == 0.0:
         # The guard jumps, or is flat.
@@ -104,8 +104,14 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     n = model.dimension
     model.field(run.mode, run.phase, run.y, model.parameters, work.field)
     farthest = FARTHEST * moment_of_rounding(model, run, run.phase, work)
+    jumps = may_jump(model, run, transition, run.phase, run.y, work)
+    if not jumps:
+        value = guard_value(model, transition, run.phase, run.y, work.scalar)
+        model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
+        if not abs(value) <= FARTHEST * rounding_band(model, run, transition, run.phase, run.y, work):
+            return
     for i in range(n):
         work.error[i], run.scale[i] = run.scale[i], abs(run.y[i])
-    _advance(model, run, transition, side, stop_cycle, stop_phase, farthest, work)
+    _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, farthest, work)
     for i in range(n):
         run.scale[i] = work.error[i]
