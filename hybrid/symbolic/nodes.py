@@ -21,7 +21,10 @@ MOST_EXPANDED = 2000
 # Facts that SymPy looks for in the tree below an expression.
 SIGNS = ("zero", "nonzero", "positive", "negative", "nonnegative", "nonpositive")
 KINDS = ("finite", "infinite", "integer", "noninteger", "even", "odd", "rational", "irrational", "algebraic")
+REALS = ("real", "extended_real", "complex", "hermitian")
 FACTS = (*SIGNS, *(f"extended_{sign}" for sign in SIGNS if sign != "zero"), *KINDS, "transcendental")
+
+ARCS = (sympy.asin, sympy.acos, sympy.atanh, sympy.acosh)
 
 _remembered: list[Any] = []
 # _seen, by identity: expressions seen so far, each with the one object that represents all equal ones.
@@ -60,6 +63,10 @@ def interned(expression: Any) -> Any:
         standing = _standing.get(key)
         if standing is None:
             standing = expression if same else expression.func(*own, evaluate=False)
+            if isinstance(standing, ARCS):
+                # SymPy asks for the modulus of their arguments, from which it takes the sign without end where
+                # it keeps a factor -1 outside of sums.
+                ask_no_more(standing)
             _standing[key] = standing
     else:
         standing = _standing.setdefault(expression, expression)
@@ -76,6 +83,8 @@ def ask_no_more(expression: sympy.Basic) -> None:
         expression._assumptions = expression.default_assumptions.copy()
     for fact in FACTS:
         expression._assumptions.setdefault(fact, None)
+    for fact in REALS:
+        expression._assumptions.setdefault(fact, True)
 
 
 def nodes(*expressions: sympy.Basic) -> Iterator[sympy.Basic]:

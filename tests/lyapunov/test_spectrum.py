@@ -49,6 +49,16 @@ def test_sum_rule(omega):
     assert abs(result.sum_defect) < 1e-8
 
 
+def test_the_sum_rule_holds_for_the_default_solver():
+    """Its series of the Hertzian contact runs on a clock of its own."""
+    result = lyapunov.lyapunov_spectrum(models.vibroimpact(), ORBIT_740, intervals=50)
+    assert abs(result.sum_defect) < 1e-6 * abs(result.sum_rule)
+    by_taylor = lyapunov.lyapunov_spectrum(
+        models.vibroimpact(), ORBIT_740, intervals=50, solver=hybrid.Taylor(rtol=1e-8, atol=1e-10)
+    )
+    assert abs(by_taylor.sum_defect) < 1e-6 * abs(by_taylor.sum_rule)
+
+
 def test_torus_has_a_zero_exponent():
     result = lyapunov.lyapunov_spectrum(
         models.vibroimpact(),

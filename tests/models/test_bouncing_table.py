@@ -101,3 +101,11 @@ def test_areas_contract_as_the_bounces_say():
     )
     assert len(arc.jumps) > 3
     assert np.linalg.det(arc.fundamental) == pytest.approx(0.8 ** (2 * len(arc.jumps)), rel=1e-7)
+
+
+def test_the_units_agree_with_each_other():
+    units = bouncing_table().units
+    assert units["A"] == units["q"] == "m"
+    assert units["v"] == f"{units['q']}/{units['t']}"
+    assert units["g"] == f"{units['q']}/{units['t']}^2"
+    assert units["w"] == f"rad/{units['t']}"

@@ -76,7 +76,9 @@ class TestAutonomous:
         assert orbit.status.ok
         assert orbit.period == pytest.approx(exact["period"], rel=1e-9)
         np.testing.assert_allclose(in_order(orbit.multipliers), sorted(exact["multipliers"]), atol=1e-7)
-        np.testing.assert_allclose(orbit.x0, [exact["theta"], exact["omega"]], atol=1e-7)
+        # The point lies away from the step; the state after it is on the arc.
+        jump = orbit.arc().jumps[0]
+        np.testing.assert_allclose(jump.x_plus, [exact["theta"], exact["omega"]], atol=1e-7)
 
     def test_stick_slip(self):
         exact = reference("stick_slip")
@@ -406,3 +408,26 @@ class TestNoOrbit:
     def test_bad_arguments(self, system, arguments, text):
         with pytest.raises(hybrid.ArgumentError, match=text):
             periodic_orbit(system, **({"x0": (0.5, 0.0)} | arguments))
+
+
+@pytest.mark.parametrize("t0", [3.0, 100.0, -7.5])
+def test_the_time_at_the_guess_does_not_matter_to_an_autonomous_orbit(t0):
+    """A clock that jumps once per period, with a memory that decays; the orbit begins far from time zero."""
+    system = HybridSystem(
+        state=("phase", "q"),
+        modes=[Mode("on", lambda t, x, p: (1.0, -x.q))],
+        transitions=[
+            hybrid.Transition(
+                "on",
+                "on",
+                hybrid.Guard(lambda t, x, p: x.phase - 1, +1),
+                hybrid.Reset(lambda t, x, p: (x.phase - 1, x.q + 1)),
+            )
+        ],
+    )
+    orbit = periodic_orbit(system, (0.97, 0.6), t0=t0, period=0.95)
+    assert orbit.status.ok
+    assert orbit.period == pytest.approx(1.0, rel=1e-10)
+    np.testing.assert_allclose(np.sort(np.abs(orbit.multipliers)), (np.exp(-1), 1.0), rtol=1e-9)
+    assert t0 <= orbit.t0 <= t0 + 2.1
+    assert orbit.arc()(orbit.t0 + 0.3).shape == (2,)

@@ -167,3 +167,17 @@ def test_a_multiple_of_a_difference_is_not_multiplied_out():
     [[slope]] = jacobian_of([sympy.Mul(3, c, a - b, evaluate=False)], [c])
     bit = np.finfo(float).eps
     assert sympy.lambdify((a, b), slope)(1.0 + bit, 1.0) == 3.0 * bit
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [np.sin, np.cos, np.tan, np.arcsin, np.arccos, np.arctan, np.sinh, np.cosh, np.tanh, np.exp]
+    + [np.arcsinh, np.arctanh, np.sqrt, np.cbrt, np.log1p, np.expm1, np.log, np.exp2, np.log2, np.log10],
+)
+def test_a_tangent_vector_follows_the_field(rate):
+    """Along an autonomous flow in one dimension the derivative of the end is the ratio of the rates."""
+    system = HybridSystem(state=("q",), modes=[Mode("on", lambda t, x, p: (rate(x.q),))])
+    for solver in (Taylor(), DOP853()):
+        arc = simulate(system, (0.4,), (0.0, 0.2), tangent=True, solver=solver)
+        wanted = rate(arc.x[-1, 0]) / rate(0.4)
+        np.testing.assert_allclose(arc.fundamental, [[wanted]], rtol=1e-6)

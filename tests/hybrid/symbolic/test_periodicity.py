@@ -60,3 +60,8 @@ def test_what_is_not(function):
 def test_half_a_turn_needs_two_periods():
     assert not proved(lambda t, x, p: np.cos(p.w * t / 2))
     assert proved(lambda t, x, p: np.cos(p.w * t / 2), turns=2)
+
+
+@pytest.mark.parametrize("share", [1e-7, 1e-9, 1e-11])
+def test_a_period_that_is_nearly_one_is_none(share):
+    assert not proved(lambda t, x, p: np.cos((1 + share) * p.w * t))

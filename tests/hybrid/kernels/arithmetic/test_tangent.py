@@ -290,3 +290,11 @@ def test_products_and_determinants_of_matrices_with_zeros(n, kind):
         assert found == -math.inf
     else:
         assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("small", [1e-17, 1e-19])
+def test_rows_are_exchanged_with_the_sizes_of_their_terms(small):
+    """The second pivot is small beside the terms of the other row, not beside those of its own."""
+    matrix = np.array([[0.0, small], [1.0, 1.0]])
+    found = log_determinant_and_nullity(matrix, np.array([[0.0, small], [1.0, 1.0]]))
+    assert found == (pytest.approx(np.log(small)), 0)
