@@ -129,7 +129,7 @@ def carry_rounding(model, run, transition, t, x, after, jacobian, sizes):
         size = 0.0
         for j in range(n):
             size += abs(jacobian[i, j]) * run.scale[j]
-        sizes[i] = max(size, abs(after[i])) if size < math.inf else abs(after[i])
+        sizes[i] = max(run.scale[i], size if size < math.inf else 0.0, abs(after[i]))
     for i in range(n):
         run.scale[i] = sizes[i]
 

@@ -12,8 +12,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.derivatives import moment_of_rounding
-from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band, size_of_time
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band
 from hybrid.kernels.types.options import KERNEL
 
 # The guard of an event is beyond zero by this share of its band, two units in the last place, or more.
@@ -61,17 +60,17 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, farthest, work):
-    """``land_beyond``, at most the time ``farthest`` on; ``run.scale`` has the sizes of the state itself."""
+def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work):
+    """``land_beyond`` with the sizes of the state itself in ``run.scale``; in a ``moment`` it moves by these."""
     n, mode = model.dimension, run.mode
     if _is_beyond(model, run, transition, side, run.y, work):
         return
     speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient) * side
     span = 0.0 if jumps else _way_beyond(model, run, transition, side, work)
-    farthest = max(2.0 * span, farthest)
-    if span == 0.0:
-        # The guard jumps, or is flat.
-        span = EPSILON * max(size_of_time(model, run.phase), farthest)
+    farthest = max(2.0 * span, FARTHEST * moment)
+    if span == 0.0 or model.affine_guard[transition] == 0:
+        # At a jump or a flat root the speed is no measure of the way.
+        span = 0.5 * moment
     cycle, phase, low = run.cycle, run.phase, run.phase_low
     while 0.0 < span <= farthest:
         for i in range(n):
@@ -103,7 +102,7 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
         return
     n = model.dimension
     model.field(run.mode, run.phase, run.y, model.parameters, work.field)
-    farthest = FARTHEST * moment_of_rounding(model, run, run.phase, work)
+    moment = moment_of_rounding(model, run, run.phase, work)
     jumps = may_jump(model, run, transition, run.phase, run.y, work)
     if not jumps:
         value = guard_value(model, transition, run.phase, run.y, work.scalar)
@@ -112,6 +111,6 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
             return
     for i in range(n):
         work.error[i], run.scale[i] = run.scale[i], abs(run.y[i])
-    _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, farthest, work)
+    _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work)
     for i in range(n):
         run.scale[i] = work.error[i]
