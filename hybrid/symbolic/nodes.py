@@ -64,8 +64,8 @@ def interned(expression: Any) -> Any:
         if standing is None:
             standing = expression if same else expression.func(*own, evaluate=False)
             if isinstance(standing, ARCS):
-                # SymPy asks for the modulus of their arguments, from which it takes the sign without end where
-                # it keeps a factor -1 outside of sums.
+                # SymPy asks for the modulus of their arguments, from which it takes the sign without end
+                # where it keeps a factor -1 outside of sums.
                 ask_no_more(standing)
             _standing[key] = standing
     else:

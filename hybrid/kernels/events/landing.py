@@ -61,7 +61,7 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 @njit(**KERNEL)
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work):
-    """``land_beyond`` with the sizes of the state itself in ``run.scale``; in a ``moment`` it moves by these."""
+    """``land_beyond`` with the sizes of the state in ``run.scale``; it moves by its rounding in a ``moment``."""
     n, mode = model.dimension, run.mode
     if _is_beyond(model, run, transition, side, run.y, work):
         return

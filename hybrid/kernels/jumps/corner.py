@@ -126,9 +126,11 @@ def settle(model, run, first, out, work):
     for _ in range(MOST_JUMPS):
         due[fired] = 0
         model.reset(fired, t, out, model.parameters, work.state)
-        carry_rounding(model, run, fired, t, out, work.state, work.reset_jacobian, work.settled)
+        if model.target[fired] not in (NO_MODE, mode):
+            carry_rounding(model, run, fired, t, out, work.state, work.reset_jacobian, work.settled)
         for i in range(n):
             out[i] = work.state[i]
+            run.scale[i] = max(run.scale[i], abs(out[i]))
         left, mode = mode, model.target[fired]
         if mode == NO_MODE:
             break

@@ -221,7 +221,7 @@ def leave(model, run, transition, transversality, work):
     mode, target = run.mode, model.target[transition]
     if mode == target and model.marker[transition] == 0:
         remember_impulse(model, run, transition, transversality, work)
-    if target != NO_MODE:
+    if target not in (NO_MODE, mode):
         carry_rounding(model, run, transition, run.phase, run.y, work.new, work.reset_jacobian, work.state)
     move(model, run, transition, mode if target == NO_MODE else target, work.new)
 

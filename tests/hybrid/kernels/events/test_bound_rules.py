@@ -279,9 +279,9 @@ class TestSpread:
         assert self.spread([X, (op.TIME, 0, 0, 0), (op.SUM, 0, 1, 0)]) == pytest.approx(0.75, rel=1e-13)
 
     def test_is_negative_where_it_may_jump(self):
-        """Between 2 and 3, from either side."""
+        """Between 0 and 1; a jump between 2 and 3 leaves the guard above zero, from either side."""
         floor = [X, (op.FLOOR, 0, 0, 0)]
-        for x, distance in ((2.4, -1.0), (3.4, -1.0), (2.75, -1.0)):
+        for x, distance in ((0.4, -1.0), (2.4, 0.0), (3.4, 0.0), (2.75, 0.0)):
             assert self.spread(floor, (x, 0.0)) == distance
         assert self.spread([Y, NUMBER, (op.PRODUCT, 0, 1, 0), (op.FLOOR, 2, 0, 0)], (0.0, 5.0), (0.1,)) == 0.0
         # A vertical tangent is no better than a jump, in either direction.

@@ -12,9 +12,17 @@ COUNTED = ("unproved", "unresolved", "coarse", "order_mattered")
 def end():
     """A model of five modes, two of them steep, and the entries of a run that ends in the second one."""
     kinds = np.array([RUNGE_KUTTA, RUNGE_KUTTA, EXACT, RUNGE_KUTTA, RUNGE_KUTTA])
-    model = SimpleNamespace(dimension=2, steep=np.array([1, 0, 1, 0, 0]), propagator=kinds)
+    steep, bounded = np.array([1, 0, 1, 0, 0]), np.ones(5, dtype=int)
+    model = SimpleNamespace(dimension=2, steep=steep, propagator=kinds, bounded=bounded)
     trail = np.zeros((HELD + 1, 3))
     # The last number of a row belongs to no component.
     trail[HELD, 2] = 1.0
-    run = {"mode": 1, "lateness": 10.0, "unknown_time": 0.0, "trail": trail, **dict.fromkeys(COUNTED, 0)}
+    run = {
+        "mode": 1,
+        "lateness": 10.0,
+        "unknown_time": 0.0,
+        "trail": trail,
+        "stay": np.zeros(5),
+        **dict.fromkeys(COUNTED, 0),
+    }
     return model, run
