@@ -181,9 +181,10 @@ def rebuilt(node: sympy.Expr, args: Sequence[sympy.Expr]) -> sympy.Expr:
     """A node with other arguments.
 
     A function and a power take a factor -1 out of what they apply to, or ask for its sign. They do so again
-    and again where SymPy keeps such a factor outside of sums.
+    and again where SymPy keeps such a factor outside of sums. Large trees are left as they are.
     """
-    if not isinstance(node, sympy.Function | sympy.Pow):
+    plain = not isinstance(node, sympy.Function | sympy.Pow)
+    if plain or is_larger_than(MOST_EXPANDED, node):
         return node.func(*args)
     with distribute(True):
         return node.func(*args)
