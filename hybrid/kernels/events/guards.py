@@ -120,8 +120,8 @@ def gradient_band(model, run, t, gradient):
 def carry_rounding(model, run, transition, t, x, after, jacobian, sizes):
     """Carry the sizes by which rounding is judged through a reset from ``x (n,)`` to ``after (n,)``.
 
-    A reset moves the rounding ``r`` of the state to ``abs(D_x R) r``, and rounds its own result. Within a mode
-    the state keeps its units: these sizes are for a reset into another one.
+    A reset moves the rounding ``r`` of the state to ``abs(D_x R) r``, and rounds its own result. Within a
+    mode the state keeps its units: these sizes are for a reset into another one.
     ``jacobian (n, n + 1)`` and ``sizes (n,)`` are scratch.
     """
     n = model.dimension

@@ -21,6 +21,8 @@ BEYOND = 0.125
 NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
 FARTHEST = 64.0
+# States with a relative difference below this are equal.
+SAME = 1e-9
 # The flow goes on through the guard if its speed keeps this share on the way.
 KEPT = 0.5
 
@@ -60,6 +62,21 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
+def _reset_jumps(model, run, transition, before, work):
+    """Whether a reset jumps between the state at the time ``before`` and ``work.state`` at that of the run.
+
+    ``work.error`` holds the sizes of the state.
+    """
+    model.reset(transition, before, run.y, model.parameters, work.field_after)
+    model.reset(transition, run.phase, work.state, model.parameters, work.new)
+    for i in range(model.dimension):
+        size = max(work.error[i], abs(work.new[i]), abs(work.field_after[i]))
+        if not abs(work.new[i] - work.field_after[i]) <= SAME * size:
+            return True
+    return False
+
+
+@njit(**KERNEL)
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work):
     """``land_beyond`` with the sizes of the state in ``run.scale``; it moves by its rounding in a ``moment``."""
     n, mode = model.dimension, run.mode
@@ -79,12 +96,16 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment
         if time_left(model, run, stop_cycle, stop_phase) < 0.0:
             set_clock(run, stop_cycle, stop_phase)
         if _is_beyond(model, run, transition, side, work.state, work):
-            if not speed > 0.0 or _goes_on(model, transition, mode, run.phase, work.state, side, speed, work):
-                for i in range(n):
-                    run.y[i] = work.state[i]
-                run.since_entry += span
-                return
-            break
+            bent = model.affine_guard[transition] == 0 and not jumps
+            on = not speed > 0.0 or _goes_on(
+                model, transition, mode, run.phase, work.state, side, speed, work
+            )
+            if not on or (bent and not _reset_jumps(model, run, transition, phase, work)):
+                break
+            for i in range(n):
+                run.y[i] = work.state[i]
+            run.since_entry += span
+            return
         run.cycle, run.phase, run.phase_low = cycle, phase, low
         span *= 2.0
     run.cycle, run.phase, run.phase_low = cycle, phase, low
@@ -95,10 +116,11 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     """Move a run along the flow until the guard that it has reached has the sign ``side``.
 
     The rounding that counts is that of the guard at this state, not that of the way there. Nothing is moved
-    where the guard dips to that side by less than its rounding. The clock does not pass the stop of the run.
-    Tangent vectors stay: they change by rounding.
+    where the guard dips to that side by less than its rounding, nor at a bent guard whose reset asks for
+    nothing that jumps there: such a guard may be flat, and a way beyond it long. Markers change nothing. The
+    clock does not pass the stop of the run. Tangent vectors stay: they change by rounding.
     """
-    if side == 0:
+    if side == 0 or model.marker[transition] == 1:
         return
     n = model.dimension
     model.field(run.mode, run.phase, run.y, model.parameters, work.field)
