@@ -78,7 +78,7 @@ def _reset_jumps(model, run, transition, before, work):
 
 @njit(**KERNEL)
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work):
-    """``land_beyond`` with the sizes of the state in ``run.scale``; it moves by its rounding in a ``moment``."""
+    """``land_beyond`` with the sizes of the state in ``run.scale``; in a ``moment`` it moves by rounding."""
     n, mode = model.dimension, run.mode
     if _is_beyond(model, run, transition, side, run.y, work):
         return
