@@ -12,7 +12,8 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.derivatives import moment_of_rounding
-from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band
+from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band, size_of_time
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # The guard of an event is beyond zero by this share of its band, two units in the last place, or more.
@@ -21,8 +22,6 @@ BEYOND = 0.125
 NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
 FARTHEST = 64.0
-# States with a relative difference below this are equal.
-SAME = 1e-9
 # The flow goes on through the guard if its speed keeps this share on the way.
 KEPT = 0.5
 
@@ -41,13 +40,9 @@ def _is_beyond(model, run, transition, side, x, work):
 
 
 @njit(**KERNEL)
-def _way_beyond(model, run, transition, side, work):
-    """Time in which a guard gets beyond its rounding at its speed; 0 if that does not lead there.
-
-    ``work.field`` is current.
-    """
+def _way_beyond(model, run, transition, side, speed, work):
+    """Time in which a guard gets beyond its rounding at its ``speed``; 0 if that does not lead there."""
     t = run.phase
-    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
     value = guard_value(model, transition, t, run.y, work.scalar) * side
     # A little farther than needed: the place is rounded, too.
     distance = 1.5 * BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
@@ -62,32 +57,25 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def _reset_jumps(model, run, transition, before, work):
-    """Whether a reset jumps between the state at the time ``before`` and ``work.state`` at that of the run.
-
-    ``work.error`` holds the sizes of the state.
-    """
-    model.reset(transition, before, run.y, model.parameters, work.field_after)
-    model.reset(transition, run.phase, work.state, model.parameters, work.new)
-    for i in range(model.dimension):
-        size = max(work.error[i], abs(work.new[i]), abs(work.field_after[i]))
-        if not abs(work.new[i] - work.field_after[i]) <= SAME * size:
-            return True
-    return False
-
-
-@njit(**KERNEL)
-def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work):
-    """``land_beyond`` with the sizes of the state in ``run.scale``; in a ``moment`` it moves by rounding."""
-    n, mode = model.dimension, run.mode
+def _advance(model, run, transition, side, stop_cycle, stop_phase, work):
+    """``land_beyond`` with the sizes of the state in ``run.scale``."""
+    n, mode, t = model.dimension, run.mode, run.phase
     if _is_beyond(model, run, transition, side, run.y, work):
         return
-    speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient) * side
-    span = 0.0 if jumps else _way_beyond(model, run, transition, side, work)
-    farthest = max(2.0 * span, FARTHEST * moment)
+    model.field(mode, t, run.y, model.parameters, work.field)
+    moment = moment_of_rounding(model, run, t, work)
+    jumps = may_jump(model, run, transition, t, run.y, work)
+    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
+    value = guard_value(model, transition, t, run.y, work.scalar)
+    if not (jumps or abs(value) <= FARTHEST * rounding_band(model, run, transition, t, run.y, work)):
+        return
+    span = 0.0 if jumps else _way_beyond(model, run, transition, side, speed, work)
+    # A landing takes no longer than the stay that it ends.
+    longest = max(run.since_entry, FARTHEST * EPSILON * size_of_time(model, t))
+    farthest = min(max(2.0 * span, FARTHEST * moment), longest)
     if span == 0.0 or model.affine_guard[transition] == 0:
         # At a jump or a flat root the speed is no measure of the way.
-        span = 0.5 * moment
+        span = 0.5 * min(moment, longest)
     cycle, phase, low = run.cycle, run.phase, run.phase_low
     while 0.0 < span <= farthest:
         for i in range(n):
@@ -96,11 +84,9 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment
         if time_left(model, run, stop_cycle, stop_phase) < 0.0:
             set_clock(run, stop_cycle, stop_phase)
         if _is_beyond(model, run, transition, side, work.state, work):
-            bent = model.affine_guard[transition] == 0 and not jumps
-            on = not speed > 0.0 or _goes_on(
+            if speed > 0.0 and not _goes_on(
                 model, transition, mode, run.phase, work.state, side, speed, work
-            )
-            if not on or (bent and not _reset_jumps(model, run, transition, phase, work)):
+            ):
                 break
             for i in range(n):
                 run.y[i] = work.state[i]
@@ -116,23 +102,13 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     """Move a run along the flow until the guard that it has reached has the sign ``side``.
 
     The rounding that counts is that of the guard at this state, not that of the way there. Nothing is moved
-    where the guard dips to that side by less than its rounding, nor at a bent guard whose reset asks for
-    nothing that jumps there: such a guard may be flat, and a way beyond it long. Markers change nothing. The
-    clock does not pass the stop of the run. Tangent vectors stay: they change by rounding.
+    where the guard dips to that side by less than its rounding. Markers change nothing. The clock does not
+    pass the stop of the run. Tangent vectors stay: they change by rounding.
     """
     if side == 0 or model.marker[transition] == 1:
         return
-    n = model.dimension
-    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
-    moment = moment_of_rounding(model, run, run.phase, work)
-    jumps = may_jump(model, run, transition, run.phase, run.y, work)
-    if not jumps:
-        value = guard_value(model, transition, run.phase, run.y, work.scalar)
-        model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
-        if not abs(value) <= FARTHEST * rounding_band(model, run, transition, run.phase, run.y, work):
-            return
-    for i in range(n):
+    for i in range(model.dimension):
         work.error[i], run.scale[i] = run.scale[i], abs(run.y[i])
-    _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, moment, work)
-    for i in range(n):
+    _advance(model, run, transition, side, stop_cycle, stop_phase, work)
+    for i in range(model.dimension):
         run.scale[i] = work.error[i]
