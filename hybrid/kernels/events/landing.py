@@ -57,18 +57,14 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def _advance(model, run, transition, side, stop_cycle, stop_phase, work):
-    """``land_beyond`` with the sizes of the state in ``run.scale``."""
+def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
+    """``land_beyond`` with the sizes of the state in ``run.scale``; ``jumps`` says that the guard may jump."""
     n, mode, t = model.dimension, run.mode, run.phase
     if _is_beyond(model, run, transition, side, run.y, work):
         return
     model.field(mode, t, run.y, model.parameters, work.field)
     moment = moment_of_rounding(model, run, t, work)
-    jumps = may_jump(model, run, transition, t, run.y, work)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
-    value = guard_value(model, transition, t, run.y, work.scalar)
-    if not (jumps or abs(value) <= FARTHEST * rounding_band(model, run, transition, t, run.y, work)):
-        return
     span = 0.0 if jumps else _way_beyond(model, run, transition, side, speed, work)
     # A landing takes no longer than the stay that it ends.
     longest = max(run.since_entry, FARTHEST * EPSILON * size_of_time(model, t))
@@ -107,8 +103,15 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     """
     if side == 0 or model.marker[transition] == 1:
         return
+    t = run.phase
+    jumps = may_jump(model, run, transition, t, run.y, work)
+    if not jumps:
+        value = guard_value(model, transition, t, run.y, work.scalar)
+        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+        if not abs(value) <= FARTHEST * rounding_band(model, run, transition, t, run.y, work):
+            return
     for i in range(model.dimension):
         work.error[i], run.scale[i] = run.scale[i], abs(run.y[i])
-    _advance(model, run, transition, side, stop_cycle, stop_phase, work)
+    _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work)
     for i in range(model.dimension):
         run.scale[i] = work.error[i]

@@ -312,14 +312,15 @@ def limit_of_rounds(model, method, run, work):
     misfit, nearly = abs(left + latest - earlier), left <= NOTHING_LEFT * lasted
     agreed = misfit <= method.rtol * lasted
     hidden = rounding_of_flights(model, run, work) / (1.0 - ratio) ** 2
-    drowned = not agreed and max(misfit, ROUGH * latest) <= hidden
+    # Rounds too short to have a length say nothing of the time: the states alone tell the limit.
+    resolved = latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase)
+    drowned = resolved and not agreed and max(misfit, ROUGH * latest) <= hidden
     if not (agreed or nearly or drowned):
         return 0.0, 0
     for i in range(model.dimension):
         slack[i] = 0.0
     if drowned:
         hidden_by_rounding(model, run, turn, ratio, hidden, slack, work)
-    resolved = latest > ROUNDING_OF_TIME * EPSILON * abs(run.phase)
     if resolved:
         extrapolate(model, run, turn, 0, left, work.settled)
         hold_endless(model, run, turn, end, left, work)
@@ -329,7 +330,7 @@ def limit_of_rounds(model, method, run, work):
         )
         if (agreed or nearly) and is_limit(model, run, turn, end, work):
             return left, turn
-    if nearly or (drowned and not resolved):
+    if nearly:
         extrapolate_by_rounds(model, run, turn, 0, work.settled)
         hold_endless(model, run, turn, end, left, work)
         extrapolate_by_rounds(model, run, turn, turn, work.error)
