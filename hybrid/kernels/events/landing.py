@@ -4,6 +4,9 @@ The root of a guard on a step is known up to rounding, on this side of zero or o
 or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a comparison. Each of them must
 find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
 by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
+
+At a crossing with a speed that is a matter of rounding: it is the root, rounded towards the far side. The
+clock stays, so a slow crossing is no later for it.
 """
 
 import math
@@ -12,12 +15,20 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.derivatives import moment_of_rounding
-from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band, size_of_time
+from hybrid.kernels.events.guards import (
+    guard_speed,
+    guard_value,
+    may_jump,
+    rounding_band,
+    size_of_time,
+)
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # The guard of an event is beyond zero by this share of its band, two units in the last place, or more.
 BEYOND = 0.125
+# At a crossing, each component is moved by so many units in its last place.
+UNITS = 3.0
 # The next number beyond a guard that is exactly zero, and so has no rounding.
 NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
@@ -27,9 +38,8 @@ KEPT = 0.5
 
 
 @njit(**KERNEL)
-def _is_beyond(model, run, transition, side, x, work):
+def _is_beyond(model, run, transition, side, t, x, work):
     """Whether a guard at ``x`` has the sign ``side`` by more than its rounding, or after its jump."""
-    t = run.phase
     value = guard_value(model, transition, t, x, work.scalar) * side
     if not value > 0.0:
         return False
@@ -45,7 +55,8 @@ def _way_beyond(model, run, transition, side, speed, work):
     t = run.phase
     value = guard_value(model, transition, t, run.y, work.scalar) * side
     # A little farther than needed: the place is rounded, too.
-    distance = 1.5 * BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
+    band = rounding_band(model, run, transition, t, run.y, work)
+    distance = 1.5 * BEYOND * band + NEXT_TO_ZERO - value
     return distance / speed if 0.0 < speed < math.inf and 0.0 < distance < math.inf else 0.0
 
 
@@ -57,10 +68,19 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
+def _round_beyond(model, run, side, gradient, out):
+    """Round each component of the state towards the far side of a guard with this gradient, into ``out``."""
+    for i in range(model.dimension):
+        towards = side * gradient[i]
+        units = UNITS if towards > 0.0 else (-UNITS if towards < 0.0 else 0.0)
+        out[i] = run.y[i] + units * EPSILON * abs(run.y[i])
+
+
+@njit(**KERNEL)
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
-    """``land_beyond`` with the sizes of the state in ``run.scale``; ``jumps`` says that the guard may jump."""
+    """``land_beyond`` with the sizes of the state in ``run.scale``; ``jumps`` says that the guard may."""
     n, mode, t = model.dimension, run.mode, run.phase
-    if _is_beyond(model, run, transition, side, run.y, work):
+    if _is_beyond(model, run, transition, side, t, run.y, work):
         return
     model.field(mode, t, run.y, model.parameters, work.field)
     moment = moment_of_rounding(model, run, t, work)
@@ -72,25 +92,32 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     if span == 0.0 or model.affine_guard[transition] == 0:
         # At a jump or a flat root the speed is no measure of the way.
         span = 0.5 * min(moment, longest)
-    cycle, phase, low = run.cycle, run.phase, run.phase_low
+    cycle, low = run.cycle, run.phase_low
     while 0.0 < span <= farthest:
         for i in range(n):
             work.state[i] = run.y[i] + span * work.field[i]
         forward(run, model.period, span)
         if time_left(model, run, stop_cycle, stop_phase) < 0.0:
             set_clock(run, stop_cycle, stop_phase)
-        if _is_beyond(model, run, transition, side, work.state, work):
+        if _is_beyond(model, run, transition, side, run.phase, work.state, work):
             if speed > 0.0 and not _goes_on(
                 model, transition, mode, run.phase, work.state, side, speed, work
             ):
                 break
+            if not jumps:
+                _round_beyond(model, run, side, work.gradient, work.trial)
+                if _is_beyond(model, run, transition, side, t, work.trial, work):
+                    run.cycle, run.phase, run.phase_low = cycle, t, low
+                    for i in range(n):
+                        run.y[i] = work.trial[i]
+                    return
             for i in range(n):
                 run.y[i] = work.state[i]
             run.since_entry += span
             return
-        run.cycle, run.phase, run.phase_low = cycle, phase, low
+        run.cycle, run.phase, run.phase_low = cycle, t, low
         span *= 2.0
-    run.cycle, run.phase, run.phase_low = cycle, phase, low
+    run.cycle, run.phase, run.phase_low = cycle, t, low
 
 
 @njit(**KERNEL)
