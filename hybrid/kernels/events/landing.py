@@ -27,8 +27,6 @@ from hybrid.kernels.types.options import KERNEL
 
 # The guard of an event is beyond zero by this share of its band, two units in the last place, or more.
 BEYOND = 0.125
-# At a crossing, each component is moved by so many units in its last place.
-UNITS = 3.0
 # The next number beyond a guard that is exactly zero, and so has no rounding.
 NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
@@ -50,14 +48,13 @@ def _is_beyond(model, run, transition, side, t, x, work):
 
 
 @njit(**KERNEL)
-def _way_beyond(model, run, transition, side, speed, work):
-    """Time in which a guard gets beyond its rounding at its ``speed``; 0 if that does not lead there."""
-    t = run.phase
+def _distance_beyond(model, run, transition, side, t, work):
+    """How far a guard is from the place beyond its rounding; ``work.gradient`` is current.
+
+    A little farther than needed: the place is rounded, too.
+    """
     value = guard_value(model, transition, t, run.y, work.scalar) * side
-    # A little farther than needed: the place is rounded, too.
-    band = rounding_band(model, run, transition, t, run.y, work)
-    distance = 1.5 * BEYOND * band + NEXT_TO_ZERO - value
-    return distance / speed if 0.0 < speed < math.inf and 0.0 < distance < math.inf else 0.0
+    return 1.5 * BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
 
 
 @njit(**KERNEL)
@@ -68,12 +65,19 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def _round_beyond(model, run, side, gradient, out):
-    """Round each component of the state towards the far side of a guard with this gradient, into ``out``."""
+def _round_beyond(model, run, side, distance, gradient, out):
+    """Round the state towards the far side of a guard with this gradient, by ``distance``, into ``out``.
+
+    One component is rounded, that which the guard feels most: it takes the fewest units in its last place.
+    """
+    most, place = 0.0, 0
     for i in range(model.dimension):
-        towards = side * gradient[i]
-        units = UNITS if towards > 0.0 else (-UNITS if towards < 0.0 else 0.0)
-        out[i] = run.y[i] + units * EPSILON * abs(run.y[i])
+        out[i] = run.y[i]
+        size = abs(gradient[i] * run.y[i])
+        if size > most:
+            most, place = size, i
+    if most > 0.0:
+        out[place] += side * distance / gradient[place]
 
 
 @njit(**KERNEL)
@@ -85,7 +89,9 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     model.field(mode, t, run.y, model.parameters, work.field)
     moment = moment_of_rounding(model, run, t, work)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
-    span = 0.0 if jumps else _way_beyond(model, run, transition, side, speed, work)
+    span, distance = 0.0, _distance_beyond(model, run, transition, side, t, work)
+    if not jumps and 0.0 < speed < math.inf and 0.0 < distance < math.inf:
+        span = distance / speed
     # A landing takes no longer than the stay that it ends.
     longest = max(run.since_entry, FARTHEST * EPSILON * size_of_time(model, t))
     farthest = min(max(2.0 * span, FARTHEST * moment), longest)
@@ -105,7 +111,7 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
             ):
                 break
             if not jumps:
-                _round_beyond(model, run, side, work.gradient, work.trial)
+                _round_beyond(model, run, side, distance, work.gradient, work.trial)
                 if _is_beyond(model, run, transition, side, t, work.trial, work):
                     run.cycle, run.phase, run.phase_low = cycle, t, low
                     for i in range(n):
