@@ -5,8 +5,8 @@ or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a 
 find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
 by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
 
-At a crossing with a speed that is a matter of rounding: it is the root, rounded towards the far side. The
-clock stays, so a slow crossing is no later for it.
+A slow crossing, as that of a low bounce, would be late by that: the flow needs more time for it than the
+rounding of time. There the root itself is rounded towards the far side, and the clock stays.
 """
 
 import math
@@ -16,6 +16,7 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.derivatives import moment_of_rounding
 from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
     guard_speed,
     guard_value,
     may_jump,
@@ -25,8 +26,8 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
-# The guard of an event is beyond zero by this share of its band, two units in the last place, or more.
-BEYOND = 0.125
+# The guard of an event is beyond zero by this share of its band, one and a half units in the last place.
+BEYOND = 1.5 / ROUNDING_OF_STATE
 # The next number beyond a guard that is exactly zero, and so has no rounding.
 NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
@@ -110,7 +111,7 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
                 model, transition, mode, run.phase, work.state, side, speed, work
             ):
                 break
-            if not jumps:
+            if not jumps and span > FARTHEST * moment:
                 _round_beyond(model, run, side, distance, work.gradient, work.trial)
                 if _is_beyond(model, run, transition, side, t, work.trial, work):
                     run.cycle, run.phase, run.phase_low = cycle, t, low
