@@ -194,6 +194,10 @@ def _emitted(system: HybridSystem) -> Emitted:
         crossing=crossing,
         timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
         timed_reset=tuple(not _is_free(reset.expressions, (symbols.t,)) for reset in resets),
+        jumping_reset=tuple(
+            reset.expressions is None or bool(jumps_of(reset.expressions, (symbols.t, *symbols.x)))
+            for reset in resets
+        ),
         propagators=tuple(map(_without_text, propagators)),
         tangent_start=places.vectors,
     )

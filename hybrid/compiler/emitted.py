@@ -144,6 +144,8 @@ class Emitted:
         Whether every function is proved to have the declared period, whatever the parameters.
     timed_guard, timed_reset
         By transition: whether the guard, or the reset, may depend on time.
+    jumping_reset
+        By transition: whether its reset is not proved to be continuous.
     steep
         By mode: the powers of guards in its field, in words, whose slope may be infinite at the guard.
     steep_inside
@@ -178,6 +180,7 @@ class Emitted:
     proved_period: bool
     timed_guard: tuple[bool, ...]
     timed_reset: tuple[bool, ...]
+    jumping_reset: tuple[bool, ...]
     steep: tuple[str, ...]
     steep_inside: tuple[str, ...]
     crossing: tuple[tuple[int, int], ...]

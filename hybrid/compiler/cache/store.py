@@ -79,7 +79,7 @@ def _read(content: bytes | None) -> Emitted | None:
             "first_residue",
             "residue_component",
         )
-        for name in (*of_transitions, *of_modes, "timed_guard", "timed_reset", *parts):
+        for name in (*of_transitions, *of_modes, "timed_guard", "timed_reset", "jumping_reset", *parts):
             found[name] = tuple(found[name])
         found["crossing"] = tuple(map(tuple, found["crossing"]))
         found["slope_columns"] = tuple(tuple(map(tuple, rows)) for rows in found["slope_columns"])

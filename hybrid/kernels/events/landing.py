@@ -5,8 +5,8 @@ or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a 
 find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
 by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
 
-A slow crossing, as that of a low bounce, would be late by that: the flow needs more time for it than the
-rounding of time. There the root itself is rounded towards the far side, and the clock stays.
+The flow needs time for that, and a slow crossing would be late. An event at which nothing is decided by a jump,
+neither by its guard nor by its reset or a condition, stays at the root.
 """
 
 import math
@@ -66,22 +66,6 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
-def _round_beyond(model, run, side, distance, gradient, out):
-    """Round the state towards the far side of a guard with this gradient, by ``distance``, into ``out``.
-
-    One component is rounded, that which the guard feels most: it takes the fewest units in its last place.
-    """
-    most, place = 0.0, 0
-    for i in range(model.dimension):
-        out[i] = run.y[i]
-        size = abs(gradient[i] * run.y[i])
-        if size > most:
-            most, place = size, i
-    if most > 0.0:
-        out[place] += side * distance / gradient[place]
-
-
-@njit(**KERNEL)
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     """``land_beyond`` with the sizes of the state in ``run.scale``; ``jumps`` says that the guard may."""
     n, mode, t = model.dimension, run.mode, run.phase
@@ -111,13 +95,6 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
                 model, transition, mode, run.phase, work.state, side, speed, work
             ):
                 break
-            if not jumps and span > FARTHEST * moment:
-                _round_beyond(model, run, side, distance, work.gradient, work.trial)
-                if _is_beyond(model, run, transition, side, t, work.trial, work):
-                    run.cycle, run.phase, run.phase_low = cycle, t, low
-                    for i in range(n):
-                        run.y[i] = work.trial[i]
-                    return
             for i in range(n):
                 run.y[i] = work.state[i]
             run.since_entry += span
@@ -132,13 +109,15 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     """Move a run along the flow until the guard that it has reached has the sign ``side``.
 
     The rounding that counts is that of the guard at this state, not that of the way there. Nothing is moved
-    where the guard dips to that side by less than its rounding. Markers change nothing. The clock does not
+    where the guard dips to that side by less than its rounding, or where nothing jumps. Markers change nothing. The clock does not
     pass the stop of the run. Tangent vectors stay: they change by rounding.
     """
     if side == 0 or model.marker[transition] == 1:
         return
     t = run.phase
     jumps = may_jump(model, run, transition, t, run.y, work)
+    if not jumps and model.decides[transition] == 0:
+        return
     if not jumps:
         value = guard_value(model, transition, t, run.y, work.scalar)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
