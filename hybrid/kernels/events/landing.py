@@ -5,8 +5,8 @@ or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a 
 find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
 by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
 
-The flow needs time for that, and a slow crossing would be late. An event at which nothing is decided by a jump,
-neither by its guard nor by its reset or a condition, stays at the root.
+The flow needs time for that, and a slow crossing would be late. An event at which nothing is decided by a
+jump, neither by its guard nor by its reset or a condition, stays at the root.
 """
 
 import math
@@ -66,6 +66,17 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
+def _shortest_span(model, run, t, work):
+    """A time in which the first component, or the clock, moves by half of its rounding."""
+    span = size_of_time(model, t)
+    for i in range(model.dimension):
+        size, pace = run.scale[i], abs(work.field[i])
+        if size > 0.0 and pace > 0.0:
+            span = min(span, size / pace)
+    return 0.5 * EPSILON * span
+
+
+@njit(**KERNEL)
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     """``land_beyond`` with the sizes of the state in ``run.scale``; ``jumps`` says that the guard may."""
     n, mode, t = model.dimension, run.mode, run.phase
@@ -82,7 +93,7 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     farthest = min(max(2.0 * span, FARTHEST * moment), longest)
     if span == 0.0 or model.affine_guard[transition] == 0:
         # At a jump or a flat root the speed is no measure of the way.
-        span = 0.5 * min(moment, longest)
+        span = min(_shortest_span(model, run, t, work), longest)
     cycle, low = run.cycle, run.phase_low
     while 0.0 < span <= farthest:
         for i in range(n):
@@ -109,8 +120,8 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     """Move a run along the flow until the guard that it has reached has the sign ``side``.
 
     The rounding that counts is that of the guard at this state, not that of the way there. Nothing is moved
-    where the guard dips to that side by less than its rounding, or where nothing jumps. Markers change nothing. The clock does not
-    pass the stop of the run. Tangent vectors stay: they change by rounding.
+    where nothing jumps, or where the guard dips to that side by less than its rounding. Markers change
+    nothing. The clock does not pass the stop of the run. Tangent vectors stay: they change by rounding.
     """
     if side == 0 or model.marker[transition] == 1:
         return
