@@ -278,7 +278,7 @@ def runge_kutta_step(task, remaining):
         shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
         run.next_step = h * shrink
         finest = h * shrink <= FINEST * measured_time(model, run, mode)
-        if finest and ratio > 1.0:
+        if finest and ratio > 1.0 and model.timed[mode] == 0:
             finest = moves_nothing(model, run, work.stages[0], h * shrink)
         if finest or h * shrink < 1e-200:
             # The field may end at a guard, as ``sqrt(h)`` does at ``h``.

@@ -312,7 +312,7 @@ def series_step(task, remaining):
         if fired == NO_TRANSITION and not cut and remaining - span <= rounding:
             span = remaining
     stays = fired == NO_TRANSITION and not span > finest and span < remaining
-    if stays and moves_nothing(model, run, series[1], h):
+    if stays and (model.timed[mode] == 1 or moves_nothing(model, run, series[1], h)):
         return STEP_TOO_SMALL, 0.0
     if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, order, t, h, span, clock, work)
