@@ -176,7 +176,7 @@ def _starts_alike(one: HybridArc, other: HybridArc) -> bool:
 
 def _alike(one: HybridArc, other: HybridArc) -> bool:
     """Whether two runs made the same jumps and ended alike."""
-    same = np.array_equal(one.jumps.transition_index, other.jumps.transition_index)
+    same = len(one.jumps) == len(other.jumps) == _agreement(one, other)
     return same and one.status.code == other.status.code
 
 
@@ -205,7 +205,12 @@ def _bound(value: np.ndarray, tighter: np.ndarray, tightest: np.ndarray) -> np.n
 
 
 def _agreement(one: HybridArc, other: HybridArc) -> int:
-    """How many jumps from the first on are the same transitions."""
+    """How many jumps from the first on are the same: in their transitions, and by and large in their times.
+
+    Times that differ by more than the mean time between jumps may belong to any two of them.
+    """
     length = min(len(one.jumps), len(other.jumps))
-    differ = np.flatnonzero(one.jumps.transition_index[:length] != other.jumps.transition_index[:length])
+    transitions = one.jumps.transition_index[:length] != other.jumps.transition_index[:length]
+    apart = np.abs(one.jumps.t[:length] - other.jumps.t[:length])
+    differ = np.flatnonzero(transitions | (apart * length > one.t[-1] - one.t[0]))
     return int(differ[0]) if len(differ) else length
