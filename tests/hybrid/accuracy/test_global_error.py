@@ -10,7 +10,7 @@ import pytest
 import hybrid
 import models
 from hybrid import DOP853, StatusCode, Tsit5, global_error
-from hybrid.accuracy.global_error import SAFETY, _agreement, _bound, _compare, _starts_alike
+from hybrid.accuracy.global_error import SAFETY, _bound, _compare, _starts_alike
 from hybrid.status import SUCCESS
 from tests.cases import systems
 from tests.reference.impacts import ImpactOscillator
@@ -195,27 +195,12 @@ def test_a_bound_is_never_less_than_rounding():
     np.testing.assert_array_equal(_bound(value, value, value), 2 * np.finfo(float).eps * np.abs(value))
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "agreeing"), [("abcd", "abxd", 2), ("abcd", "xbcd", 0), ("abc", "abcd", 3)]
-)
-def test_jumps_agree_up_to_the_first_that_differs(one, other, agreeing):
-    arcs = (SimpleNamespace(jumps=Jumped(np.array(list(names)))) for names in (one, other))
-    assert _agreement(*arcs) == agreeing
-
-
-class Jumped:
-    def __init__(self, transition_index):
-        self.transition_index = transition_index
-
-    def __len__(self):
-        return len(self.transition_index)
-
-
 def run_with(times, transitions, end, mode="m"):
     """What the comparison reads of a run."""
     jumps = SimpleNamespace(t=np.array(times), transition_index=np.array(transitions))
     jumps = type("Jumps", (SimpleNamespace,), {"__len__": lambda self: len(times)})(**vars(jumps))
-    return SimpleNamespace(jumps=jumps, x=np.array([end]), mode=[mode], status=SUCCESS)
+    t = np.array([0.0, 5.0])
+    return SimpleNamespace(t=t, jumps=jumps, x=np.array([end]), mode=[mode], status=SUCCESS)
 
 
 def test_jumps_are_compared_as_far_as_all_three_runs_agree():

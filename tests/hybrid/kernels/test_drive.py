@@ -24,68 +24,6 @@ from tests.hybrid.kernels.plain import plain
 kernels = plain(drive)
 
 
-class TestScale:
-    """The sizes of two components, at the start of a flight and where it lands on the second guard."""
-
-    def test_is_remembered_on_a_guard_of_the_mode(self):
-        model = SimpleNamespace(dimension=2, first_outgoing=np.array([0, 1, 3]), outgoing=np.array([2, 0, 1]))
-        for on_guard, known in (
-            ((0, 0, 1), False),
-            ((1, 0, 0), True),
-            ((0, 2, 0), True),
-            ((0, -1, 0), False),
-        ):
-            run = SimpleNamespace(mode=1, on_guard=np.array(on_guard), scale=np.array([3.0, 4.0]))
-            work = SimpleNamespace(settled=np.zeros(2))
-            assert bool(kernels.remember_scale(model, run, work)) == known
-            assert work.settled.tolist() == ([3.0, 4.0] if known else [0.0, 0.0])
-
-    def kept(self, value, *, on_guard=True, bent=True, propagator=RUNGE_KUTTA):
-        """The band of rounding is the size of the second component."""
-
-        def guard_gradient(transition, t, x, parameters, out):
-            assert (transition, t) == (1, 7.0)
-            out[:] = 0.0, 1.0, 0.0
-
-        def rounding_band(model, run, transition, t, x, work):
-            assert work.gradient.tolist() == [0.0, 1.0, 0.0]
-            return run.scale[1]
-
-        tested = plain(drive, guard_value=lambda *given: value, rounding_band=rounding_band).keep_scale
-        model = SimpleNamespace(
-            dimension=2,
-            parameters=np.zeros(0),
-            propagator=np.array([TAYLOR, propagator]),
-            affine_guard=np.array([int(bent), int(not bent)]),
-            guard_gradient=guard_gradient,
-        )
-        run = SimpleNamespace(mode=1, pending=1, y=np.zeros(2), scale=np.array([8.0, 1.0]))
-        work = SimpleNamespace(settled=np.array([2.0, 4.0]), gradient=np.zeros(3), scalar=np.zeros(1))
-        tested(model, run, on_guard, 7.0, work)
-        return run.scale.tolist()
-
-    @pytest.mark.parametrize("sign", [-1.0, 1.0])
-    def test_is_kept_where_the_landing_is_within_rounding(self, sign):
-        assert self.kept(sign * 1.0) == [8.0, 1.0]
-        assert self.kept(0.0) == [8.0, 1.0]
-
-    @pytest.mark.parametrize("sign", [-1.0, 1.0])
-    def test_is_that_of_the_start_where_the_flight_began_on_a_guard(self, sign):
-        assert self.kept(sign * 1.5) == [8.0, 4.0]
-        assert self.kept(sign * 4.0) == [8.0, 4.0]
-        assert self.kept(sign * 9.0, bent=False) == [8.0, 4.0]
-        assert self.kept(sign * 1.5, on_guard=False, bent=False) == [8.0, 1.0]
-
-    @pytest.mark.parametrize("sign", [-1.0, 1.0])
-    def test_grows_where_a_step_has_landed_on_a_bent_guard(self, sign):
-        """To twice what the landing needs, if that is at most 64 times the rounding of the state."""
-        assert self.kept(sign * 8.0) == [32.0, 16.0]
-        assert self.kept(sign * 1.5, on_guard=False) == [24.0, 3.0]
-        assert self.kept(sign * 64.0, on_guard=False) == [1024.0, 128.0]
-        assert self.kept(sign * 65.0, on_guard=False) == [8.0, 1.0]
-        assert self.kept(sign * 1.5, on_guard=False, propagator=TAYLOR) == [8.0, 1.0]
-
-
 class TestStep:
     def stepped(self, code=GO_ON, *, tangents=2, abrupt=1, pending=NO_TRANSITION):
         """What is called around a step of a quarter in the second mode."""
@@ -355,7 +293,7 @@ class TestAdvance:
             arrived=arrived,
             keep_apart=lambda *given: calls.append("apart"),
             late_step=lambda model, method, run, span, work: calls.append(("late", run.phase)),
-            first_in_order=lambda task, fired: fired if fired < 2 else NO_TRANSITION,
+            first_in_order=lambda task, fired, *stop: fired if fired < 2 else NO_TRANSITION,
         )
         code = tested(parts, task, 3, 1.0, most, 50)
         return code, calls, (task.run.cycle, task.run.phase)

@@ -163,19 +163,3 @@ def test_the_quietest_time_is_farthest_from_jumps_in_two_periods(jumps, quiet):
     found = SimpleNamespace(_follow=follow, mode="run")
     assert module._Shooting._quiet_time(found, Point(np.zeros(1), 0.7, 10.0)) == pytest.approx(quiet)
     assert asked == [20.0]
-
-
-@pytest.mark.parametrize(
-    ("times", "signature"),
-    [([0.7, 2.0, 3.7], ("a", "0", "1")), ([2.0, 3.7], ("a", "0", "1")), ([0.7, 2.0], ("a", "0", "1"))],
-)
-def test_a_jump_at_the_start_counts_once(times, signature):
-    """It may be met again at the end, one period of 3 later; a jump at the end alone counts too."""
-    jumps = [SimpleNamespace(t=t, target=str(i)) for i, t in enumerate(times)]
-    found = SimpleNamespace(
-        _follow=lambda *given: SimpleNamespace(jumps=jumps),
-        system=SimpleNamespace(forcing_period=lambda parameters: None),
-        parameters=None,
-    )
-    start = SimpleNamespace(point=Point(np.zeros(1), 0.7, 3.0), mode="a")
-    assert module._Shooting._signature(found, start) == signature

@@ -293,6 +293,7 @@ class TestRunsKnowNothingOfOneAnother:
                 solver=solver,
                 tangent=True,
                 samples=samples,
+                keep_jumps=True,
             )
 
         first = arc((0.1, 0.3))
@@ -327,10 +328,11 @@ class TestRunsKnowNothingOfOneAnother:
             dense = [] if samples else [arc(np.linspace(0.0, t_end, 101))]
             return [*columns, jumps.transversality, jumps.kind, *dense]
 
-        first = simulate(oscillator, (0.1, 0.3), (0.0, t_end), tangent=True, samples=samples)
+        kept_jumps = {"tangent": True, "samples": samples, "keep_jumps": True}
+        first = simulate(oscillator, (0.1, 0.3), (0.0, t_end), **kept_jumps)
         before = [np.array(each) for each in everything(first)]
         for x0 in ((-1.0, 5.0), (0.0, -2.0), (0.5, 0.5)):
-            simulate(oscillator, x0, (0.0, t_end), tangent=True, samples=samples)
+            simulate(oscillator, x0, (0.0, t_end), **kept_jumps)
         for kept, now in zip(before, everything(first), strict=True):
             np.testing.assert_array_equal(kept, now)
 

@@ -8,7 +8,6 @@ import pytest
 
 from hybrid.simulation import trajectory
 from hybrid.simulation.periods import split_time
-from hybrid.system.growth import Unexplored
 
 PERIODS = [0.1, 1.0 / 3.0, 2 * math.pi / 7.46, 1e-9, 3e5]
 
@@ -58,26 +57,3 @@ def test_a_run_with_markers_goes_on_from_one_without():
     assert run.side.tolist() == [7, 1, -1]
     assert run.on_guard.tolist() == [5, 0, 1]
     assert run.due.tolist() == [0, 0, 0]
-
-
-@pytest.mark.parametrize("misses", [False, True])
-def test_a_growing_system_is_compiled_once_it_has_the_mode_of_the_start(misses, monkeypatch):
-    asked = []
-
-    class Compiled(Exception):
-        """The system is compiled."""
-
-    def compile_system(system):
-        raise Compiled
-
-    growth = SimpleNamespace(place=lambda *given: asked.append(given) or misses)
-    system = SimpleNamespace(
-        growth=growth,
-        variables=SimpleNamespace(state_values=lambda name, x0: "state"),
-        parameter_values=lambda parameters: "values",
-    )
-    monkeypatch.setattr(trajectory, "as_system", lambda name, system: system)
-    monkeypatch.setattr(trajectory, "compile_system", compile_system)
-    with pytest.raises(Unexplored if misses else Compiled):
-        trajectory.start(system, (1.0,), 2.0, mode="a")
-    assert asked == [(2.0, "state", "values", "a")]

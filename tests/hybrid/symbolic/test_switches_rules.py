@@ -12,20 +12,15 @@ from hybrid.symbolic.expressions import (
     ZERO,
     Absolute,
     Ceiling,
-    Equal,
     Floor,
     Less,
     LessEqual,
     Level,
     Maximum,
     Minimum,
-    Remainder,
     Select,
     Sign,
     Step,
-    Truncate,
-    TruncatedRemainder,
-    WholeQuotient,
 )
 from hybrid.symbolic.printer import assignments
 from hybrid.symbolic.switches import Surfaces, Switches
@@ -40,28 +35,6 @@ def value(expression, q, v=1.0):
     code = "\n".join(assignments(["out[0]"], [expression]))
     exec(code, {"t": 0.0, "x": (q, v), "p": (1.0,), "out": out, "np": np, **vars(math)})
     return out[0]
-
-
-@pytest.mark.parametrize(
-    ("atom", "function"),
-    [
-        (WholeQuotient(Q, V), lambda q: q // 0.75),
-        (Remainder(Q, V), lambda q: q % 0.75),
-        (TruncatedRemainder(Q, V), lambda q: math.fmod(q, 0.75)),
-        (Truncate(Q), math.trunc),
-    ],
-)
-def test_functions_in_terms_of_simpler_ones(atom, function):
-    made = switches._rewritten(atom)
-    assert not made.atoms(type(atom))
-    for q in (-2.0, -0.9, -0.3, 0.2, 0.8, 1.9):
-        assert value(made, q, 0.75) == pytest.approx(function(q), abs=1e-15)
-
-
-def test_an_equality_is_false_and_simple_functions_stay():
-    assert switches._rewritten(Equal(Q, V)) == 0
-    for atom in (Less(Q, V), Sign(Q), Floor(Q), Ceiling(Q), Maximum(Q, V), Absolute(Q), Step(Q)):
-        assert switches._rewritten(atom) is None
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ def types_alive():
 
 def test_types_of_dropped_modules_are_freed(monkeypatch):
     # Nothing comes from an earlier process.
-    monkeypatch.setattr(functions, "kept", lambda path: None)
+    monkeypatch.setattr(functions, "kept_of_model", lambda *given: None)
 
     def run(rates):
         for rate in rates:

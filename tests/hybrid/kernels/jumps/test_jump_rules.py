@@ -178,24 +178,6 @@ class TestCrossings:
         tested.recall_map(Model(), run, 3, memory())
         assert said.calls == calls
 
-    @pytest.mark.parametrize(
-        ("target", "marker", "mode", "remembers"), [(0, 0, 0, True), (0, 1, 0, False), (2, 0, 2, False)]
-    )
-    def test_impulses_are_remembered_where_a_chatter_may_begin(self, target, marker, mode, remembers):
-        model, said = Model(), Recorder()
-        model.target, model.marker = np.array([9, target]), np.array([9, marker])
-        tested = plain(
-            jump,
-            remember_impulse=said.stub("impulse", kept=(2, 3)),
-            move=said.stub("move", kept=(2, 3, 4)),
-        )
-        tested.leave(model, self.run(), 1, 7.0, SimpleNamespace(new="new"))
-        assert said.calls == [*([("impulse", 1, 7.0)] if remembers else []), ("move", 1, mode, "new")]
-        # At the end of a run its mode stays.
-        model.target[1] = NO_MODE
-        tested.leave(model, self.run(), 1, 7.0, SimpleNamespace(new="new"))
-        assert said.calls[-1] == ("move", 1, 0, "new")
-
     def test_a_change_of_the_mode_in_an_instant(self):
         said, work = Recorder(), memory()
         run = self.run(mode=2)
