@@ -19,7 +19,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, Solver, Taylor, Tsit5
 from hybrid.status import StatusCode
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system, check_mode
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -244,7 +244,7 @@ def work_precision(
     x0 = system.variables.state_values("x0", x0)
     t_span = arguments.time_span("t_span", t_span)
     if mode is not None:
-        system.check_mode(mode)
+        check_mode(system, mode)
     system.parameter_values(parameters)
     tangent = arguments.flag("tangent", tangent)
     runs = {

@@ -18,7 +18,7 @@ from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system, starting_mode
 from hybrid.system.growth import Unexplored
 
 UNLIMITED = np.iinfo(np.int64).max
@@ -50,7 +50,7 @@ def start(
     as_system("system", system)
     state = system.variables.state_values("x0", x0)
     t0 = arguments.number(time, t0)
-    mode = mode if by_guards else system.starting_mode(mode)
+    mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
         values = system.parameter_values(parameters)
         if system.growth.place(t0, state, values, mode):

@@ -30,7 +30,7 @@ from hybrid.status import Status, StatusCode
 from hybrid.sweep.local import LOOK, cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system, starting_mode
 from hybrid.system.labels import named
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def simulate_many(
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
     system.parameter_values(parameters)
     overrides = named("parameters", parameters)
-    mode = system.starting_mode(mode)
+    mode = starting_mode(system, mode)
     options = {"mode": mode, "parameters": overrides, "solver": check_solver(solver)}
     found = _Found(origins, times, t1)
     if system.growth is not None or (mode is not None and len(system.parts_of(mode)) > 1):

@@ -23,7 +23,7 @@ from hybrid.solvers import Solver
 from hybrid.sweep.points import as_points
 from hybrid.sweep.sheet import Labels
 from hybrid.system.elements import Guard
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.growth import Unexplored
 from hybrid.system.labels import by_label, named, plain_name
 from hybrid.transform.markers import with_section
@@ -221,7 +221,7 @@ def rows_of(
     state = system.variables.state_values("x0", x0)
     system.parameter_values(others)
     if mode is not None:
-        system.check_mode(mode)
+        check_mode(system, mode)
     along = _axis(continue_from, swept.dims)
     if along in starts:
         raise ArgumentError(

@@ -60,6 +60,13 @@ def _growth(instance: Any, attribute: attrs.Attribute[Any], value: object) -> No
         )
 
 
+def _derived_from(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if not isinstance(value, Watched):
+        raise arguments.refusal(
+            "HybridSystem: derived_from", "be left out: split and filippov give it", value
+        )
+
+
 def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
     arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
 
@@ -113,7 +120,9 @@ class HybridSystem(Portable):
     # What makes further modes, for a system that is made in stages.
     growth: Growth | None = attrs.field(default=None, kw_only=True, validator=_growth, repr=False)
     # What the functions read that this system was derived from.
-    derived_from: Watched = attrs.field(factory=Watched, kw_only=True, eq=False, repr=False)
+    derived_from: Watched = attrs.field(
+        factory=Watched, kw_only=True, validator=_derived_from, eq=False, repr=False
+    )
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
 
@@ -267,21 +276,6 @@ class HybridSystem(Portable):
         parts = [i for i, mode in enumerate(self.modes) if name in (mode.name, mode.part_of)]
         return parts or [self.mode_index(name)]
 
-    def check_mode(self, name: object, what: str = "Mode") -> None:
-        """ModelError unless a run may start in a mode of that name; ``what`` begins the text."""
-        names = [*self.mode_names, *(mode.part_of for mode in self.modes if mode.part_of)]
-        if self.growth is not None:
-            # No part of a mode may have been made yet.
-            names += self.growth.original.mode_names
-        if not isinstance(name, str) or name not in names:
-            raise ModelError(unknown_name(what, name, dict.fromkeys(names), "Modes"))
-
-    def starting_mode(self, mode: str | None) -> str | None:
-        """The mode that a call names, or the only one, or ``start``; None if the guards choose it."""
-        if mode is not None:
-            return mode
-        return self.mode_names[0] if len(self.modes) == 1 and self.is_whole else self.start
-
     def copies_of(self, name: str) -> list[int]:
         """Indices of the transitions that are copies of a transition, or of the one of that name."""
         copies = []
@@ -333,7 +327,7 @@ class HybridSystem(Portable):
                     what = f"Transition {transition.name!r}: {end} mode"
                     raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
         if self.start is not None:
-            self.check_mode(self.start, "HybridSystem: start mode")
+            check_mode(self, self.start, "HybridSystem: start mode")
         if self.is_whole:
             # The modes between those of a stage may not have been made yet.
             self._check_reachable()
@@ -350,6 +344,23 @@ class HybridSystem(Portable):
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."
             )
+
+
+def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:
+    """ModelError unless a run may start in a mode of that name; ``what`` begins the text."""
+    names = [*system.mode_names, *(mode.part_of for mode in system.modes if mode.part_of)]
+    if system.growth is not None:
+        # No part of a mode may have been made yet.
+        names += system.growth.original.mode_names
+    if not isinstance(name, str) or name not in names:
+        raise ModelError(unknown_name(what, name, dict.fromkeys(names), "Modes"))
+
+
+def starting_mode(system: HybridSystem, mode: str | None) -> str | None:
+    """The mode that a call names, or the only one, or ``start``; None if the guards choose it."""
+    if mode is not None:
+        return mode
+    return system.mode_names[0] if len(system.modes) == 1 and system.is_whole else system.start
 
 
 def functions_of(system: HybridSystem) -> Iterator[tuple[int, ModelFunction]]:

@@ -15,7 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver
 from hybrid.system.derivatives import evaluate
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.labels import named
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
 
@@ -138,7 +138,7 @@ def cases(
         If a name does not exist, or a range or the span is invalid.
     """
     if mode is not None:
-        as_system("system", system).check_mode(mode)
+        check_mode(as_system("system", system), mode)
     state, values = _states("states", system, states), _parameters("parameters", system, parameters)
     through = tuple(
         arguments.known("passable: Transition", name, system.transition_names, "Transitions")

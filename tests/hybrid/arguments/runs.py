@@ -50,6 +50,8 @@ def runs(made):
                 "t_span": [*SPAN, (0.0, 1e300), (-1e300, 0.0)],
                 "tangent": TANGENT,
                 "samples": SAMPLES,
+                # Without samples an arc needs its jumps.
+                "keep_jumps": [*FLAG[1:], False],
                 "max_jumps": COUNT,
             },
         ),
