@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
-from types import CodeType, FunctionType, MethodType, ModuleType
+from types import CodeType, FunctionType, MethodType, ModuleType, WrapperDescriptorType
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,10 @@ class Watched:
         elif isinstance(getattr(function, "py_func", None), FunctionType):
             self._read_by(function.py_func)
         elif function is not None:
-            self._read_by(vars(type(function)).get("__call__"), function)
+            # The call of what is written in C, such as `len`, reads nothing, and has a call like itself.
+            call = type(function).__call__
+            if not isinstance(call, WrapperDescriptorType):
+                self._read_by(call, function)
 
     def _read_by_code(self, function: FunctionType, owner: Any) -> None:
         key = (id(function), id(owner))

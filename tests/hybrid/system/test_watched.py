@@ -9,6 +9,7 @@ import pytest
 import hybrid
 from hybrid import HybridSystem, Mode, ModelError, from_equations, simulate
 from hybrid.compiler.compiled import compile_system
+from hybrid.system.watched import Watched
 
 RATE = 2.0
 
@@ -78,6 +79,23 @@ def of_a_method():
     return body.field, partial(setattr, body, "rate")
 
 
+class Called:
+    def __init__(self):
+        self.rate = 2.0
+
+    def __call__(self, t, x, p):
+        return (-self.rate * x.q,)
+
+
+class Heir(Called):
+    pass
+
+
+def of_an_inherited_call():
+    heir = Heir()
+    return heir, partial(setattr, heir, "rate")
+
+
 def of_an_argument_given_in_advance():
     table = [2.0]
 
@@ -91,7 +109,7 @@ def of_an_argument_given_in_advance():
     "made",
     [
         of_a_global, of_a_closure, of_an_array, of_a_dict, of_an_object, of_a_method,
-        of_an_argument_given_in_advance,
+        of_an_inherited_call, of_an_argument_given_in_advance,
     ],
 )  # fmt: skip
 def test_a_change_is_seen_by_the_next_run(made):
@@ -124,6 +142,12 @@ def test_a_declared_period_is_watched_too():
         table["w"] = w
         section = hybrid.stroboscopic_section(system, (0.0,), periods=2)
         assert section.t == pytest.approx([2 * np.pi / w, 4 * np.pi / w])
+
+
+@pytest.mark.parametrize("function", [len, int, np.sin, str.upper, "a".upper, partial(len)])
+def test_functions_written_in_c_read_nothing(function):
+    """The call of a built-in function has a call of its own, and so on without end."""
+    assert Watched([function]).holds()
 
 
 def test_a_derived_system_asks_to_be_derived_again():
