@@ -18,6 +18,7 @@ LONG = {**RUN, "t0": 0.0, "progress": False}
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
 CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
 PLAIN = {"parameters": None, "period": None, "name": "", "units": None}
+FIGURE = {"ax": None, "figsize": None}
 DEFAULTS = {
     hybrid.DOP853: TOLERANCES,
     hybrid.RadauIIA: TOLERANCES,
@@ -43,7 +44,7 @@ DEFAULTS = {
     hybrid.from_equations: PLAIN,
     hybrid.global_error: {**RUN, "max_jumps": 100_000},
     hybrid.simulate: {**RUN, "tangent": None, "samples": None, "keep_jumps": None, "max_jumps": 100_000},
-    hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None},
+    hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None, "progress": None},
     hybrid.periodic_orbit: {
         **RUN,
         **{"t0": 0.0, "periods": 1, "period": None, "tolerance": 1e-10, "max_iterations": 30},
@@ -68,9 +69,16 @@ DEFAULTS = {
         **{**LONG, "separation": 1e-8, "direction": None, "intervals": 1000, "interval": None},
         "transient": 0,
     },
-    hybrid.plot.plot_orbit: {"x": 0, "y": None, "ax": None},
-    hybrid.plot.plot_section: {"x": 0, "y": None, "ax": None},
-    hybrid.plot.plot_work_precision: {"quantity": "state", "ax": None},
+    hybrid.plot.plot_arc: {"components": None, **FIGURE},
+    hybrid.plot.plot_ends: {"x": 0, "y": None, "size": None, **FIGURE},
+    hybrid.plot.plot_global_error: FIGURE,
+    hybrid.plot.plot_graph: FIGURE,
+    hybrid.plot.plot_jumps: FIGURE,
+    hybrid.plot.plot_orbit: {"x": 0, "y": None, **FIGURE},
+    hybrid.plot.plot_phase: FIGURE,
+    hybrid.plot.plot_section: {"x": 0, "y": None, "size": None, **FIGURE},
+    hybrid.plot.plot_sweep: {"size": None, **FIGURE},
+    hybrid.plot.plot_work_precision: {"quantity": "state", **FIGURE},
 }
 
 
@@ -112,7 +120,7 @@ def test_defaults_of_work_precision():
 def test_every_public_call_is_listed():
     listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
     # Bases, errors and results are made by the library.
-    made = {"Solver", "Status", "StatusCode"}
+    made = {"Solver", "Status", "StatusCode", "TwoOrbitExponents"}
     for package in (hybrid, lyapunov):
         for name in package.__all__:
             each = getattr(package, name)
