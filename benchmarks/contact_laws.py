@@ -18,8 +18,7 @@ from benchmarks.common import file_in, heading, least_time, options, table
 from hybrid import Taylor
 from hybrid.plot import COLOURS
 from lyapunov import ModelComparison, compare_models, lyapunov_spectrum
-from models.contact import ContactLaw, matched_laws
-from models.vibroimpact import hertz_stiffness
+from models.contact import ContactLaw, hertz_stiffness, matched_laws
 
 PICTURE = "contact_laws.png"
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)

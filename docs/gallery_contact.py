@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 import models
 from hybrid import DOP853, simulate, stroboscopic_section
 from hybrid.plot import COLOURS
-from models.contact import Hertz, HuntCrossley, KelvinVoigt
-from models.vibroimpact import hertz_stiffness
+from models.contact import Hertz, HuntCrossley, KelvinVoigt, hertz_stiffness
 
 COARSE = DOP853(rtol=1e-8, atol=1e-10)
 

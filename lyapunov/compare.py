@@ -156,8 +156,7 @@ def compare_models(
     Examples
     --------
     >>> import models
-    >>> from models.contact import Hertz, Rigid
-    >>> from models.vibroimpact import hertz_stiffness
+    >>> from models.contact import Hertz, Rigid, hertz_stiffness
     >>> laws = {"rigid": Rigid(e=1.0), "Hertz": Hertz(hertz_stiffness())}
     >>> found = compare_models(
     ...     {name: models.vibroimpact(law) for name, law in laws.items()},

@@ -312,6 +312,29 @@ class KelvinVoigt:
         ]
 
 
+def hertz_stiffness(
+    E: float = 2.1e11, nu: float = 0.3, A: float = 0.5, B: float = 0.5, q: float = 0.318
+) -> float:
+    """Hertz stiffness ``K = (4/3) q / ((d1 + d2) sqrt(A + B))``, ``d = (1 - nu^2) / (E pi)`` for both bodies.
+
+    Parameters
+    ----------
+    E, nu
+        Young's modulus in N/m^2 and Poisson's ratio, the same for both bodies.
+    A, B, q
+        Curvatures of the contact in 1/m, and the corresponding coefficient.
+    """
+    E, q = arguments.positive("E", E), arguments.positive("q", q)
+    A, B = arguments.positive("A", A), arguments.positive("B", B)
+    nu = arguments.number("nu", nu)
+    if not abs(nu) < 1:
+        raise arguments.refusal("nu", "lie between -1 and 1", nu)
+    # E / (1 - nu^2) = 1 / (pi d), and the sum of two curvatures may be too large for a float.
+    curvature = 2 * (A / 4 + B / 4) ** 0.5
+    stiffness = 2 / 3 * pi * q * (E / ((1 - nu) * (1 + nu))) / curvature
+    return arguments.result("hertz_stiffness", stiffness)
+
+
 def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[str, ContactLaw]:
     """Every law that can have restitution ``e``, matched at one speed of impact, the simplest first.
 

@@ -81,13 +81,7 @@ def coulomb_stick_slip() -> HybridSystem:
         ],
         transitions=[
             Transition("stick", "slip", Guard(_pull, direction=+1), name="release"),
-            Transition(
-                "slip",
-                "stick",
-                Guard(_slip, direction=+1),
-                Reset(_caught),
-                name="catch",
-            ),
+            Transition("slip", "stick", Guard(_slip, direction=+1), Reset(_caught), name="catch"),
         ],
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid import HybridSystem, arguments
-from models.contact import Bodies, ContactLaw, Hertz, after_collision
+from models.contact import Bodies, ContactLaw, Hertz, after_collision, hertz_stiffness
 
 
 def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
@@ -33,7 +33,8 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         Parameters (all but D are recalled from other papers of the authors and are unchecked):
         bodies ``m1 = 1000``, ``m2 = 100`` kg; ``omega1 = 6.283``, ``omega2 = 5.646`` rad/s;
         ``xi1 = xi2 = 0.036``; drive ``P = 500`` N, ``phi0 = 0``, ``omega = 7.40`` rad/s; gap at rest
-        ``D = 0.05`` m; contact stiffness ``K = 1.537e11`` N/m^(3/2), from :func:`hertz_stiffness`.
+        ``D = 0.05`` m; contact stiffness ``K = 1.537e11`` N/m^(3/2), from
+        :func:`models.contact.hertz_stiffness`.
 
     Notes
     -----
@@ -83,29 +84,6 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         transitions=contact.transitions(bodies),
         period=_forcing_period,
     )  # fmt: skip
-
-
-def hertz_stiffness(
-    E: float = 2.1e11, nu: float = 0.3, A: float = 0.5, B: float = 0.5, q: float = 0.318
-) -> float:
-    """Hertz stiffness ``K = (4/3) q / ((d1 + d2) sqrt(A + B))``, ``d = (1 - nu^2) / (E pi)`` for both bodies.
-
-    Parameters
-    ----------
-    E, nu
-        Young's modulus in N/m^2 and Poisson's ratio, the same for both bodies.
-    A, B, q
-        Curvatures of the contact in 1/m, and the corresponding coefficient.
-    """
-    E, q = arguments.positive("E", E), arguments.positive("q", q)
-    A, B = arguments.positive("A", A), arguments.positive("B", B)
-    nu = arguments.number("nu", nu)
-    if not abs(nu) < 1:
-        raise arguments.refusal("nu", "lie between -1 and 1", nu)
-    # E / (1 - nu^2) = 1 / (pi d), and the sum of two curvatures may be too large for a float.
-    curvature = 2 * (A / 4 + B / 4) ** 0.5
-    stiffness = 2 / 3 * np.pi * q * (E / ((1 - nu) * (1 + nu))) / curvature
-    return arguments.result("hertz_stiffness", stiffness)
 
 
 def _penetration(t, x, p):

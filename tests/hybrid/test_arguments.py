@@ -24,7 +24,6 @@ from hybrid.errors import HybridError
 from models import contact
 from models.dry_friction_oscillator import den_hartog_amplitude
 from models.one_impact import one_impact_orbits
-from models.vibroimpact import hertz_stiffness
 from tests.hybrid.arguments.methods import methods
 from tests.hybrid.arguments.models_and_testing import checks, laws
 from tests.hybrid.arguments.plots import plots
@@ -103,7 +102,7 @@ def public_functions():
     found += [getattr(hybrid.plot, name) for name in hybrid.plot.__all__ if name.startswith("plot")]
     found += [each for name, each in vars(models).items() if inspect.isfunction(each)]
     laws = (contact.Rigid, contact.Hertz, contact.HuntCrossley, contact.KelvinVoigt)
-    found += [*laws, contact.matched_laws, hertz_stiffness, one_impact_orbits, den_hartog_amplitude]
+    found += [*laws, contact.matched_laws, contact.hertz_stiffness, one_impact_orbits, den_hartog_amplitude]
     for each in list(found):
         if inspect.isclass(each) and each.__name__ not in WITHOUT_METHODS and not issubclass(each, Exception):
             for name, method in vars(each).items():

@@ -10,8 +10,15 @@ import pytest
 import hybrid
 import lyapunov
 from models import vibroimpact
-from models.contact import Hertz, HuntCrossley, KelvinVoigt, Rigid, after_collision, matched_laws
-from models.vibroimpact import hertz_stiffness
+from models.contact import (
+    Hertz,
+    HuntCrossley,
+    KelvinVoigt,
+    Rigid,
+    after_collision,
+    hertz_stiffness,
+    matched_laws,
+)
 from tests.reference.load import reference
 
 K, SPEED = hertz_stiffness(), 0.4

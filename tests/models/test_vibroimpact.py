@@ -8,7 +8,7 @@ import pytest
 import hybrid
 import lyapunov
 from models import vibroimpact
-from models.vibroimpact import hertz_stiffness
+from models.contact import hertz_stiffness
 from tests.reference.load import complex_pairs, reference
 
 FOUNDING = reference("founding_system")

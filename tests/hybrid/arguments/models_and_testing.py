@@ -6,7 +6,6 @@ import models
 from models import contact
 from models.dry_friction_oscillator import den_hartog_amplitude
 from models.one_impact import one_impact_orbits
-from models.vibroimpact import hertz_stiffness
 from tests.hybrid.arguments.values import (
     BALL,
     COUNT,
@@ -79,7 +78,7 @@ def laws():
     return [
         (call(models.vibroimpact), {"contact": ["a", 3, 0, False, contact.Rigid, Odd()]}),
         (
-            call(hertz_stiffness),
+            call(contact.hertz_stiffness),
             {
                 "E": POSITIVE,
                 "nu": [*NUMBER, 1.0, -1.0],
