@@ -1,7 +1,6 @@
 """Spectra compared with exact answers: error bars, memory and messages."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ import hybrid
 import lyapunov
 import models
 from hybrid.simulation.ending import status_of
-from lyapunov.spectrum import time_scale
 from tests.cases import systems
 
 ORBIT_740 = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
@@ -425,19 +423,6 @@ def test_the_default_interval_does_not_depend_on_the_units_of_the_states(field, 
     )
     spectrum = lyapunov.lyapunov_spectrum(system, x0, intervals=2, transient=0)
     assert spectrum.interval == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("jacobian", "x", "rate", "expected"),
-    [
-        ([[0.0, np.inf], [0.0, 0.0]], (1.0, 1.0), (1.0, 1.0), 1.0),
-        ([[0.0, 0.0], [0.0, 0.0]], (3.0, 4.0), (0.5, -2.0), 6.0),
-        ([[0.0, 0.0], [0.0, 0.0]], (3.0, 4.0), (0.0, 0.0), 1.0),
-    ],
-)
-def test_the_time_in_which_the_field_changes_a_state(jacobian, x, rate, expected):
-    found = SimpleNamespace(jacobian=lambda: np.array(jacobian), x=x, field=lambda: rate)
-    assert time_scale(found) == expected
 
 
 @pytest.mark.parametrize("unit", [2.0**-40, 1.0, 2.0**40])

@@ -86,6 +86,19 @@ def test_the_length_of_an_interval(monkeypatch):
     assert spectrum.interval_length(orbit(0.0), 0.5, 7) == 0.5
 
 
+@pytest.mark.parametrize(
+    ("jacobian", "x", "rate", "expected"),
+    [
+        ([[0.0, np.inf], [0.0, 0.0]], (1.0, 1.0), (1.0, 1.0), 1.0),
+        ([[0.0, 0.0], [0.0, 0.0]], (3.0, 4.0), (0.5, -2.0), 6.0),
+        ([[0.0, 0.0], [0.0, 0.0]], (3.0, 4.0), (0.0, 0.0), 1.0),
+    ],
+)
+def test_the_time_in_which_the_field_changes_a_state(jacobian, x, rate, expected):
+    found = SimpleNamespace(jacobian=lambda: np.array(jacobian), x=x, field=lambda: rate)
+    assert spectrum.time_scale(found) == expected
+
+
 @pytest.mark.parametrize("t0", [0.0, 2.0**52, -(2.0**52)])
 def test_an_interval_is_at_least_1024_roundings_of_the_latest_time(t0):
     """At ``t0`` numbers are 1 apart; intervals of 1024 from zero reach a time with the same rounding."""
