@@ -290,9 +290,10 @@ class CompiledSystem:
             field_before=_indices(before for before, _ in self.emitted.crossing),
             field_behind=_indices(behind for _, behind in self.emitted.crossing),
             timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
-            decides=_indices(
-                jumping or any(other.source == each.source and other.guard.when for other in transitions)
-                for each, jumping in zip(transitions, self.emitted.jumping_reset, strict=True)
+            jumping_reset=_indices(self.emitted.jumping_reset),
+            conditional=_indices(
+                any(each.source == name and each.guard.when is not None for each in transitions)
+                for name in system.mode_names
             ),
             timed_jump=_indices(map(max, self.emitted.timed_guard, self.emitted.timed_reset)),
             tangent_start=self.emitted.tangent_start,

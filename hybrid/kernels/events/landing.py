@@ -5,8 +5,8 @@ or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a 
 find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
 by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
 
-The flow needs time for that, and a slow crossing would be late. An event at which nothing is decided by a
-jump, neither by its guard nor by its reset or a condition, stays at the root.
+The flow needs time for that, and a slow crossing would be late. So an event stays at its root if neither its
+guard nor its reset may jump there, and no condition in its mode changes on that way.
 """
 
 import math
@@ -17,6 +17,7 @@ from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.derivatives import moment_of_rounding
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
+    allowed,
     guard_speed,
     guard_value,
     may_jump,
@@ -66,6 +67,17 @@ def _goes_on(model, transition, mode, t, x, side, speed, work):
 
 
 @njit(**KERNEL)
+def _decides(model, run, transition, t, later, x, work):
+    """Whether a condition in the mode changes from the state at ``t`` to ``x`` at the time ``later``."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        other = model.outgoing[slot]
+        before = allowed(model, other, t, run.y, work.scalar)
+        if before != allowed(model, other, later, x, work.scalar):
+            return True
+    return False
+
+
+@njit(**KERNEL)
 def _shortest_span(model, run, t, work):
     """A time in which the first component, or the clock, moves by half of its rounding."""
     span = size_of_time(model, t)
@@ -106,6 +118,12 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
                 model, transition, mode, run.phase, work.state, side, speed, work
             ):
                 break
+            if not (
+                jumps
+                or model.jumping_reset[transition] == 1
+                or _decides(model, run, transition, t, run.phase, work.state, work)
+            ):
+                break
             for i in range(n):
                 run.y[i] = work.state[i]
             run.since_entry += span
@@ -120,14 +138,14 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     """Move a run along the flow until the guard that it has reached has the sign ``side``.
 
     The rounding that counts is that of the guard at this state, not that of the way there. Nothing is moved
-    where nothing jumps, or where the guard dips to that side by less than its rounding. Markers change
+    where nothing jumps, nor where the guard dips to that side by less than its rounding. Markers change
     nothing. The clock does not pass the stop of the run. Tangent vectors stay: they change by rounding.
     """
     if side == 0 or model.marker[transition] == 1:
         return
     t = run.phase
     jumps = may_jump(model, run, transition, t, run.y, work)
-    if not jumps and model.decides[transition] == 0:
+    if not jumps and model.jumping_reset[transition] == 0 and model.conditional[run.mode] == 0:
         return
     if not jumps:
         value = guard_value(model, transition, t, run.y, work.scalar)

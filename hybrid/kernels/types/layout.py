@@ -72,8 +72,8 @@ class Model(Structure):
     guard; ``root`` is the order of the root that the series of a mode hold for its guards. ``field_before``
     and ``field_behind`` are the numbers of the fields at the crossing of a guard, on its two sides.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time, ``timed_jump`` for a
-    transition whose guard or reset may. ``decides`` is 1 for a transition whose reset may jump, or from whose
-    mode a condition leads: its event has to lie beyond its guard.
+    transition whose guard or reset may. ``jumping_reset`` is 1 for one whose reset may jump,
+    ``conditional`` for a mode that is left under conditions.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
     """
@@ -123,7 +123,8 @@ class Model(Structure):
     field_behind: INDICES
     timed: INDICES
     timed_jump: INDICES
-    decides: INDICES
+    jumping_reset: INDICES
+    conditional: INDICES
     tangent_start: INTEGER
     tangent_columns: INDICES
     period: REAL

@@ -13,6 +13,7 @@ from hybrid.transform.splitter import Splitter
 PARAMETERS = {"gap": 0.5, "mu": 1.0, "w": 2.0}
 WORDS = {
     **{name: getattr(np, name) for name in ("sin", "cos", "exp", "floor")},
+    "pi": np.pi,
     "mod": lambda a, b: a - b * np.floor(a / b),
 }
 
