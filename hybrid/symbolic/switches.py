@@ -51,6 +51,9 @@ DIGITS = 12
 ROUNDING = 1e-12
 
 
+Pulse = tuple[sympy.Expr, sympy.Expr, int]
+
+
 @attrs.frozen
 class Surface:
     """A surface ``height = 0``.
@@ -64,12 +67,15 @@ class Surface:
         ``level``. Surfaces with the same core are parallel. The height grows with the core.
     argument
         For a floor its argument, whose fraction is below 1/2 above the surface; else None.
+    pulse
+        For both ends of a pulse, ``u``, ``d`` and the side on which the fraction of ``u`` exceeds ``d``.
     """
 
     height: sympy.Expr
     core: str
     level: float
     argument: sympy.Expr | None = None
+    pulse: Pulse | None = None
 
 
 class Surfaces:
@@ -78,6 +84,7 @@ class Surfaces:
     def __init__(self, symbols: Symbols) -> None:
         self.symbols = symbols
         self.known: list[Surface] = []
+        self.pulses: dict[str, Pulse] = {}
         self._implied: dict[Any, int | None] = {}
 
     def find(self, height: sympy.Expr, argument: sympy.Expr | None = None) -> tuple[int, int]:
@@ -87,7 +94,7 @@ class Surfaces:
         if number is not None:
             return number, orientation
         upwards = height if orientation > 0 else _negative(height)
-        self.known.append(Surface(upwards, core, level, argument))
+        self.known.append(Surface(upwards, core, level, argument, self.pulses.get(core)))
         return len(self.known) - 1, orientation
 
     def match(self, height: sympy.Expr) -> tuple[int, int] | None:
@@ -211,7 +218,7 @@ class Switches:
 
     def __init__(self, entries: Sequence[sympy.Expr], surfaces: Surfaces) -> None:
         self.surfaces = surfaces
-        pulses = tuple(_pulses(entry, surfaces.symbols) for entry in entries)
+        pulses = tuple(_pulses(entry, surfaces) for entry in entries)
         self._root = self._stage(pulses, {})
 
     def resolved(self, sides: Mapping[int, int]) -> Resolved | int:
@@ -347,7 +354,7 @@ def _fixed(atom: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
     return atom.func(*([ZERO] if isinstance(atom, Less | LessEqual) else []), height)
 
 
-def _pulses(entry: sympy.Expr, symbols: Symbols) -> sympy.Expr:
+def _pulses(entry: sympy.Expr, surfaces: Surfaces) -> sympy.Expr:
     """An expression whose comparisons of a fraction with a constant have one surface: both ends of a pulse.
 
     The fraction of ``u``, as in ``mod(t, 4) > 1``, is above ``d`` where ``cos(pi*d) > cos(2*pi*(u - d/2))``.
@@ -357,13 +364,13 @@ def _pulses(entry: sympy.Expr, symbols: Symbols) -> sympy.Expr:
     for atom in nodes_of((Less, LessEqual, Sign, Step), entry):
         height = _height(atom)[0]
         with distribute(True):
-            pulse = _pulse(height, symbols) if contains(height, (Floor, Remainder)) else None
+            pulse = _pulse(height, surfaces) if contains(height, (Floor, Remainder)) else None
         if pulse is not None:
             changes[atom] = atom.func(*([ZERO] if isinstance(atom, Less | LessEqual) else []), pulse)
     return replaced(entry, changes) if changes else entry
 
 
-def _pulse(height: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
+def _pulse(height: sympy.Expr, surfaces: Surfaces) -> sympy.Expr | None:
     """A smooth height with the sign of ``g*(u - floor(u)) + c``; None if a height is not of this form."""
     if is_larger_than(MOST_TERMS, height):
         return None
@@ -375,7 +382,7 @@ def _pulse(height: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
     [floor] = floors
     [u], slope = floor.args, -height.coeff(floor)
     constant = expanded(height - slope * (u - floor))
-    if slope == 0 or contains(u, SWITCHING) or mentions(slope, symbols.variables):
+    if slope == 0 or contains(u, SWITCHING) or mentions(slope, surfaces.symbols.variables):
         return None
     level = sympy.cancel(-constant / slope)
     if not level.is_number:
@@ -383,7 +390,11 @@ def _pulse(height: sympy.Expr, symbols: Symbols) -> sympy.Expr | None:
     if not 0 < level < 1:
         return slope if level <= 0 else -slope
     middle = 2 * sympy.pi * (u - level / 2)
-    return slope * (sympy.cos(sympy.pi * level).evalf() - sympy.cos(middle))
+    pulse = slope * (sympy.cos(sympy.pi * level).evalf() - sympy.cos(middle))
+    core, _, orientation = _core(pulse, surfaces.symbols)
+    if slope.is_number:
+        surfaces.pulses[core] = u, level, orientation if slope > 0 else -orientation
+    return pulse
 
 
 def _height(atom: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr | None]:

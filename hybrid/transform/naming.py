@@ -44,6 +44,9 @@ class Names:
         if surface.argument is not None:
             words = self._text(surface.argument)
             name = f"mod({words},1){'>1/2' if side < 0 else '<1/2'}" if side else f"2*({words}) whole"
+        elif surface.pulse is not None:
+            u, level, above = surface.pulse
+            name = f"mod({self._text(u)},1){SIGNS[side * above]}{self._text(level)}"
         else:
             left, right = self._equation(self._without_levels(surface.height))
             name = f"{left}{SIGNS[side]}{right}"
