@@ -32,7 +32,7 @@ LOWER = (
 
 # A state above this size grows beyond all numbers.
 HUGE = 1e100
-# A state that doubles within this share of the time grows without bound, if it does not slow down.
+# A state that doubles within this share of the stay in its mode grows without bound, unless it slows down.
 SOON = 1e-6
 
 
@@ -294,7 +294,7 @@ def _grows_without_bound(trajectory: Trajectory) -> bool:
         here, beyond = trajectory.field(), trajectory.field(2.0 * x)
         moments = np.abs(x) / np.abs(here)
         fastest = int(np.argmin(np.where(here * x > 0.0, moments, np.inf)))
-        soon = moments[fastest] <= SOON * max(abs(run.phase), run.longest_step)
+        soon = moments[fastest] <= SOON * max(run.since_entry, run.longest_step)
         return bool(soon and here[fastest] * x[fastest] > 0.0 and beyond[fastest] / here[fastest] >= 1.0)
 
 

@@ -1,6 +1,5 @@
 """The two-orbit method rule by rule: how runs are followed, placed and judged."""
 
-from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -153,24 +152,6 @@ def test_the_clock_must_reach_the_end_of_all_intervals(monkeypatch):
         two_orbit.two_orbit_exponents(system, (0.0,), interval=1.0, intervals=5, transient=2)
 
 
-def test_the_bar_counts_the_intervals_of_the_transient_too(monkeypatch):
-    totals = []
-
-    def bar(total, *given):
-        totals.append(total)
-        raise StopAsyncIteration
-
-    monkeypatch.setattr(two_orbit, "start", lambda *given, **options: SimpleNamespace(stop=nullcontext()))
-    monkeypatch.setattr(two_orbit, "as_system", lambda name, system: system)
-    monkeypatch.setattr(two_orbit, "interval_length", lambda *given: 1.0)
-    monkeypatch.setattr(two_orbit, "load_kernels", lambda module: None)
-    monkeypatch.setattr(two_orbit, "progress_bar", bar)
-    system = SimpleNamespace(growth=None, dimension=1)
-    with pytest.raises(StopAsyncIteration):
-        two_orbit.two_orbit_exponents(system, (0.0,), interval=1.0, intervals=5, transient=2)
-    assert totals == [7]
-
-
 @pytest.mark.parametrize(
     ("period", "interval", "wanted"),
     [(2.0, 2.0, ("to", 8, 0.5)), (2.0, 1.0, ("until", 13.5)), (0.0, 1.0, ("until", 13.5))],
@@ -186,45 +167,3 @@ def test_intervals_that_are_forcing_periods_are_counted(period, interval, wanted
         advance=lambda t, record: ("until", t),
     )
     assert two_orbit._skip(run, 3, interval) == wanted
-
-
-class Placed:
-    """A companion, in a mode, and what it was told."""
-
-    def __init__(self, mode):
-        self.mode, self.run, self.reference = mode, SimpleNamespace(cycle=0, phase=0.0, phase_low=0.0), None
-
-    def goes_on_from(self, reference):
-        self.reference = reference
-
-
-@pytest.mark.parametrize("found", ["left", "right", None])
-def test_where_a_companion_starts(found, monkeypatch):
-    """In the mode that the guards allow; None: they do not allow one, and it is that of the orbit."""
-    asked = []
-
-    def start(system, x, t, *, mode=None, **options):
-        asked.append((system, x.tolist(), t, mode, options))
-        if found is None and mode is None:
-            raise ArgumentError("In no mode.")
-        return Placed(mode or found)
-
-    monkeypatch.setattr(two_orbit, "start", start)
-    reference = SimpleNamespace(
-        system="system",
-        x=np.array([1.0, 2.0]),
-        t=3.0,
-        mode="left",
-        run=SimpleNamespace(cycle=4, phase=5.0, phase_low=6.0),
-    )
-    companion = two_orbit._companion(reference, np.array([0.5, -0.5]), "parameters", "solver")
-    options = {"parameters": "parameters", "solver": "solver"}
-    modes = [None] if found else [None, "left"]
-    assert asked == [("system", [1.5, 1.5], 3.0, mode, options) for mode in modes]
-    assert companion.mode == (found or "left")
-    run = companion.run
-    if companion.mode == "left":
-        assert companion.reference is reference
-    else:
-        assert companion.reference is None
-        assert (run.cycle, run.phase, run.phase_low) == (4, 5.0, 6.0)
