@@ -18,6 +18,7 @@ from hybrid.symbolic.continuity import vanishes_on
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.evaluation import expressed, scalar
 from hybrid.symbolic.expressions import HALF, ZERO, power
+from hybrid.symbolic.nodes import nodes_of, replaced
 from hybrid.symbolic.switches import Surfaces, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
@@ -214,6 +215,8 @@ class Pieces:
         on = [number for number, side in sides.items() if side == 0]
         if not on:
             return expressed(self._vertex_field(sides))
+        if len(on) == 1 and self.rests(sides, on[0]):
+            return expressed(self._held(self._vertex_field({**sides, on[0]: 2}), on[0]))
         shares = self.shares(sides)
         if shares is not None:
             return shares.flow
@@ -256,6 +259,34 @@ class Pieces:
             sympy.Add(*(slope * change for slope, change in zip(normal, changes, strict=True))).expand() != 0
             for changes in self.changes(sides, number)
         )
+
+    def rests(self, sides: Sides, number: int) -> bool:
+        """Whether a state that reaches a surface stays there, though the field does not jump.
+
+        From both sides its speed through the surface falls to zero like a root: with a slope it would never
+        get there.
+        """
+        height = self.surfaces.known[number].height
+        [[*normal, own]] = jacobian_of([height], self.surfaces.symbols.variables)
+        for side in (-2, 2):
+            field = self._vertex_field({**sides, number: side})
+            speed = sympy.Add(own, *(slope * rate for slope, rate in zip(normal, field, strict=True)))
+            if not self._roots(speed, number) or not vanishes_on(speed, height):
+                return False
+        return True
+
+    def _roots(self, expression: sympy.Expr, number: int) -> list[sympy.Expr]:
+        """Roots in an expression whose slope is infinite on a surface."""
+        height = self.surfaces.known[number].height
+        return [
+            each
+            for each in nodes_of(sympy.Pow, expression)
+            if each.exp.is_number and 0 < each.exp < 1 and vanishes_on(each.base, height)
+        ]
+
+    def _held(self, field: Sequence[sympy.Expr], number: int) -> list[sympy.Expr]:
+        """A field on a surface: roots of the height are zero, whatever rounding leaves of the height."""
+        return [replaced(entry, dict.fromkeys(self._roots(entry, number), ZERO)) for entry in field]
 
     def _bare_field(self, sides: Sides) -> list[sympy.Expr]:
         result = self.switches.resolved(sides)

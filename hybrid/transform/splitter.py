@@ -192,10 +192,8 @@ class Splitter:
                     continue
                 # Names of earlier stages stay: a run in another thread may still be on such a stage.
                 self.frontier[name] = edge.target
-                onward = Transition(
-                    transition.source, None, transition.guard, name=name, part_of=transition.part_of
-                )
-                transitions.append(onward)
+                onward = transition.source, None, transition.guard
+                transitions.append(Transition(*onward, name=name, part_of=transition.part_of))
         modes = [self.known[cell][0] for cell in self.made]
         notes = (*self.original.notes, *self.names.notes)
         growth = self if self.frontier else None
@@ -246,8 +244,8 @@ class Splitter:
         original = self.original.modes[cell.mode]
         if not cell.branches:
             return attrs.evolve(original, name=self.name_of(cell), part_of=original.name)
-        field = self.pieces[cell.mode].flow(dict(cell.branches))
-        return Mode(self.name_of(cell), field, part_of=original.name)
+        flow = self.pieces[cell.mode].flow(dict(cell.branches))
+        return Mode(self.name_of(cell), flow, part_of=original.name)
 
     def _edges(self, cell: Cell) -> Iterator[Edge]:
         for number, side in cell.sides:
@@ -267,6 +265,11 @@ class Splitter:
         for choice in pieces.choices(beyond):
             sides = {**dict(cell.branches), **choice.sides}
             extra = self._on(choice.chosen)
+            if pieces.rests(sides, number):
+                for resting in pieces.choices({**sides, number: 0}):
+                    more = [*extra, *self._on(resting.chosen)]
+                    yield self._edge(cell, resting.cell, Guard(height, -side, when=_all(more)))
+                continue
             joined = cell.sliding and not corners.are_apart(pieces, sides, [*cell.sliding, number])
             if not pieces.jumps(sides, number) or not (joined or pieces.may_attract(sides, number)):
                 yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra)))
@@ -329,6 +332,8 @@ class Splitter:
         for side, target, extra in ways:
             off = Guard(height, side, when=_all([self._condition(surface.is_off), *extra]), at_start=True)
             yield self._edge(cell, target, off)
+        if pieces.rests(sides, number):
+            return
         apart = corners.are_apart(pieces, sides, cell.sliding)
         if apart or number == cell.sliding[0]:
             attracts = (
@@ -380,15 +385,11 @@ class Splitter:
         """A user's transition in one cell: one for each side that the state may land on."""
         transition = outgoing.transition
         own = self.names.cell(self.surfaces.known, cell.sides)
-        new: dict[str, Any] = {
-            "source": self.name_of(cell),
-            "part_of": transition.name,
-        }
+        new: dict[str, Any] = {"source": self.name_of(cell), "part_of": transition.name}
         guard = self._smooth_guard(cell, outgoing)
         if transition.target is None:
-            yield Edge(
-                attrs.evolve(transition, guard=guard, name=copy_name(transition.name, own), **new), None
-            )
+            ends = attrs.evolve(transition, guard=guard, name=copy_name(transition.name, own), **new)
+            yield Edge(ends, None)
             return
         asked = [] if guard.when is None else [self._truth(guard.when)]
         limit = self._limit(cell, transition)
