@@ -266,6 +266,9 @@ class Pieces:
         From both sides its speed through the surface falls to zero like a root: with a slope it would never
         get there.
         """
+        slides = any(side == 0 for other, side in sides.items() if other != number)
+        if slides or self.jumps(sides, number):
+            return False
         height = self.surfaces.known[number].height
         [[*normal, own]] = jacobian_of([height], self.surfaces.symbols.variables)
         for side in (-2, 2):

@@ -301,7 +301,11 @@ def runge_kutta_step(task, remaining):
         h, correction, fired = find_event(task, h, interpolated)
         if math.isnan(h):
             return STEP_TOO_SMALL, 0.0
-        if h == 0.0 and fired == NO_TRANSITION:
+        lost = False
+        for i in range(model.dimension if fired != NO_TRANSITION else 0):
+            lost = lost or math.isnan(work.new[i])
+        # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
+        if lost or (h == 0.0 and fired == NO_TRANSITION):
             run.rejected += 1
             run.next_step = SHORTER * whole
             return GO_ON, 0.0

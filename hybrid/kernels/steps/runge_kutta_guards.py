@@ -338,11 +338,7 @@ def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y,
         if before and after and high - low <= finest:
             if length != high:
                 attempt_again(parts, model, method, mode, t, high, y, tangents, work)
-            if not math.isnan(guard_value(model, transition, t + high, work.new, work.scalar)):
-                return high, 0.0
-            # The field ends at the guard: the last place before it is the landing.
-            attempt_again(parts, model, method, mode, t, low, y, tangents, work)
-            return low, 0.0
+            return high, 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
         # A place that does not come from Newton's method gives no rate of convergence.

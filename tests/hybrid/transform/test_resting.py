@@ -11,7 +11,7 @@ SOLVERS = pytest.mark.parametrize(
 
 
 def tanks(inflow=0.0):
-    """Two tanks joined by a pipe; the flow goes with the root of the difference of levels (Torricelli)."""
+    """Two tanks joined by a pipe; its flow goes with the root of the difference of levels (Torricelli)."""
 
     def field(t, x, p):
         flow = np.sign(x.a - x.b) * np.sqrt(np.abs(x.a - x.b))
