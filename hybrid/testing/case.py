@@ -23,6 +23,7 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Transition
 from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
+from hybrid.system.variables import named_values
 from hybrid.testing.sizes import sizes_along
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
@@ -157,6 +158,10 @@ class Case:
     def __repr__(self) -> str:
         return f"Case({self.told()})"
 
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        """How Hypothesis and IPython print a case: in one line, without the functions of its system."""
+        printer.text(repr(self))
+
     def told(self) -> str:
         """The case in words; names only the parameters that differ from the declared values."""
         changed = [
@@ -176,6 +181,24 @@ class Case:
         return ", ".join(
             f"{name} = {value:.10g}" for name, value in zip(self.system.state_names, x, strict=True)
         )
+
+    def named(self, x: Any) -> Any:
+        """A state ``(n,)`` as model functions get it, so that ``case.named(x).q`` is a component.
+
+        Examples
+        --------
+        >>> import models
+        >>> ball = models.bouncing_ball()
+        >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.3)
+        >>> float(case.named(case.run.arc.x[0]).q)
+        1.0
+        """
+        return named_values("state components", self.system.state_names, x)
+
+    def field(self, mode: str, t: float, x: Any) -> np.ndarray:
+        """The vector field ``(n,)`` of a mode at ``(t, x)``, with the parameters of this case."""
+        system = self.system
+        return self.evaluate(system.modes[system.mode_index(mode)].field, t, x)
 
     @property
     def values(self) -> np.ndarray:

@@ -4,7 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis.vendor.pretty import pretty
 
+import models
 from hybrid.testing.case import Case, _before_trouble
 
 
@@ -35,3 +37,20 @@ def test_the_fraction_selects_one_of_the_jumps(fraction, number):
     jumps = ["first", "second", "third", "fourth"]
     run = SimpleNamespace(arc=SimpleNamespace(jumps=jumps))
     assert Case.the_jump(SimpleNamespace(run=run, fraction=fraction)) == jumps[number]
+
+
+BALL = models.bouncing_ball()
+
+
+def test_a_case_is_printed_in_one_line():
+    case = Case(BALL, BALL.parameters, "flight", (1.0, 0.5), 0.0, 0.3)
+    assert pretty(case) == repr(case)
+    assert len(pretty([case]).splitlines()) == 1
+
+
+def test_states_and_fields_of_a_case_go_by_name():
+    case = Case(BALL, {**BALL.parameters, "g": 2.0}, "flight", (1.0, 0.5), 0.0, 0.3)
+    end = case.named(case.run.arc.x[-1])
+    energy = 0.5 * end.v**2 + 2.0 * end.q
+    assert energy == pytest.approx(0.5 * 0.5**2 + 2.0, rel=1e-12)
+    np.testing.assert_array_equal(case.field("flight", 0.0, case.x0), [0.5, -2.0])
