@@ -8,6 +8,7 @@ from hybrid.testing.case import Case, Engine, PropertyError, Run, discard
 from hybrid.testing.check import PropertyReport, SystemReport, check_system
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
+from hybrid.testing.ends import check_ends
 from hybrid.testing.events import check_jumps, check_sides
 from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields
 from hybrid.testing.functions import check_compiled, check_period
@@ -47,6 +48,7 @@ __all__ = [
     "check_cut",
     "check_derivatives",
     "check_elastic",
+    "check_ends",
     "check_extension",
     "check_flow_direction",
     "check_jumps",

@@ -31,6 +31,8 @@ TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
 LOOSER = 100.0
 # A run is cut short after this many jumps: more jumps test nothing new.
 MOST_JUMPS = 5
+# The whole run, which is only looked at, ends after this many: more than tell that jumps repeat endlessly.
+MOST_OF_WHOLE = 2000
 # A run is discarded if looser tolerances move its end by more than this, relative to its size.
 SENSITIVE = 1e-6
 
@@ -264,6 +266,16 @@ class Case:
         if isinstance(found, str):
             discard(found)
         return found
+
+    @cached_property
+    def whole(self) -> HybridArc | None:
+        """The whole run, however it ends; None if no mode allows the start."""
+        if self.mode is None:
+            return None
+        try:
+            return self.simulate(self.t1, max_jumps=MOST_OF_WHOLE)
+        except ArgumentError:
+            return None
 
     @property
     def duration(self) -> float:

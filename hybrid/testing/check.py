@@ -20,6 +20,7 @@ from hybrid.system.graph import HybridSystem, as_system
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
+from hybrid.testing.ends import ENDS, check_ends
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
 from hybrid.testing.functions import COMPILED, PERIOD, check_compiled, check_period
 from hybrid.testing.invariance import (
@@ -213,6 +214,7 @@ def check_system(
     as_system("system", system)
     examples = arguments.count("examples", examples, 1)
     properties: dict[str, Callable[[Case], None]] = {
+        ENDS: check_ends,
         DERIVATIVES: check_derivatives,
         COMPILED: check_compiled,
         PERIOD: check_period,
@@ -300,7 +302,7 @@ class _Tally:
         if self.failed:
             names = [self.failed]
         else:
-            names = list(self.properties) if self._is_fit(case) else [DERIVATIVES, COMPILED, PERIOD]
+            names = list(self.properties) if self._is_fit(case) else [ENDS, DERIVATIVES, COMPILED, PERIOD]
         for name in names:
             try:
                 self.properties[name](case)
