@@ -362,9 +362,13 @@ def lies_beyond(case: Case) -> str:
 
 
 def guard_beyond(case: Case, transition: Transition, t: float, x: Any) -> float:
-    """The guard times its direction, negative before it fires; -inf for a two-way guard or a marker."""
+    """The guard times its direction, negative before it fires; -inf where it is no wall.
+
+    A two-way guard and a marker are none, nor is a guard with a condition: the state may pass where that does
+    not hold.
+    """
     direction = transition.guard.direction
-    if direction == 0 or transition.is_marker:
+    if direction == 0 or transition.is_marker or transition.guard.when is not None:
         return -np.inf
     values = evaluate(
         case.system.variables, transition.guard.function, t, np.asarray(x, dtype=float), case.values

@@ -41,6 +41,7 @@ from hybrid.testing.invariance import (
     turned,
 )
 from hybrid.testing.landing import LANDINGS, LIMITS, check_landings, check_limits
+from hybrid.testing.laws import as_laws, check_conserved, check_invariant, checks
 from hybrid.testing.saltation import (
     CONTINUITY,
     EXTENSION,
@@ -160,6 +161,8 @@ def check_system(
     mode: str | None = None,
     elastic: Iterable[str] | Callable[[np.ndarray], np.ndarray] | None = None,
     passable: Iterable[str] = (),
+    invariant: Mapping[str, Any] | None = None,
+    conserved: Mapping[str, Any] | None = None,
     examples: int = 50,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
@@ -185,6 +188,11 @@ def check_system(
         or the involution of the state. The reversed run must return to its start. Not checked by default.
     passable
         Names of transitions whose guard the state may cross and stay in the same mode.
+    invariant
+        What is never negative: functions of ``(t, x, p)`` by name, or by mode mappings of names to functions.
+        Starts are drawn from there. Finds walls that let the state through.
+    conserved
+        What never changes, such as an energy; given likewise. Finds wrong signs, factors and lost components.
     examples
         Number of runs to draw.
     solver
@@ -241,6 +249,8 @@ def check_system(
     if elastic is not None:
         flip = turned("elastic", system, elastic)
         properties[ELASTIC] = lambda case: check_elastic(case, flip)
+    properties |= checks("non-negative", as_laws("invariant", system, invariant), check_invariant)
+    properties |= checks("conserved", as_laws("conserved", system, conserved), check_conserved)
     tally = _Tally(system, properties)
     drawn = cases(
         system,
@@ -249,6 +259,7 @@ def check_system(
         t_span=t_span,
         mode=mode,
         passable=passable,
+        invariant=invariant,
         solver=solver,
         engine=engine,
     )

@@ -18,6 +18,7 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.labels import named
 from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
+from hybrid.testing.laws import as_laws, starts_within
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
 Range = tuple[float, float] | float | SearchStrategy[float]
@@ -26,7 +27,7 @@ Ranges = Mapping[str, Range]
 # Values lie on a grid of this many steps to either side, so that they print short and shrink to the middle.
 GRID = 500
 RANGES = "map names to ranges, or be a strategy"
-STARTS_TRIED = 4
+STARTS_TRIED = 8
 
 
 def states(
@@ -109,6 +110,7 @@ def cases(
     t_span: tuple[float, float] | None = None,
     mode: str | None = None,
     passable: Iterable[str] = (),
+    invariant: Mapping[str, Any] | None = None,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
 ) -> SearchStrategy[Case]:
@@ -127,6 +129,9 @@ def cases(
         Mode to start in; by default any mode that allows the state.
     passable
         Names of transitions whose guard the state may cross and stay in the same mode, as with a membrane.
+    invariant
+        Functions of ``(t, x, p)`` by name, or by mode mappings of names to functions: starts are drawn where
+        they are non-negative.
     solver
         Method and tolerances, which should be tight: a run that depends on them cannot be judged.
     engine
@@ -145,6 +150,7 @@ def cases(
         for name in arguments.items("passable", passable, "be names of transitions")
     )
     begin, end = _time_span(t_span) if t_span is not None else (0.0, None)
+    laws = as_laws("invariant", system, invariant)
     solver = check_solver(solver)
     arguments.instance("engine", engine, Engine, "Subclass hybrid.testing.Engine.")
 
@@ -159,7 +165,9 @@ def cases(
         for _ in range(STARTS_TRIED):
             x0 = draw(state)
             case = Case(system, p, mode, x0, t0, t0 + duration, fraction, through, solver, engine)
-            allowed = [name for name in _allowed(case) if mode in (None, name)]
+            allowed = [
+                name for name in _allowed(case) if mode in (None, name) and starts_within(laws, case, name)
+            ]
             if allowed:
                 return attrs.evolve(case, mode=allowed[choice % len(allowed)])
         return attrs.evolve(case, mode=None)

@@ -42,11 +42,13 @@ def checks():
                     "solver": SOLVER,
                     "engine": [None, "a", 3, Odd()],
                     "passable": [None, 3, ["nope"], "nope", [3]],
+                    "invariant": [3, [3], {"a": 3}, {"a": None}, {"nope": {"a": abs}}, {3: abs}],
                     **(
                         {}
                         if function is hybrid.testing.cases
                         else {
                             "examples": [0, *COUNT],
+                            "conserved": [3, [3], {"a": 3}, {"a": None}, {"nope": {"a": abs}}, {3: abs}],
                             "elastic": ["nope", 3, ["nope"], [3], [None]],
                         }
                     ),
