@@ -84,7 +84,7 @@ class TestStep:
             method=method,
             run=run,
             record=record,
-            work=SimpleNamespace(stages=[None]),
+            work=SimpleNamespace(stages=[None], new=np.zeros(2)),
             tangents=3,
             orthonormal=orthonormal,
         )
