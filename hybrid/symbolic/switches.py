@@ -51,6 +51,7 @@ DIGITS = 12
 ROUNDING = 1e-12
 
 
+# What a surface that is both ends of a pulse keeps: see ``Surface.pulse``.
 Pulse = tuple[sympy.Expr, sympy.Expr, int]
 
 
@@ -391,8 +392,8 @@ def _pulse(height: sympy.Expr, surfaces: Surfaces) -> sympy.Expr | None:
         return slope if level <= 0 else -slope
     middle = 2 * sympy.pi * (u - level / 2)
     pulse = slope * (sympy.cos(sympy.pi * level).evalf() - sympy.cos(middle))
-    core, _, orientation = _core(pulse, surfaces.symbols)
     if slope.is_number:
+        core, _, orientation = _core(pulse, surfaces.symbols)
         surfaces.pulses[core] = u, level, orientation if slope > 0 else -orientation
     return pulse
 

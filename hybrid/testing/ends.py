@@ -35,8 +35,9 @@ def check_ends(case: Case) -> None:
     arc = as_case(case).whole
     if arc is None:
         discard("no mode allows the start")
+    sizes: dict[str, float] = {}
     for jump in arc.jumps:
-        _check_landing(case, jump, arc.x)
+        _check_landing(case, jump, arc.x, sizes)
     if arc.status.code not in BROKEN:
         return
     before = "before any jump"
@@ -48,16 +49,22 @@ def check_ends(case: Case) -> None:
     case.fail(ENDS, f"got {arc.status.message}", before, hint=BROKEN[arc.status.code])
 
 
-def _check_landing(case: Case, jump: Jump, states: np.ndarray) -> None:
-    """Fail if a transition that leads back to its mode leaves the state beyond its own guard."""
+def _check_landing(case: Case, jump: Jump, states: np.ndarray, sizes: dict[str, float]) -> None:
+    """Fail if a transition that leads back to its mode leaves the state beyond its own guard.
+
+    ``sizes`` keeps the largest values of guards on the run, by transition.
+    """
     transition = case.transition(jump)
     if jump.target != transition.source or transition.name in case.passable:
         return
     beyond = guard_beyond(case, transition, jump.t, jump.x_plus)
-    sizes = [abs(guard_beyond(case, transition, jump.t, x)) for x in states]
-    size = max((each for each in sizes if np.isfinite(each)), default=0.0)
-    if np.isfinite(beyond) and beyond > LEFT_BEYOND * size:
-        name = transition.name
+    if not (np.isfinite(beyond) and beyond > 0.0):
+        return
+    name = transition.name
+    if name not in sizes:
+        values = [abs(guard_beyond(case, transition, jump.t, x)) for x in states]
+        sizes[name] = max((each for each in values if np.isfinite(each)), default=0.0)
+    if beyond > LEFT_BEYOND * sizes[name]:
         case.fail(
             ENDS,
             f"{name} lands {beyond:.6g} beyond {name}",

@@ -85,11 +85,12 @@ def check_units(case: Case) -> None:
 def _compare_measured(case: Case, units: Mapping[str, float], time: float, solver: Solver, told: str) -> None:
     """Fail if the run is another one with these ``units`` of the state by mode and this unit of the time."""
     variant = measured(case.system)
-    mode = case.mode if case.mode is not None else str(case.run.arc.mode[0])
-    start = time * case.t0, [units[mode] * value for value in case.x0], mode
+    end = time * case.run.t1
+    assert case.mode is not None, "a case without a mode has no run"
+    start = time * case.t0, [units[case.mode] * value for value in case.x0], case.mode
     extra = dict(zip(variant.state, (units[name] for name in case.system.mode_names), strict=True))
     arc = case.simulate(
-        time * case.run.t1,
+        end,
         system=variant.system,
         start=start,
         extra={**extra, variant.time: time},
