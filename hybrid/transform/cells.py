@@ -121,6 +121,7 @@ class Pieces:
         self._fields: dict[Any, Function] = {}
         self._between: dict[Any, SwitchingSurface] = {}
         self._shares: dict[Any, Shares | None] = {}
+        self._rests: dict[Any, bool] = {}
 
     def cells(self, sides: Sides, decide: Callable[[int], int | None] | None = None) -> Iterator[Choice]:
         """The cells where these sides hold; sides that are missing and matter are chosen both ways.
@@ -266,6 +267,12 @@ class Pieces:
         From both sides its speed through the surface falls to zero like a root: with a slope it would never
         get there.
         """
+        key = number, tuple(sorted((k, s) for k, s in sides.items() if k != number))
+        if key not in self._rests:
+            self._rests[key] = self._proved_to_rest(sides, number)
+        return self._rests[key]
+
+    def _proved_to_rest(self, sides: Sides, number: int) -> bool:
         slides = any(side == 0 for other, side in sides.items() if other != number)
         if slides or self.jumps(sides, number):
             return False
