@@ -25,6 +25,7 @@ from hybrid.sweep.store import open_store
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
+from hybrid.system.laws import Laws
 from hybrid.transform.filippov import filippov
 from hybrid.transform.split import from_equations, split
 
@@ -42,6 +43,7 @@ __all__ = [
     "HybridError",
     "HybridSystem",
     "Jump",
+    "Laws",
     "Mode",
     "ModelError",
     "PeriodicOrbit",

@@ -5,6 +5,7 @@ A changed default changes the results of every script that relies on it.
 
 import inspect
 
+import attrs
 import pytest
 
 import hybrid
@@ -17,7 +18,7 @@ RUN = {**MODEL, "solver": None}
 LONG = {**RUN, "t0": 0.0, "progress": False}
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
 CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
-PLAIN = {"parameters": None, "period": None, "name": "", "units": None}
+PLAIN = {"parameters": None, "period": None, "name": "", "units": None, "laws": None}
 FIGURE = {"ax": None, "figsize": None}
 DEFAULTS = {
     hybrid.DOP853: TOLERANCES,
@@ -40,8 +41,14 @@ DEFAULTS = {
         **{"times": None, "saltation": None, "fundamental": None, "exponents": None},
         **{"steps": None, "seconds": None},
     },
-    hybrid.filippov: {"start": None, "period": None, "name": "", "units": None},
+    hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "laws": None},
     hybrid.from_equations: PLAIN,
+    hybrid.Laws: {
+        **dict.fromkeys(
+            ("invariant", "equal", "conserved", "dissipated", "balance", "continuous", "across"), ()
+        ),
+        "elastic": None,
+    },
     hybrid.global_error: {**RUN, "max_jumps": 100_000},
     hybrid.simulate: {**RUN, "tangent": None, "samples": None, "keep_jumps": None, "max_jumps": 100_000},
     hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None, "progress": None},
@@ -106,8 +113,9 @@ def test_defaults_of_checks():
     found = defaults(hybrid.testing.check_system)
     assert found["examples"] == 50
     assert found["solver"] == hybrid.DOP853(**CHECKING)
-    names = ("states", "parameters", "t_span", "mode", "elastic")
-    assert [found[name] for name in names] == [None] * 5
+    laws = [field.name for field in attrs.fields(hybrid.Laws)]
+    names = ("states", "parameters", "t_span", "mode", *laws)
+    assert [found[name] for name in names] == [None] * len(names)
 
 
 def test_defaults_of_work_precision():

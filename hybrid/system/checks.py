@@ -48,6 +48,24 @@ def sample_state(variables: Variables) -> np.ndarray:
     return 0.5 + fractions
 
 
+def trial(variables: Variables, title: str, function: Callable[..., Any], *, of_jump: bool = False) -> Any:
+    """What a function of ``(t, x, p)``, or of ``(t, minus, plus, p)``, returns at a generic point.
+
+    None if the arithmetic fails there.
+
+    Raises
+    ------
+    ModelError
+        If the function has the wrong arity, asks for a name that does not exist, or fails.
+    """
+    t, x, p = _arguments(variables)
+    if of_jump:
+        value = _call(title, function, (t, x, x, p), "t, minus, plus, p")
+    else:
+        value = _call(title, function, (t, x, p))
+    return None if value is None else value[0]
+
+
 def derivative_has_time_column(variables: Variables, function: ModelFunction) -> bool:
     """Whether a given derivative returns ``n + 1`` columns; False if it fails at the sample point."""
     assert function.derivative is not None

@@ -18,6 +18,7 @@ from hybrid.system.checks import check_functions
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.growth import Growth, grows
+from hybrid.system.laws import Laws, placed
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
@@ -67,6 +68,10 @@ def _derived_from(instance: Any, attribute: attrs.Attribute[Any], value: object)
         )
 
 
+def _laws(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    arguments.instance("HybridSystem: laws", value, Laws, "Write Laws(invariant={...}).")
+
+
 def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
     arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
 
@@ -98,6 +103,9 @@ class HybridSystem(Portable):
     units
         Units by name, of components of the state, of parameters, and of time under the name ``"t"``; any may
         be left out. Results as datasets and pictures show them; no calculation uses them.
+    laws
+        What the author knows of the runs, such as a conserved energy: `Laws`. The checks of
+        `hybrid.testing` use them, and say so if one does not fit the system; no calculation does.
 
     Raises
     ------
@@ -115,6 +123,8 @@ class HybridSystem(Portable):
     name: str = attrs.field(default="", kw_only=True, validator=_name)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
+    # Nor do laws.
+    laws: Laws = attrs.field(factory=Laws, kw_only=True, eq=False, repr=False, validator=_laws)
     # Lines for `repr`: what short names in a derived system stand for.
     notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_notes, repr=False)
     # What makes further modes, for a system that is made in stages.
@@ -348,12 +358,31 @@ class HybridSystem(Portable):
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:
     """ModelError unless a run may start in a mode of that name; ``what`` begins the text."""
-    names = [*system.mode_names, *(mode.part_of for mode in system.modes if mode.part_of)]
-    if system.growth is not None:
-        # No part of a mode may have been made yet.
-        names += system.growth.original.mode_names
+    names = _written(system, "modes")
     if not isinstance(name, str) or name not in names:
-        raise ModelError(unknown_name(what, name, dict.fromkeys(names), "Modes"))
+        raise ModelError(unknown_name(what, name, names, "Modes"))
+
+
+def laws_of(system: HybridSystem, given: Laws | None = None) -> Laws:
+    """The laws that a system carries, and others, with their names looked up.
+
+    Raises
+    ------
+    ArgumentError, ModelError
+        If a law does not fit the system.
+    """
+    laws = system.laws if given is None else system.laws.joined(given)
+    return placed(laws, system.variables, _written(system, "modes"), _written(system, "transitions"))
+
+
+def _written(system: HybridSystem, what: str) -> dict[str, None]:
+    """Names of the modes or transitions, and of those that they are parts of."""
+    elements = getattr(system, what)
+    names = [*(each.name for each in elements), *(each.part_of for each in elements if each.part_of)]
+    if system.growth is not None and system.growth.original is not None:
+        # No part of a mode may have been made yet.
+        names += [each.name for each in getattr(system.growth.original, what)]
+    return dict.fromkeys(names)
 
 
 def starting_mode(system: HybridSystem, mode: str | None) -> str | None:

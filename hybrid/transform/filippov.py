@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from hybrid.errors import ModelError, shown
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
+from hybrid.system.laws import Laws
 from hybrid.system.variables import Variables, as_parameters, as_state
 from hybrid.system.watched import Watched
 from hybrid.transform.surface import SwitchingSurface
@@ -23,6 +24,7 @@ def filippov(
     period: float | Function | None = None,
     name: str = "",
     units: Mapping[str, str] | None = None,
+    laws: Laws | None = None,
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
 
@@ -53,7 +55,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    start, period, name, units
+    start, period, name, units, laws
         As for `HybridSystem`.
 
     Returns
@@ -141,6 +143,7 @@ def filippov(
         period=period,
         name=name,
         units={} if units is None else units,
+        laws=Laws() if laws is None else laws,
         derived_from=Watched([below, above, switching]),
     )
 

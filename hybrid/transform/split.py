@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.laws import Laws
 from hybrid.system.periodicity import Period
 
 
@@ -17,6 +18,7 @@ def from_equations(
     period: Period = None,
     name: str = "",
     units: Mapping[str, str] | None = None,
+    laws: Laws | None = None,
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
 
@@ -26,7 +28,7 @@ def from_equations(
     ----------
     field
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
-    state, parameters, period, name, units
+    state, parameters, period, name, units, laws
         As for `HybridSystem`.
 
     Raises
@@ -57,6 +59,7 @@ def from_equations(
             period=period,
             name=name,
             units={} if units is None else units,
+            laws=Laws() if laws is None else laws,
         )
     )
 
