@@ -188,7 +188,8 @@ class Transition(Portable):
     Raises
     ------
     ModelError
-        If guard or reset are of the wrong type, a name is empty, or there is a reset but no target.
+        If guard or reset are of the wrong type, a name is empty, there is a reset but no target, or
+        ``accumulates_to`` is the mode that the transition leads from and back to.
     """
 
     source: str = attrs.field(validator=_nonempty_name)
@@ -213,6 +214,12 @@ class Transition(Portable):
             raise ModelError(
                 f"Transition {self.source}->{END}: accumulates_to={value!r} is for transitions whose jumps "
                 "may accumulate, and this one ends the run. Omit it, or name a target mode."
+            )
+
+        if value is not None and value == self.source == self.target:
+            raise ModelError(
+                f"Transition {self.source}->{self.target}: accumulates_to={value!r} is the mode in which the "
+                "jumps accumulate: there they would begin again. Name a mode whose field stays on the guard."
             )
 
     @name.default

@@ -210,16 +210,22 @@ def test_graph():
     def position(t, x, p):
         return x.q
 
+    plain = oscillator(linear)
+    with_limit = attrs.evolve(
+        plain,
+        modes=[*plain.modes, Mode("rest", lambda t, x, p: (0.0, 0.0))],
+        transitions=[attrs.evolve(plain.transitions[0], accumulates_to="rest")],
+    )
     assert_all_differ(
         [
-            oscillator(linear),
+            plain,
             oscillator(linear, guard=Guard(position, -1)),
             oscillator(linear, guard=Guard(position, +1)),
             oscillator(linear, guard=Guard(position, +1, when=lambda t, x, p: x.v)),
             oscillator(linear, guard=Guard(position, +1, when=lambda t, x, p: -x.v)),
             oscillator(linear, reset=None),
             oscillator(linear, reset=Reset(lambda t, x, p: (x.q, x.v))),
-            oscillator(linear, accumulates_to="swing"),
+            with_limit,
         ][1:]
     )
 

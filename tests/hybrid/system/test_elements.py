@@ -73,6 +73,8 @@ def test_an_end_of_the_run_has_neither_reset_nor_limit():
         Transition("a", None, GUARD, RESET)
     with pytest.raises(ModelError, match=r"Transition a->\(end\): accumulates_to='b' is for transitions"):
         Transition("a", None, GUARD, accumulates_to="b")
+    with pytest.raises(ModelError, match=r"accumulates_to='a' is the mode in which the jumps accumulate"):
+        Transition("a", "a", GUARD, RESET, accumulates_to="a")
     other = Transition("a", "b", GUARD, RESET, accumulates_to="c")
     assert (other.reset, other.accumulates_to) == (RESET, "c")
 

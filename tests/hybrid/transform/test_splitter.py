@@ -320,7 +320,7 @@ class TestCopies:
         assert self.ticks(onward, "m: u<0") == {"tick (u<0)": ("free", -1, False, (2.5, 0.75), None, None)}
 
     def test_the_limit_of_chatter_is_on_the_same_side(self):
-        system = machine(lambda t, x, p: (x.q, x.u), limit="m")
+        system = machine(lambda t, x, p: (x.q, x.u), target="free", limit="m")
         limits = {each.source: each.accumulates_to for each in system.transitions if each.part_of == "tick"}
         assert limits == {"m: u<0": "m: u<0", "m: u>0": "m: u>0", "m: u=0": "m: u=0"}
         assert {each.accumulates_to for each in machine(None).transitions} == {None}
