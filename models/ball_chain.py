@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def ball_chain() -> HybridSystem:
@@ -47,6 +47,15 @@ def ball_chain() -> HybridSystem:
             _collision("left", _left_gap, _left),
             _collision("right", _right_gap, _right),
         ],
+        laws=Laws(
+            invariant={"gap on the left": _left_gap, "gap on the right": _right_gap, "1 - e": _loss},
+            conserved={"momentum": _momentum},
+            dissipated={"energy": _energy},
+            across={
+                "left": {"momentum": _left_momentum, "restitution": _left_restitution},
+                "right": {"momentum": _right_momentum, "restitution": _right_restitution},
+            },
+        ),
     )
 
 
@@ -79,3 +88,31 @@ def _right(t, x, p):
 def _collided(m, v, M, V, e):
     change = (1 + e) * (v - V) / (m + M)
     return v - M * change, V + m * change
+
+
+def _loss(t, x, p):
+    return 1 - p.e
+
+
+def _momentum(t, x, p):
+    return p.m1 * x.v1 + p.m2 * x.v2 + p.m3 * x.v3
+
+
+def _energy(t, x, p):
+    return (p.m1 * x.v1**2 + p.m2 * x.v2**2 + p.m3 * x.v3**2) / 2
+
+
+def _left_momentum(t, minus, plus, p):
+    return p.m1 * (plus.v1 - minus.v1) + p.m2 * (plus.v2 - minus.v2)
+
+
+def _right_momentum(t, minus, plus, p):
+    return p.m2 * (plus.v2 - minus.v2) + p.m3 * (plus.v3 - minus.v3)
+
+
+def _left_restitution(t, minus, plus, p):
+    return plus.v1 - plus.v2 + p.e * (minus.v1 - minus.v2)
+
+
+def _right_restitution(t, minus, plus, p):
+    return plus.v2 - plus.v3 + p.e * (minus.v2 - minus.v3)

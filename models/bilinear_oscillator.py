@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Transition
 
 
 def bilinear_oscillator() -> HybridSystem:
@@ -47,6 +47,14 @@ def bilinear_oscillator() -> HybridSystem:
             Transition("stiff", "soft", Guard(_displacement, direction=-1), name="leave"),
         ],
         period=_forcing_period,
+        laws=Laws(
+            invariant={
+                "soft": {"displacement to the left": _to_the_left},
+                "stiff": {"displacement to the right": _displacement},
+            },
+            balance={"energy": (_energy, _power)},
+            continuous=("touch", "leave"),
+        ),
     )
 
 
@@ -68,3 +76,15 @@ def _displacement(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _to_the_left(t, x, p):
+    return -x.x
+
+
+def _energy(t, x, p):
+    return (x.v**2 + p.k1 * np.minimum(x.x, 0.0) ** 2 + p.k2 * np.maximum(x.x, 0.0) ** 2) / 2
+
+
+def _power(t, x, p):
+    return (p.A * np.cos(p.w * t) - p.c * x.v) * x.v

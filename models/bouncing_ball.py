@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def bouncing_ball() -> HybridSystem:
@@ -47,6 +47,11 @@ def bouncing_ball() -> HybridSystem:
                 name="bounce",
             )
         ],
+        laws=Laws(
+            invariant={"height": _height},
+            dissipated={"energy": _energy},
+            across={"bounce": {"restitution": _restitution}},
+        ),
     )
 
 
@@ -60,3 +65,11 @@ def _height(t, x, p):
 
 def _bounce(t, x, p):
     return 0.0, -p.e * x.v
+
+
+def _energy(t, x, p):
+    return x.v**2 / 2 + p.g * x.q
+
+
+def _restitution(t, minus, plus, p):
+    return plus.v + p.e * minus.v

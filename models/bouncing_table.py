@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def bouncing_table() -> HybridSystem:
@@ -48,10 +48,7 @@ def bouncing_table() -> HybridSystem:
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.5, "A": 0.01, "w": 36.0},
         units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2", "A": "m", "w": "rad/s"},
-        modes=[
-            Mode("flight", _flight),
-            Mode("rest", _rest),
-        ],
+        modes=[Mode("flight", _flight), Mode("rest", _rest)],
         transitions=[
             Transition(
                 "flight",
@@ -71,6 +68,12 @@ def bouncing_table() -> HybridSystem:
             ),
         ],
         period=_forcing_period,
+        laws=Laws(
+            invariant={"flight": {"height": _height}, "rest": {"force of the table": _weight}},
+            equal={"rest": {"height": _height, "velocity": _velocity}},
+            dissipated={"energy": (_energy, _power)},
+            across={"bounce": {"restitution": _restitution}},
+        ),
     )
 
 
@@ -97,3 +100,19 @@ def _bounce(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _velocity(t, x, p):
+    return x.v
+
+
+def _energy(t, x, p):
+    return x.v**2 / 2 + p.g * x.q
+
+
+def _power(t, x, p):
+    return p.A * p.w**2 * np.sin(p.w * t) * x.v
+
+
+def _restitution(t, minus, plus, p):
+    return plus.v + p.e * minus.v

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def buck_converter() -> HybridSystem:
@@ -52,7 +52,7 @@ def buck_converter() -> HybridSystem:
         },
         units={
             "v": "V", "i": "A", "t": "s", "E": "V", "L": "H", "C": "F", "R": "Ohm", "T": "s",
-            "V_L": "V", "V_U": "V", "V_ref": "V",
+            "V_L": "V", "V_U": "V", "V_ref": "V", "tau": "1",
         },
         modes=[Mode("off", _off), Mode("on", _on)],
         transitions=[
@@ -62,6 +62,16 @@ def buck_converter() -> HybridSystem:
             Transition("on", "on", below, restart, name="saturate"),
             Transition("off", "off", Guard(_ramp_end, direction=+1), restart, name="skip"),
         ],
+        laws=Laws(
+            invariant={
+                "phase of the ramp": _phase,
+                "rest of the period": _rest,
+                "off": {"control voltage above the ramp": _excess},
+                "on": {"control voltage below the ramp": _shortage},
+            },
+            balance={"off": {"energy": (_energy, _power_off)}, "on": {"energy": (_energy, _power_on)}},
+            across={each: {"charge and current": _stored} for each in ("reopen", "saturate", "skip")},
+        ),
     )  # fmt: skip
 
 
@@ -99,3 +109,31 @@ def _below_start(t, x, p):
 
 def _restart(t, x, p):
     return x.v, x.i, 0.0
+
+
+def _phase(t, x, p):
+    return x.tau
+
+
+def _rest(t, x, p):
+    return 1 - x.tau
+
+
+def _shortage(t, x, p):
+    return -_excess(t, x, p)
+
+
+def _energy(t, x, p):
+    return (p.L * x.i**2 + p.C * x.v**2) / 2
+
+
+def _power_off(t, x, p):
+    return -(x.v**2) / p.R
+
+
+def _power_on(t, x, p):
+    return p.E * x.i - x.v**2 / p.R
+
+
+def _stored(t, minus, plus, p):
+    return plus.v - minus.v, plus.i - minus.i

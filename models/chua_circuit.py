@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Laws, Mode, Transition
 
 
 def chua_circuit() -> HybridSystem:
@@ -55,6 +57,15 @@ def chua_circuit() -> HybridSystem:
             Transition("inner", "right", _breakpoint_at(1.0, +1)),
             Transition("right", "inner", _breakpoint_at(1.0, -1)),
         ],
+        laws=Laws(
+            invariant={
+                "left": {"distance to the inner region": partial(_outside, -1.0)},
+                "inner": {"distance to the outer regions": _inside},
+                "right": {"distance to the inner region": partial(_outside, 1.0)},
+            },
+            balance={"energy": (_energy, _power)},
+            continuous=("left->inner", "inner->left", "inner->right", "right->inner"),
+        ),
     )
 
 
@@ -70,3 +81,20 @@ def _breakpoint_at(side, direction):
 
 def _beyond(side, t, x, p):
     return x.x - side
+
+
+def _outside(side, t, x, p):
+    return side * x.x - 1
+
+
+def _inside(t, x, p):
+    return 1 - np.abs(x.x)
+
+
+def _energy(t, x, p):
+    return (x.x**2 / p.alpha + x.y**2 + x.z**2 / p.beta) / 2
+
+
+def _power(t, x, p):
+    f = p.m1 * x.x + (p.m0 - p.m1) * (np.abs(x.x + 1) - np.abs(x.x - 1)) / 2
+    return -((x.x - x.y) ** 2) - f * x.x

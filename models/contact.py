@@ -8,40 +8,32 @@ restitution.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from math import cos, cosh, exp, expm1, gamma, log1p, pi, sin, sinh, sqrt, tan, tanh
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
-import numpy as np
-
-from hybrid import Guard, Mode, Reset, Transition, arguments
+from hybrid import Guard, Laws, Mode, Reset, Transition, arguments
+from models.contact_energy import (
+    Bodies,
+    hertz_force,
+    hunt_crossley_force,
+    hunt_crossley_power,
+    kelvin_voigt_force,
+    kelvin_voigt_power,
+    laws_apart,
+    negative,
+    restitution_error,
+    soft_laws,
+    spring_energy,
+)
 
 # Restitution of a Kelvin-Voigt contact with critical damping; a smaller one needs damping above critical.
 CRITICAL_RESTITUTION = exp(-2)
 RESTITUTION = "satisfy 0 < e <= 1 in a compliant contact (in a rigid one e may be 0)"
 # Between these angles the restitution takes every value of floating point.
 LEAST_ANGLE, LARGEST_ANGLE = 1e-8, 350.0
-
-
-class Bodies(NamedTuple):
-    """The functions of the two bodies that a law of contact needs.
-
-    Attributes
-    ----------
-    field
-        ``(t, x, p, force)``: the time derivative of the state under a force that pushes the bodies apart.
-    penetration, rate
-        ``(t, x, p)``: the overlap of the bodies, and its rate of growth.
-    collided
-        ``(t, x, p, e)``: the state after a collision by Newton's law.
-    """
-
-    field: Callable[..., Any]
-    penetration: Callable[..., Any]
-    rate: Callable[..., Any]
-    collided: Callable[..., Any]
 
 
 @runtime_checkable
@@ -56,12 +48,21 @@ class ContactLaw(Protocol):
         """Default values by name."""
         ...
 
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the parameters by name, for a state in m and m/s."""
+        ...
+
     def modes(self, bodies: Bodies) -> list[Mode]:
         """The mode ``free`` and those in which the bodies touch."""
         ...
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """The transition ``impact`` and those that lead back to ``free``."""
+        ...
+
+    def laws(self, bodies: Bodies) -> Laws:
+        """What is known of gap, energy and impact."""
         ...
 
 
@@ -78,6 +79,7 @@ class Rigid:
         Coefficient of restitution.
     """
 
+    units: ClassVar[Mapping[str, str]] = {}
     e: float = 1.0
 
     def __post_init__(self) -> None:
@@ -97,6 +99,11 @@ class Rigid:
         collision = Reset(partial(_collided, bodies))
         return [Transition("free", "free", Guard(bodies.penetration, +1), collision, name="impact")]
 
+    def laws(self, bodies: Bodies) -> Laws:
+        """Energy, and the restitution."""
+        restitution = partial(restitution_error, bodies)
+        return laws_apart(bodies).joined(Laws(across={"impact": {"restitution": restitution}}))
+
 
 @dataclass(frozen=True)
 class Hertz:
@@ -111,6 +118,7 @@ class Hertz:
         Stiffness, N/m^(3/2).
     """
 
+    units: ClassVar[Mapping[str, str]] = {"K": "N/m^(3/2)"}
     K: float
 
     def __post_init__(self) -> None:
@@ -123,11 +131,15 @@ class Hertz:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free`` and ``contact``."""
-        return [_free(bodies), _pushed(bodies, _hertz_force)]
+        return [_free(bodies), _pushed(bodies, hertz_force)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
         return _in_and_out(bodies)
+
+    def laws(self, bodies: Bodies) -> Laws:
+        """Energy with that of the contact; no force at the impact."""
+        return soft_laws(bodies, bodies.power)
 
     def duration(self, mass: float, speed: float) -> float:
         r"""Duration of an impact, s.
@@ -173,6 +185,7 @@ class HuntCrossley:
     of Applied Mechanics 42(2), 440-445, 1975, doi:10.1115/1.3423596.
     """
 
+    units: ClassVar[Mapping[str, str]] = {"K": "N/m^(3/2)", "alpha": "s/m"}
     K: float
     alpha: float
 
@@ -222,12 +235,16 @@ class HuntCrossley:
         """``free`` and ``contact``."""
         return [
             _free(bodies),
-            _pushed(bodies, _hunt_crossley_force),
+            _pushed(bodies, hunt_crossley_force),
         ]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
         return _in_and_out(bodies)
+
+    def laws(self, bodies: Bodies) -> Laws:
+        """Energy with that of the contact, and its loss; no force at the impact."""
+        return soft_laws(bodies, partial(hunt_crossley_power, bodies))
 
 
 @dataclass(frozen=True)
@@ -248,6 +265,7 @@ class KelvinVoigt:
         Stiffness, N/m, and damping, N s/m.
     """
 
+    units: ClassVar[Mapping[str, str]] = {"k": "N/m", "c": "N s/m"}
     k: float
     c: float
 
@@ -298,18 +316,37 @@ class KelvinVoigt:
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free``, ``contact`` and ``recovery``."""
         free = _free(bodies)
-        contact = _pushed(bodies, _kelvin_voigt_force)
+        contact = _pushed(bodies, kelvin_voigt_force)
         return [free, contact, Mode("recovery", free.field)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact``, ``release``, ``parting`` and ``return``."""
-        force = partial(_force_between, bodies, _kelvin_voigt_force)
+        force = partial(_force_between, bodies, kelvin_voigt_force)
         return [
             Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
             Transition("contact", "recovery", Guard(force, -1), name="release"),
             Transition("recovery", "free", Guard(bodies.penetration, -1), name="parting"),
             Transition("recovery", "contact", Guard(force, +1), name="return"),
         ]
+
+    def laws(self, bodies: Bodies) -> Laws:
+        """Energy with that of the spring, and its loss; no force but at the impact."""
+        force = partial(_force_between, bodies, kelvin_voigt_force)
+        contact = Laws(
+            invariant={
+                "contact": {"penetration": bodies.penetration, "force": force},
+                "recovery": {
+                    "penetration": bodies.penetration,
+                    "pull that is left out": partial(negative, force),
+                },
+            },
+            balance={
+                "contact": {"energy": (partial(spring_energy, bodies), partial(kelvin_voigt_power, bodies))},
+                "recovery": {"energy": (bodies.energy, bodies.power)},
+            },
+            continuous=("release", "parting", "return"),
+        )
+        return laws_apart(bodies).joined(contact)
 
 
 def hertz_stiffness(
@@ -407,19 +444,6 @@ def _in_and_out(bodies: Bodies) -> list[Transition]:
         Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
         Transition("contact", "free", Guard(bodies.penetration, -1), name="release"),
     ]
-
-
-def _hertz_force(penetration: Any, rate: Any, p: Any) -> Any:
-    # A step may evaluate a point slightly outside the contact, where the power is undefined.
-    return p.K * np.maximum(penetration, 0.0) ** 1.5
-
-
-def _hunt_crossley_force(penetration: Any, rate: Any, p: Any) -> Any:
-    return _hertz_force(penetration, rate, p) * (1 + 1.5 * p.alpha * rate)
-
-
-def _kelvin_voigt_force(penetration: Any, rate: Any, p: Any) -> Any:
-    return p.k * penetration + p.c * rate
 
 
 def _restitution(e: float) -> float:

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from hybrid import ArgumentError, HybridSystem, arguments, filippov
+from hybrid import ArgumentError, HybridSystem, Laws, arguments, filippov
 
 
 def dry_friction_oscillator() -> HybridSystem:
@@ -49,6 +49,15 @@ def dry_friction_oscillator() -> HybridSystem:
         above=partial(_field, +1),
         switching=_velocity,
         period=_forcing_period,
+        laws=Laws(
+            invariant={
+                "below": {"speed backwards": _backwards},
+                "above": {"speed forwards": _velocity},
+                "sliding": {"friction in reserve": _hold},
+            },
+            equal={"sliding": {"velocity": _velocity}},
+            balance={"energy": (_energy, _power)},
+        ),
     )
 
 
@@ -96,3 +105,19 @@ def _velocity(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _backwards(t, x, p):
+    return -x.v
+
+
+def _hold(t, x, p):
+    return p.f - np.abs(p.A * np.cos(p.w * t) - x.x)
+
+
+def _energy(t, x, p):
+    return (x.v**2 + x.x**2) / 2
+
+
+def _power(t, x, p):
+    return (p.A * np.cos(p.w * t) - p.c * x.v) * x.v - p.f * np.abs(x.v)

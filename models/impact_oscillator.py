@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def impact_oscillator() -> HybridSystem:
@@ -50,6 +50,11 @@ def impact_oscillator() -> HybridSystem:
             )
         ],
         period=_forcing_period,
+        laws=Laws(
+            invariant={"distance to the stop": _gap},
+            balance={"energy": (_energy, _power)},
+            across={"impact": {"restitution": _restitution}},
+        ),
     )
 
 
@@ -67,3 +72,19 @@ def _rebound(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _gap(t, x, p):
+    return p.d - x.x
+
+
+def _energy(t, x, p):
+    return (x.v**2 + p.k * x.x**2) / 2
+
+
+def _power(t, x, p):
+    return (p.A * np.cos(p.w * t) - p.c * x.v) * x.v
+
+
+def _restitution(t, minus, plus, p):
+    return plus.v + p.r * minus.v

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def impact_pair() -> HybridSystem:
@@ -54,6 +54,11 @@ def impact_pair() -> HybridSystem:
             Transition("flight", "flight", Guard(_from_right, direction=+1), rebound, name="right"),
         ],
         period=_forcing_period,
+        laws=Laws(
+            invariant={"distance to the walls": _gap},
+            balance={"energy": (_energy, _power)},
+            across={"left": {"restitution": _restitution}, "right": {"restitution": _restitution}},
+        ),
     )
 
 
@@ -75,3 +80,19 @@ def _rebound(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _gap(t, x, p):
+    return p.d / 2 - np.abs(x.x)
+
+
+def _energy(t, x, p):
+    return x.v**2 / 2
+
+
+def _power(t, x, p):
+    return p.A * p.w**2 * np.cos(p.w * t) * x.v
+
+
+def _restitution(t, minus, plus, p):
+    return plus.v + p.r * minus.v

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def rimless_wheel() -> HybridSystem:
@@ -41,6 +41,7 @@ def rimless_wheel() -> HybridSystem:
     T. McGeer, "Passive dynamic walking", International Journal of Robotics Research 9(2), 62-82, 1990.
     doi:10.1177/027836499000900206
     """
+    onto_a_foot = {"both feet on the ground": _both_feet, "angular momentum about the new foot": _momentum}
     return HybridSystem(
         name="rimless wheel",
         state=("theta", "omega"),
@@ -71,6 +72,11 @@ def rimless_wheel() -> HybridSystem:
                 name="step back",
             ),
         ],
+        laws=Laws(
+            invariant={"angle to the next contact": _way},
+            balance={"energy between steps": (_energy, _no_power)},
+            across={"step": onto_a_foot, "step back": onto_a_foot},
+        ),
     )
 
 
@@ -84,3 +90,23 @@ def _beyond_spoke(side, t, x, p):
 
 def _onto(side, t, x, p):
     return p.gamma - side * p.alpha, np.cos(2 * p.alpha) * x.omega
+
+
+def _way(t, x, p):
+    return p.alpha - np.abs(x.theta - p.gamma)
+
+
+def _energy(t, x, p):
+    return x.omega**2 / 2 + p.g / p.l * np.cos(x.theta)
+
+
+def _no_power(t, x, p):
+    return 0.0
+
+
+def _both_feet(t, minus, plus, p):
+    return plus.theta - p.gamma + minus.theta - p.gamma
+
+
+def _momentum(t, minus, plus, p):
+    return plus.omega - np.cos(minus.theta - plus.theta) * minus.omega

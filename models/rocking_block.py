@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def rocking_block() -> HybridSystem:
@@ -58,6 +58,14 @@ def rocking_block() -> HybridSystem:
             Transition("left", "right", Guard(_tilt, direction=+1), loss, name="impact right"),
         ],
         period=_forcing_period,
+        laws=Laws(
+            invariant={"right": {"tilt to the right": _tilt}, "left": {"tilt to the left": _tilt_left}},
+            balance={"energy": (_energy, _power)},
+            across={
+                "impact left": {"restitution": _restitution},
+                "impact right": {"restitution": _restitution},
+            },
+        ),
     )
 
 
@@ -76,3 +84,19 @@ def _impact(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _tilt_left(t, x, p):
+    return -x.theta
+
+
+def _energy(t, x, p):
+    return x.omega**2 / 2 + p.p**2 * np.cos(p.alpha - np.abs(x.theta))
+
+
+def _power(t, x, p):
+    return -(p.p**2) * p.A * np.cos(p.w * t) * np.cos(p.alpha - np.abs(x.theta)) * x.omega
+
+
+def _restitution(t, minus, plus, p):
+    return plus.omega - p.e * minus.omega

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def simplest_walker() -> HybridSystem:
@@ -57,6 +57,18 @@ def simplest_walker() -> HybridSystem:
             Transition("behind", "ahead", Guard(_height, direction=-1), name="passing"),
             Transition("ahead", "behind", Guard(_height, direction=+1), Reset(_exchange), name="heelstrike"),
         ],
+        laws=Laws(
+            invariant={"behind": {"swing foot behind": _height}, "ahead": {"swing foot ahead": _depth}},
+            balance={"energy between steps": (_energy, _no_power)},
+            continuous=("passing",),
+            across={
+                "heelstrike": {
+                    "both feet on the ground": _both_feet,
+                    "angular momentum about the new foot": _momentum,
+                    "angular momentum of the swing leg": _swing_momentum,
+                }
+            },
+        ),
     )
 
 
@@ -72,3 +84,28 @@ def _height(t, x, p):
 def _exchange(t, x, p):
     c = np.cos(2 * x.theta)
     return -x.theta, -2 * x.theta, c * x.dtheta, c * (1 - c) * x.dtheta
+
+
+def _depth(t, x, p):
+    return -_height(t, x, p)
+
+
+def _energy(t, x, p):
+    return x.dtheta**2 / 2 + np.cos(x.theta - p.gamma)
+
+
+def _no_power(t, x, p):
+    return 0.0
+
+
+def _both_feet(t, minus, plus, p):
+    return plus.theta + minus.theta, plus.phi + minus.phi
+
+
+def _momentum(t, minus, plus, p):
+    return plus.dtheta - np.cos(minus.phi) * minus.dtheta
+
+
+def _swing_momentum(t, minus, plus, p):
+    # The foot that leaves the ground was at rest: across its leg it still is, since the leg has no mass.
+    return plus.dtheta - plus.dphi - np.cos(plus.phi) * plus.dtheta

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def slip_hopper() -> HybridSystem:
@@ -22,9 +22,10 @@ def slip_hopper() -> HybridSystem:
         State ``x``, ``y`` (position of the mass relative to the last foothold on level ground, m), ``vx``,
         ``vy`` (m/s); modes ``descent``, ``stance`` and ``ascent``; transitions ``touchdown``, where ``y``
         falls to ``l0 sin(alpha)`` and the foot gets a new place, so that ``x -> -l0 cos(alpha)``,
-        ``takeoff``, where the leg has the length ``l0`` again, and ``apex``. Parameters: mass ``m = 80`` kg,
-        leg stiffness ``k = 20000`` N/m, leg length at rest ``l0 = 1`` m, angle of attack ``alpha = 68 deg``
-        (in rad), ``g = 9.81`` m/s^2.
+        ``takeoff``, where the leg has the length ``l0`` again, and ``apex``. The run ends if the runner takes
+        off downwards (``fall``) or if its apex is below ``l0 sin(alpha)`` (``low apex``). Parameters: mass
+        ``m = 80`` kg, leg stiffness ``k = 20000`` N/m, leg length at rest ``l0 = 1`` m, angle of attack
+        ``alpha = 68 deg`` (in rad), ``g = 9.81`` m/s^2.
 
     Notes
     -----
@@ -34,8 +35,6 @@ def slip_hopper() -> HybridSystem:
       a stance lasts ``2 (pi - arctan(w v / g)) / w`` and a flight ``2 v / g``.
     - At the energy of 5 m/s at the height 1 m, running is stable: apex 0.940267144380 m, period
       0.252532613818 s, multiplier -0.161307631037.
-    - If the runner takes off downwards, or its apex is below ``l0 sin(alpha)``, it has fallen, and the rest
-      of the run is meaningless.
 
     References
     ----------
@@ -72,11 +71,27 @@ def slip_hopper() -> HybridSystem:
             Transition(
                 "stance",
                 "ascent",
-                Guard(_extension, direction=+1),
+                Guard(_extension, direction=+1, when=_rises),
                 name="takeoff",
             ),
-            Transition("ascent", "descent", Guard(_climb, direction=-1), name="apex"),
+            Transition("stance", None, Guard(_extension, direction=+1, when=_sinks), name="fall"),
+            Transition("ascent", "descent", Guard(_climb, direction=-1, when=_is_high), name="apex"),
+            Transition("ascent", None, Guard(_climb, direction=-1, when=_is_low), name="low apex"),
         ],
+        laws=Laws(
+            invariant={
+                "descent": {"height of the foot": _foot},
+                "stance": {"compression of the leg": _compression},
+                "ascent": {"climb": _climb},
+            },
+            conserved={
+                "descent": {"energy": _energy},
+                "stance": {"energy": _energy_on_leg},
+                "ascent": {"energy": _energy},
+            },
+            continuous=("takeoff", "apex"),
+            across={"touchdown": {"length of the leg": _stretch, "velocity": _change}},
+        ),
     )
 
 
@@ -103,3 +118,39 @@ def _extension(t, x, p):
 
 def _climb(t, x, p):
     return x.vy
+
+
+def _rises(t, x, p):
+    return x.vy > 0
+
+
+def _sinks(t, x, p):
+    return x.vy <= 0
+
+
+def _is_high(t, x, p):
+    return _foot(t, x, p) > 0
+
+
+def _is_low(t, x, p):
+    return _foot(t, x, p) <= 0
+
+
+def _compression(t, x, p):
+    return p.l0 - np.hypot(x.x, x.y)
+
+
+def _energy(t, x, p):
+    return p.m * (x.vx**2 + x.vy**2) / 2 + p.m * p.g * x.y
+
+
+def _energy_on_leg(t, x, p):
+    return _energy(t, x, p) + p.k * _compression(t, x, p) ** 2 / 2
+
+
+def _stretch(t, minus, plus, p):
+    return np.hypot(plus.x, plus.y) - p.l0
+
+
+def _change(t, minus, plus, p):
+    return plus.vx - minus.vx, plus.vy - minus.vy

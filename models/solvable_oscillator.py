@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Transition
 
 
 def solvable_oscillator() -> HybridSystem:
@@ -50,6 +50,12 @@ def solvable_oscillator() -> HybridSystem:
             Transition("plus", "minus", Guard(_velocity, +1, when=_is_negative)),
             Transition("minus", "plus", Guard(_velocity, -1, when=_is_positive)),
         ],
+        laws=Laws(
+            conserved={
+                "plus": {"amplitude without its growth": partial(_amplitude, 1.0)},
+                "minus": {"amplitude without its growth": partial(_amplitude, -1.0)},
+            }
+        ),
     )
 
 
@@ -67,3 +73,7 @@ def _is_negative(t, x, p):
 
 def _is_positive(t, x, p):
     return x.u
+
+
+def _amplitude(s, t, x, p):
+    return np.exp(-p.b * t) * np.hypot(x.u - s, (x.v - p.b * (x.u - s)) / (2 * np.pi))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition, filippov
+import numpy as np
+
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition, filippov
 
 
 def stick_slip() -> HybridSystem:
@@ -40,6 +42,15 @@ def stick_slip() -> HybridSystem:
         below=_behind,
         above=_ahead,
         switching=_slip,
+        laws=Laws(
+            invariant={
+                "below": {"slip backwards": _slip_back},
+                "above": {"slip forwards": _slip},
+                "sliding": {"friction in reserve": _hold},
+            },
+            equal={"sliding": {"slip": _slip}},
+            balance={"energy seen from the belt": (_energy, _power)},
+        ),
     )
 
 
@@ -83,6 +94,15 @@ def coulomb_stick_slip() -> HybridSystem:
             Transition("stick", "slip", Guard(_pull, direction=+1), name="release"),
             Transition("slip", "stick", Guard(_slip, direction=+1), Reset(_caught), name="catch"),
         ],
+        laws=Laws(
+            invariant={
+                "stick": {"friction in reserve": _hold},
+                "slip": {"slip backwards": _slip_back, "friction in reserve when caught": _hold_later},
+            },
+            equal={"stick": {"slip": _slip}},
+            balance={"energy seen from the belt": (_energy, _coulomb_power)},
+            across={"catch": {"displacement": _displacement}},
+        ),
     )
 
 
@@ -116,3 +136,33 @@ def _pull(t, x, p):
 
 def _caught(t, x, p):
     return x.x, p.belt
+
+
+def _slip_back(t, x, p):
+    return p.belt - x.v
+
+
+def _hold(t, x, p):
+    return p.Fs - np.abs(x.x)
+
+
+def _hold_later(t, x, p):
+    # A block that slips is caught at x = Fk - sqrt((x - Fk)^2 + v^2 - belt^2), which must be above -Fs.
+    return (p.Fs + p.Fk) ** 2 - (x.x - p.Fk) ** 2 - x.v**2 + p.belt**2
+
+
+def _energy(t, x, p):
+    return ((x.v - p.belt) ** 2 + x.x**2) / 2
+
+
+def _power(t, x, p):
+    speed = np.abs(x.v - p.belt)
+    return p.belt * x.x - _friction(p, speed) * speed
+
+
+def _coulomb_power(t, x, p):
+    return p.belt * x.x - p.Fk * np.abs(x.v - p.belt)
+
+
+def _displacement(t, minus, plus, p):
+    return plus.x - minus.x

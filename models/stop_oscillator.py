@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Transition
 
 
 def stop_oscillator() -> HybridSystem:
@@ -65,6 +65,14 @@ def stop_oscillator() -> HybridSystem:
             Transition("left", "free", Guard(_at_left, direction=+1), name="leave left"),
         ],
         period=_forcing_period,
+        laws=Laws(
+            invariant={
+                "free": {"distance to the stops": _gap},
+                "right": {"compression of the right stop": _at_right},
+                "left": {"compression of the left stop": _pressed_left},
+            },
+            balance={"energy": (_energy, _power)},
+        ),
     )
 
 
@@ -83,3 +91,20 @@ def _at_left(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.w
+
+
+def _gap(t, x, p):
+    return p.d - np.abs(x.x)
+
+
+def _pressed_left(t, x, p):
+    return -_at_left(t, x, p)
+
+
+def _energy(t, x, p):
+    given = np.maximum(np.abs(x.x) - p.d, 0.0)
+    return (x.v**2 + p.k * x.x**2 + p.ks * given**2) / 2 + p.F0 * given
+
+
+def _power(t, x, p):
+    return (p.A * np.cos(p.w * t) - p.c * x.v) * x.v

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from hybrid import Guard, HybridSystem, Mode, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Transition
 
 BUFFERS = (1, 2, 3)
 
@@ -53,6 +53,10 @@ def switched_arrival() -> HybridSystem:
         transitions=[
             Transition(f"fill{j}", f"fill{i}", _empties(i)) for j in BUFFERS for i in BUFFERS if i != j
         ],
+        laws=Laws(
+            invariant={f"work in buffer {i}": partial(_content, i) for i in BUFFERS},
+            conserved={"total work": _total},
+        ),
     )
 
 
@@ -67,3 +71,7 @@ def _empties(i):
 
 def _content(i, t, x, p):
     return x[i - 1]
+
+
+def _total(t, x, p):
+    return x.x1 + x.x2 + x.x3

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def three_disk_billiard() -> HybridSystem:
@@ -56,6 +56,14 @@ def three_disk_billiard() -> HybridSystem:
             )
             for k in range(3)
         ],
+        laws=Laws(
+            invariant={f"gap to disk{k + 1}": partial(_gap, k) for k in range(3)},
+            conserved={"speed": _speed},
+            across={
+                f"disk{k + 1}": {"angular momentum about its centre": partial(_turn, k)} for k in range(3)
+            },
+            elastic=("vx", "vy"),
+        ),
     )
 
 
@@ -77,3 +85,12 @@ def _reflected(k, t, x, p):
     dx, dy = _from_centre(k, x, p)
     twice = 2 * (x.vx * dx + x.vy * dy) / (dx**2 + dy**2)
     return x.x, x.y, x.vx - twice * dx, x.vy - twice * dy
+
+
+def _speed(t, x, p):
+    return np.hypot(x.vx, x.vy)
+
+
+def _turn(k, t, minus, plus, p):
+    dx, dy = _from_centre(k, minus, p)
+    return dx * (plus.vy - minus.vy) - dy * (plus.vx - minus.vx)

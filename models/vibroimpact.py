@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import HybridSystem, arguments
-from models.contact import Bodies, ContactLaw, Hertz, after_collision, hertz_stiffness
+from hybrid import HybridSystem, Laws, arguments
+from models.contact import ContactLaw, Hertz, after_collision, hertz_stiffness
+from models.contact_energy import Bodies
 
 
 def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
@@ -65,7 +66,8 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     if isinstance(contact, type) or not isinstance(contact, ContactLaw) or not callable(contact.modes):
         wanted = "be a law of contact from models.contact, for example Rigid(e=0.8)"
         raise arguments.refusal("contact", wanted, contact)
-    bodies = Bodies(_field, _penetration, _rate, _collided)
+    bodies = Bodies(_field, _penetration, _rate, _collided, _energy, _power)
+    laws = Laws(balance={"momentum": (_momentum, _outer_force)}, across={"impact": {"momentum": _impulse}})
     return HybridSystem(
         name="vibro-impact",
         state=("x1", "x2", "v1", "v2"),
@@ -78,11 +80,12 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         units={
             "x1": "m", "x2": "m", "v1": "m/s", "v2": "m/s", "t": "s",
             "m1": "kg", "m2": "kg", "omega1": "rad/s", "omega2": "rad/s",
-            "P": "N", "phi0": "rad", "omega": "rad/s", "D": "m",
+            "P": "N", "phi0": "rad", "omega": "rad/s", "D": "m", **contact.units,
         },
         modes=contact.modes(bodies),
         transitions=contact.transitions(bodies),
         period=_forcing_period,
+        laws=laws.joined(contact.laws(bodies)),
     )  # fmt: skip
 
 
@@ -108,3 +111,27 @@ def _field(t, x, p, Fcon):
 
 def _collided(t, x, p, e):
     return (x.x1, x.x1, *after_collision(p.m1, p.m2, x.v1, x.v2, e))
+
+
+def _momentum(t, x, p):
+    return p.m1 * x.v1 + p.m2 * x.v2
+
+
+def _outer_force(t, x, p):
+    # The force between the bodies and that of the spring between them do not change the momentum.
+    return p.P * np.cos(p.omega * t + p.phi0) - p.m1 * p.omega1 * (2 * p.xi1 * x.v1 + p.omega1 * x.x1)
+
+
+def _impulse(t, minus, plus, p):
+    return _momentum(t, plus, p) - _momentum(t, minus, p)
+
+
+def _energy(t, x, p):
+    springs = p.m1 * (p.omega1 * x.x1) ** 2 + p.m2 * (p.omega2 * (x.x1 - x.x2 + p.D)) ** 2
+    return (p.m1 * x.v1**2 + p.m2 * x.v2**2 + springs) / 2
+
+
+def _power(t, x, p):
+    driven = p.P * np.cos(p.omega * t + p.phi0) * x.v1
+    damped = p.m1 * p.xi1 * p.omega1 * x.v1**2 + p.m2 * p.xi2 * p.omega2 * (x.v1 - x.v2) ** 2
+    return driven - 2 * damped
