@@ -55,7 +55,7 @@ KERNEL_ROOMS = tuple(
     f"hybrid.kernels.{name}"
     for name in ("types", "instructions", "arithmetic", "events", "steps", "jumps", "evaluate", "drive")
 )
-HEAVY = ("matplotlib", "networkx", "numba", "pandas", "scipy", "sympy", "xarray")
+HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pint", "scipy", "sympy", "xarray")
 MAX_LINES = 500
 
 

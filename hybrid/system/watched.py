@@ -33,7 +33,7 @@ class Watched:
     """
 
     def __init__(self, functions: Iterable[Callable[..., Any] | None] = ()) -> None:
-        self._cells: list[tuple[Any, Any]] = []
+        self._cells: list[tuple[Any, str, Any]] = []
         self._items: list[tuple[dict[str, Any], str, Any]] = []
         self._attributes: list[tuple[Any, str, Any]] = []
         self._arrays: list[tuple[np.ndarray, bytes]] = []
@@ -52,12 +52,21 @@ class Watched:
     def holds(self) -> bool:
         """Whether all values are still what they were. This takes some microseconds, longer for tables."""
         return (
-            all(_same(_content(cell), value) for cell, value in self._cells)
+            all(_same(_content(cell), value) for cell, _, value in self._cells)
             and all(_same(names.get(name, MISSING), value) for names, name, value in self._items)
             and all(_same(getattr(owner, name, MISSING), value) for owner, name, value in self._attributes)
             and all(array.tobytes() == content for array, content in self._arrays)
             and all(_same_items(_items(value), content) for value, content in self._lists)
         )
+
+    def numbers(self) -> dict[str, float]:
+        """The plain numbers that were read from modules and closures, by name."""
+        places = [entry[-2:] for entry in (*self._cells, *self._items, *self._attributes)]
+        return {
+            name: float(value)
+            for name, value in places
+            if isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
+        }
 
     def _read_by(self, function: Any, owner: Any = None) -> None:
         """What a function reads; ``owner`` is the object whose method it is."""
@@ -82,9 +91,9 @@ class Watched:
             return
         self._seen[key] = function, owner
         names, attributes = _names_in(function.__code__)
-        for cell in function.__closure__ or ():
+        for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
             value = _content(cell)
-            self._cells.append((cell, value))
+            self._cells.append((cell, name, value))
             self._read(value, attributes)
         for name in names & function.__globals__.keys():
             value = function.__globals__[name]

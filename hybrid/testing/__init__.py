@@ -4,11 +4,13 @@
 own tests with ``@given(cases(system))``.
 """
 
-from hybrid.testing.case import Case, Engine, PropertyError, Run, discard
-from hybrid.testing.check import PropertyReport, SystemReport, check_system
+from hybrid.testing.case import Case, Engine, Run
+from hybrid.testing.check import check_system
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
-from hybrid.testing.ends import check_ends
+from hybrid.testing.dimensions import check_dimensions
+from hybrid.testing.ends import check_ends, check_sides_after
+from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.events import check_jumps, check_sides
 from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields
 from hybrid.testing.functions import check_compiled, check_period
@@ -22,6 +24,9 @@ from hybrid.testing.invariance import (
     check_split,
 )
 from hybrid.testing.landing import check_landings, check_limits
+from hybrid.testing.laws import check_laws
+from hybrid.testing.reads import check_reads
+from hybrid.testing.report import PropertyReport, SystemReport
 from hybrid.testing.saltation import (
     check_continuity,
     check_extension,
@@ -30,7 +35,7 @@ from hybrid.testing.saltation import (
     check_sum_rule,
 )
 from hybrid.testing.small import small_systems
-from hybrid.testing.strategies import cases, parameters, states
+from hybrid.testing.strategies import cases, parameters, run_settings, states
 from hybrid.testing.units import check_units
 
 __all__ = [
@@ -47,20 +52,24 @@ __all__ = [
     "check_crossings",
     "check_cut",
     "check_derivatives",
+    "check_dimensions",
     "check_elastic",
     "check_ends",
     "check_extension",
     "check_flow_direction",
     "check_jumps",
     "check_landings",
+    "check_laws",
     "check_limits",
     "check_names",
     "check_order",
     "check_period",
+    "check_reads",
     "check_saltation",
     "check_samples",
     "check_scale",
     "check_sides",
+    "check_sides_after",
     "check_split",
     "check_sum_rule",
     "check_system",
@@ -68,6 +77,7 @@ __all__ = [
     "discard",
     "parameters",
     "piecewise_affine_fields",
+    "run_settings",
     "small_systems",
     "states",
 ]

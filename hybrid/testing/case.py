@@ -8,7 +8,6 @@ from typing import Any, NoReturn
 
 import attrs
 import numpy as np
-from hypothesis.errors import UnsatisfiedAssumption
 
 from hybrid import arguments
 from hybrid.compiler.agreement import compiled_value
@@ -20,10 +19,13 @@ from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, Solver
 from hybrid.status import StatusCode
 from hybrid.system.derivatives import evaluate
-from hybrid.system.elements import Transition
-from hybrid.system.functions import ModelFunction
-from hybrid.system.graph import HybridSystem
+from hybrid.system.elements import Mode, Transition
+from hybrid.system.functions import ModelFunction, reset_function
+from hybrid.system.graph import HybridSystem, laws_of
+from hybrid.system.laws import Laws
 from hybrid.system.variables import named_values
+from hybrid.testing.errors import PropertyError, discard
+from hybrid.testing.reads import is_clock
 from hybrid.testing.sizes import sizes_along
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
@@ -33,17 +35,10 @@ LOOSER = 100.0
 MOST_JUMPS = 5
 # The whole run, which is only looked at, ends after this many: more than tell that jumps repeat endlessly.
 MOST_OF_WHOLE = 2000
+# What a jump is that is not judged.
+KINDS = {"grazing": "so shallow that the tolerances decide it", "limit": "the limit of a chatter"}
 # A run is discarded if looser tolerances move its end by more than this, relative to its size.
 SENSITIVE = 1e-6
-
-
-class PropertyError(AssertionError):
-    """A property that every system must have fails; the message gives the case and the likely cause."""
-
-
-def discard(reason: str) -> NoReturn:
-    """Discard an example that cannot be judged; Hypothesis then draws another one."""
-    raise UnsatisfiedAssumption(reason)
 
 
 def as_case(case: object) -> Case:
@@ -108,12 +103,15 @@ class Run:
         Change of the end state with looser tolerances, ``(n,)``.
     scale
         Sizes of the components along the run, ``(n,)``, each in its own unit.
+    cut
+        Why the run ends before that of the case does; empty if it does not.
     """
 
     arc: HybridArc
     t1: float
     error: np.ndarray
     scale: np.ndarray
+    cut: str = ""
 
     @property
     def tolerance(self) -> np.ndarray:
@@ -144,6 +142,8 @@ class Case:
         Method and tolerances of every run.
     engine
         Computes the runs.
+    laws
+        What the author knows; by default the laws that the system carries.
     """
 
     system: HybridSystem
@@ -156,6 +156,7 @@ class Case:
     passable: tuple[str, ...] = ()
     solver: Solver = TIGHT
     engine: Engine = LIBRARY
+    laws: Laws = attrs.Factory(lambda self: laws_of(self.system), takes_self=True)
 
     def __repr__(self) -> str:
         return f"Case({self.told()})"
@@ -199,10 +200,24 @@ class Case:
 
     def field(self, mode: str, t: float, x: Any) -> np.ndarray:
         """The vector field ``(n,)`` of a mode at ``(t, x)``, with the parameters of this case."""
-        system = self.system
-        return self.evaluate(system.modes[system.mode_index(mode)].field, t, x)
+        return self.evaluate(self.mode_of(mode).field, t, x)
 
-    @property
+    def law(self, name: str, t: float, x: Any) -> float:
+        """The quantity of a law of states, such as an energy, at ``(t, x)``.
+
+        Raises
+        ------
+        ArgumentError
+            If the case has no law of that name.
+        """
+        laws = {law.name: law for some in self.laws.in_modes.values() for law in some}
+        return float(self.evaluate(laws[arguments.known("Law", name, laws, "Laws")].function, t, x)[0])
+
+    def mode_of(self, name: str) -> Mode:
+        """The mode of that name."""
+        return self.system.modes[self.system.mode_index(name)]
+
+    @cached_property
     def values(self) -> np.ndarray:
         """Parameter vector ``(m,)``."""
         return self.system.parameter_values(self.parameters)
@@ -213,6 +228,22 @@ class Case:
         if values is None:
             discard("a model function is not finite")
         return np.asarray(values)
+
+    def after(self, transition: Transition, t: float, x: Any) -> np.ndarray:
+        """The state ``(n,)`` after a transition from ``(t, x)``."""
+        reset = reset_function(transition, self.system.state)
+        return np.array(x, dtype=float) if reset is None else self.evaluate(reset.value, t, x)
+
+    def is_wall(self, transition: Transition) -> bool:
+        """Whether no state lies beyond the guard of a transition, in its direction, and stays in the mode.
+
+        Some may for a two-way guard, a marker, a guard with a condition, which may not hold, and one of time
+        alone, which says nothing of the state.
+        """
+        guard = transition.guard
+        if guard.direction == 0 or transition.is_marker or guard.when is not None:
+            return False
+        return transition.name not in self.passable and not is_clock(self.system, transition.name)
 
     def slope(self, function: ModelFunction, owner: str, t: float, x: np.ndarray) -> np.ndarray:
         """The derivative ``(rows, n + 1)``, as runs use it, of a function of mode or transition ``owner``."""
@@ -231,6 +262,14 @@ class Case:
     def transition(self, jump: Jump) -> Transition:
         """The transition of a jump."""
         return self.system.transitions[self.system.transition_index(jump.transition)]
+
+    def names_of_mode(self, name: str) -> tuple[str | None, ...]:
+        """The name of a mode, and that of the mode that it is a part of."""
+        return name, self.mode_of(name).part_of
+
+    def names_of_transition(self, name: str) -> tuple[str | None, ...]:
+        """The name of a transition, and that of the one that it is a copy of."""
+        return name, self.system.transitions[self.system.transition_index(name)].part_of
 
     def simulate(
         self,
@@ -277,6 +316,20 @@ class Case:
         except ArgumentError:
             return None
 
+    def guard_size(self, transition: Transition) -> float:
+        """The largest absolute value of a guard on the whole run, in any mode."""
+        if transition.name not in self._guard_sizes:
+            arc, function = self.whole, transition.guard.function
+            rows = [] if arc is None else zip(arc.t, arc.x, strict=True)
+            found = [evaluate(self.system.variables, function, t, x, self.values) for t, x in rows]
+            sizes = [abs(float(values[0])) for values in found if values is not None]
+            self._guard_sizes[transition.name] = max(sizes, default=0.0)
+        return self._guard_sizes[transition.name]
+
+    @cached_property
+    def _guard_sizes(self) -> dict[str, float]:
+        return {}
+
     @property
     def duration(self) -> float:
         """How long the run of the case takes."""
@@ -286,13 +339,12 @@ class Case:
     def _run(self) -> Run | str:
         if self.mode is None:
             return f"no mode allows the start: {lies_beyond(self)}"
-        try:
-            arc = self.simulate(self.t1, max_jumps=MOST_JUMPS)
-        except ArgumentError as refusal:
-            return str(refusal)
+        arc, cut = self.whole, ""
+        if arc is None:
+            return "a run cannot start there"
         t1 = self.t1
-        if not is_clean(arc):
-            t1 = _before_trouble(arc)
+        if not is_clean(arc) or len(arc.jumps) > MOST_JUMPS:
+            t1, cut = _before_trouble(arc)
             arc = self.simulate(t1)
         if not is_clean(arc):
             return f"the run failed: {arc.status}" if not arc.status.ok else "the run grazes or chatters"
@@ -315,7 +367,7 @@ class Case:
         error = np.abs(arc.x[-1] - other.x[-1])
         if not np.all(error <= SENSITIVE * scale):
             return "the end of the run depends on the tolerances"
-        return Run(arc, t1, error, scale)
+        return Run(arc, t1, error, scale, cut)
 
     def the_jump(self) -> Jump:
         """The jump of the run that ``fraction`` selects; the example is discarded if the run has no jump."""
@@ -324,13 +376,18 @@ class Case:
             discard("no event on the run")
         return jumps[int(self.fraction * len(jumps))]
 
-    def fail(self, property_name: str, *lines: str, hint: str) -> NoReturn:
-        """Raise a PropertyError that describes the case."""
+    def follows_at_once(self, jump: Jump) -> bool:
+        """Whether a jump of the run follows another at its instant: the state has landed beyond its guard."""
+        return jump.j > 0 and self.run.arc.jumps.t[jump.j - 1] == jump.t
+
+    def fail(self, property_name: str, *lines: str, hint: str, time: float | None = None) -> NoReturn:
+        """Raise a PropertyError that describes the case; ``time`` is that on the run at which it fails."""
         told = "\n".join(f"  {line}" for line in lines)
         name = self.system.name or "the system"
         raise PropertyError(
             f"{property_name}: this does not hold for {name}.\n{told}\n"
-            f"  case: {self.told()}\n  likely: {hint}"
+            f"  case: {self.told()}\n  likely: {hint}",
+            time,
         )
 
 
@@ -339,16 +396,40 @@ def is_clean(arc: HybridArc) -> bool:
     return arc.status.ok and not arc.grazings and not np.any(arc.jumps.kind != "transverse")
 
 
-def _before_trouble(arc: HybridArc) -> float:
-    """A time before the first grazing, chatter or failure, midway between two jumps."""
-    bad = np.flatnonzero(arc.jumps.kind != "transverse")
-    clean = arc.jumps.t[: bad[0]] if len(bad) else arc.jumps.t
+def lasting(arc: HybridArc) -> np.ndarray:
+    """Which rows of a run hold states in which it stays for some time.
+
+    A jump may land where the next fires at once. Before the limit of a chatter the state is that of the last
+    jump that was followed.
+    """
+    first = np.searchsorted(arc.j, arc.j, side="left")
+    last = np.searchsorted(arc.j, arc.j, side="right") - 1
+    lasts = (arc.t[last] > arc.t[first]) | (len(arc.jumps) == 0)
+    limits = np.flatnonzero(arc.jumps.kind == "limit")
+    lasts &= ~(np.isin(arc.j, limits) & (np.arange(len(arc.t)) == last))
+    return np.asarray(lasts)
+
+
+def _before_trouble(arc: HybridArc) -> tuple[float, str]:
+    """A time before the first grazing, chatter or failure, between two jumps, and which of them it is."""
+    kinds = arc.jumps.kind
+    bad = np.flatnonzero(kinds != "transverse")
     touched = min((grazing.t for grazing in arc.grazings), default=np.inf)
-    times = np.unique([arc.t[0], *clean[clean < touched]])
+    first = int(bad[0]) if len(bad) else len(kinds)
+    if len(bad) and arc.jumps.t[first] <= touched:
+        end, why = float(arc.jumps.t[first]), f"{arc.jumps.transition[first]!s} is {KINDS[str(kinds[first])]}"
+    elif arc.grazings:
+        end, why = touched, "a guard is grazed"
+    else:
+        end, why = float(arc.t[-1]), f"the run ends with {arc.status.code.name}"
+    jumps = arc.jumps.t[:first]
+    jumps = jumps[jumps < end]
+    if len(jumps) > MOST_JUMPS:
+        jumps, why = jumps[:MOST_JUMPS], f"it has more than {MOST_JUMPS} jumps"
+    times = np.unique([arc.t[0], *jumps])
     if len(times) < 2:
-        end = min(touched, arc.t[-1])
-        return float(0.5 * (times[0] + end))
-    return float(0.5 * (times[-2] + times[-1]))
+        return float(0.5 * (times[0] + end)), why
+    return float(0.5 * (times[-2] + times[-1])), why
 
 
 def lies_beyond(case: Case) -> str:
@@ -358,22 +439,20 @@ def lies_beyond(case: Case) -> str:
         value = guard_beyond(case, transition, case.t0, case.x0)
         if not value < 0.0:
             told.append(f"guard {transition.name!r} of mode {transition.source!r}")
+    for law in case.laws.invariant:
+        if not float(case.evaluate(law.function, case.t0, case.x0)[0]) >= 0.0:
+            told.append(f"invariant {law.name!r}" + (f" of mode {law.of!r}" if law.of else ""))
     return "it lies beyond " + ", ".join(told) if told else "a guard is not finite"
 
 
 def guard_beyond(case: Case, transition: Transition, t: float, x: Any) -> float:
-    """The guard times its direction, negative before it fires; -inf where it is no wall.
-
-    A two-way guard and a marker are none, nor is a guard with a condition: the state may pass where that does
-    not hold.
-    """
-    direction = transition.guard.direction
-    if direction == 0 or transition.is_marker or transition.guard.when is not None:
+    """The guard times its direction, negative before it fires; -inf where it is no wall."""
+    if not case.is_wall(transition):
         return -np.inf
     values = evaluate(
         case.system.variables, transition.guard.function, t, np.asarray(x, dtype=float), case.values
     )
-    return np.nan if values is None else float(direction * values[0])
+    return np.nan if values is None else float(transition.guard.direction * values[0])
 
 
 def matrix_told(matrix: np.ndarray) -> str:
@@ -384,6 +463,15 @@ def matrix_told(matrix: np.ndarray) -> str:
         formatter={"float_kind": lambda v: f"{v:.8g}"},
         max_line_width=10**6,
     ).replace("\n", "")
+
+
+def jump_told(case: Case, jump: Jump) -> str:
+    """A jump in words."""
+    return (
+        f"event {jump.transition!r} at t = {jump.t:.10g} from mode {jump.source!r} to {jump.target!r}: "
+        f"{case.state_told(jump.x_minus)} becomes {case.state_told(jump.x_plus)}; guard's speed "
+        f"{jump.transversality:.6g}"
+    )
 
 
 def mode_after(jump: Jump) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
-from hypothesis import HealthCheck, Phase, Verbosity, given
+from hypothesis import HealthCheck, Phase, Verbosity
+from hypothesis import given as with_drawn
 from hypothesis import settings as hypothesis_settings
 from hypothesis.errors import Unsatisfiable, UnsatisfiedAssumption
 from hypothesis.strategies import SearchStrategy
@@ -17,12 +19,23 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system
-from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, PropertyError, mode_after
+from hybrid.system.laws import Elastic, Laws
+from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine
+from hybrid.testing.coverage import FIRES, Coverage
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
-from hybrid.testing.ends import ENDS, check_ends
+from hybrid.testing.dimensions import DIMENSIONS, check_dimensions
+from hybrid.testing.ends import ENDS, SIDES_AFTER, check_ends, check_sides_after
+from hybrid.testing.errors import PropertyError
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
-from hybrid.testing.functions import COMPILED, PERIOD, check_compiled, check_period
+from hybrid.testing.functions import (
+    COMPILED,
+    PERIOD,
+    SHORTEST,
+    check_compiled,
+    check_period,
+    check_shortest_period,
+)
 from hybrid.testing.invariance import (
     CUT,
     ELASTIC,
@@ -41,7 +54,9 @@ from hybrid.testing.invariance import (
     turned,
 )
 from hybrid.testing.landing import LANDINGS, LIMITS, check_landings, check_limits
-from hybrid.testing.laws import as_laws, check_conserved, check_invariant, checks
+from hybrid.testing.laws import law_checks
+from hybrid.testing.reads import READS, check_reads, numbers_read
+from hybrid.testing.report import PropertyReport, SystemReport
 from hybrid.testing.saltation import (
     CONTINUITY,
     EXTENSION,
@@ -54,102 +69,11 @@ from hybrid.testing.saltation import (
     check_saltation,
     check_sum_rule,
 )
-from hybrid.testing.strategies import Ranges, cases
+from hybrid.testing.strategies import Ranges, all_laws, cases
 from hybrid.testing.units import UNITS, check_units
 
-# A property is reported as hardly checked if less than this share of its examples could be judged.
-HARDLY = 0.1
-
-
-@attrs.frozen
-class PropertyReport:
-    """Result for one property.
-
-    Attributes
-    ----------
-    name
-        The property, as a sentence.
-    examples
-        Number of examples on which the property was checked and held.
-    discarded
-        Number of examples that could not be judged, by reason.
-    """
-
-    name: str
-    examples: int
-    discarded: Counter[str]
-
-    @property
-    def checked(self) -> bool:
-        """Whether the property was checked on any example."""
-        return self.examples > 0
-
-    def __str__(self) -> str:
-        lost = sum(self.discarded.values())
-        if not lost:
-            return f"{self.name}: {self.examples} examples."
-        if not self.checked:
-            return f"NOT CHECKED: {self.name}: {_most_common(self.discarded)}."
-        why = f"{lost} discarded ({_most_common(self.discarded)})"
-        hardly = "HARDLY CHECKED: " if self.examples < HARDLY * (self.examples + lost) else ""
-        return f"{hardly}{self.name}: {self.examples} examples, {why}."
-
-
-@attrs.frozen
-class SystemReport:
-    """What :func:`check_system` checked; every property held.
-
-    Attributes
-    ----------
-    properties
-        One :class:`PropertyReport` per property.
-    unfit
-        Number of runs that could not be judged, by reason; only the model functions were checked at their
-        starts.
-    jumps
-        How often each transition was taken, by name.
-    visits
-        How often each mode was entered or started in, by name.
-    discontinuities
-        Where the field of a mode is discontinuous, by mode: tangent vectors are not valid beyond.
-    """
-
-    name: str
-    properties: tuple[PropertyReport, ...]
-    unfit: Counter[str]
-    jumps: Counter[str]
-    visits: Counter[str]
-    discontinuities: Mapping[str, str]
-
-    @property
-    def unchecked(self) -> tuple[str, ...]:
-        """Properties that were checked on no example."""
-        return tuple(found.name for found in self.properties if not found.checked)
-
-    @property
-    def never_seen(self) -> tuple[str, ...]:
-        """Transitions that no run took and modes that no run visited."""
-        return tuple(name for count in (self.jumps, self.visits) for name in count if not count[name])
-
-    def __str__(self) -> str:
-        lines = [f"{self.name}: no property failed."]
-        if self.unfit:
-            lines.append(f"- {self.unfit.total()} runs could not be judged ({_most_common(self.unfit)}).")
-        lines += [f"- {found}" for found in self.properties]
-        for mode, jumps in self.discontinuities.items():
-            lines.append(
-                f"- The field of mode {mode!r} jumps where {jumps}: tangent vectors are not valid beyond. "
-                "Make its pieces modes joined by guards there."
-            )
-        if self.never_seen:
-            lines.append(f"- Never seen: {', '.join(self.never_seen)}. Give ranges that reach them.")
-        return "\n".join(lines)
-
-
-def _most_common(reasons: Counter[str]) -> str:
-    reason, most = reasons.most_common(1)[0]
-    share = "" if most == reasons.total() else f"{most} of them: "
-    return f"{share}{reason.rstrip('.')}"
+# Properties of the functions, at the start of a case, and of the whole run; laws are others.
+WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, SIDES_AFTER, LIMITS, ENDS)
 
 
 def check_system(
@@ -159,10 +83,15 @@ def check_system(
     parameters: Ranges | SearchStrategy[Any] | None = None,
     t_span: tuple[float, float] | None = None,
     mode: str | None = None,
-    elastic: Iterable[str] | Callable[[np.ndarray], np.ndarray] | None = None,
     passable: Iterable[str] = (),
     invariant: Mapping[str, Any] | None = None,
+    equal: Mapping[str, Any] | None = None,
     conserved: Mapping[str, Any] | None = None,
+    dissipated: Mapping[str, Any] | None = None,
+    balance: Mapping[str, Any] | None = None,
+    continuous: Iterable[str] | None = None,
+    across: Mapping[str, Any] | None = None,
+    elastic: Elastic | None = None,
     examples: int = 50,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
@@ -183,16 +112,11 @@ def check_system(
         Time span that contains the runs; by default two forcing periods, or a span estimated from the fields.
     mode
         Mode that runs start in; by default any mode whose guards allow the state.
-    elastic
-        For a system that conserves energy: names of the components that change sign when time is reversed,
-        or the involution of the state. The reversed run must return to its start. Not checked by default.
     passable
         Names of transitions whose guard the state may cross and stay in the same mode.
-    invariant
-        What is never negative: functions of ``(t, x, p)`` by name, or by mode mappings of names to functions.
-        Starts are drawn from there. Finds walls that let the state through.
-    conserved
-        What never changes, such as an energy; given likewise. Finds wrong signs, factors and lost components.
+    invariant, equal, conserved, dissipated, balance, continuous, across, elastic
+        What the author knows, as for :class:`hybrid.Laws`; beside the laws that the system carries. Starts
+        are drawn where no ``invariant`` is negative and every ``equal`` is zero.
     examples
         Number of runs to draw.
     solver
@@ -217,41 +141,21 @@ def check_system(
     >>> import models
     >>> report = check_system(models.bouncing_ball(), examples=5)
     >>> report.unchecked
-    ('The declared period ...', 'The saltation matrix is the identity ...', 'The order ...', 'An elastic ...')
+    ('The saltation matrix is the identity ...', 'An elastic ...')
     """
     as_system("system", system)
     examples = arguments.count("examples", examples, 1)
-    properties: dict[str, Callable[[Case], None]] = {
-        ENDS: check_ends,
-        DERIVATIVES: check_derivatives,
-        COMPILED: check_compiled,
-        PERIOD: check_period,
-        JUMPS: check_jumps,
-        SIDES: check_sides,
-        CROSSINGS: check_crossings,
-        SALTATION: check_saltation,
-        FLOW_DIRECTION: check_flow_direction,
-        CONTINUITY: check_continuity,
-        EXTENSION: check_extension,
-        SUM_RULE: check_sum_rule,
-        SPLIT: check_split,
-        SAMPLES: check_samples,
-        NAMES: check_names,
-        ORDER: check_order,
-        SCALE: check_scale,
-        UNITS: check_units,
-        CUT: check_cut,
+    given = {
+        "invariant": invariant,
+        "equal": equal,
+        "conserved": conserved,
+        "dissipated": dissipated,
+        "balance": balance,
+        "continuous": continuous,
+        "across": across,
+        "elastic": elastic,
     }
-    if any(each.reset is not None for each in system.transitions):
-        properties[LANDINGS] = check_landings
-    if any(each.accumulates_to for each in system.transitions):
-        properties[LIMITS] = check_limits
-    if elastic is not None:
-        flip = turned("elastic", system, elastic)
-        properties[ELASTIC] = lambda case: check_elastic(case, flip)
-    properties |= checks("non-negative", as_laws("invariant", system, invariant), check_invariant)
-    properties |= checks("conserved", as_laws("conserved", system, conserved), check_conserved)
-    tally = _Tally(system, properties)
+    laws = all_laws(system, given)
     drawn = cases(
         system,
         states=states,
@@ -259,12 +163,63 @@ def check_system(
         t_span=t_span,
         mode=mode,
         passable=passable,
-        invariant=invariant,
         solver=solver,
         engine=engine,
+        **given,
     )
+    flip = None if laws.elastic is None else turned("elastic", system, laws.elastic)
+    coverage = Coverage.of(system)
+    tally = _Tally(coverage, _properties(system, laws, flip), law_checks(laws))
+    tally.once(READS, lambda: check_reads(attrs.evolve(system, laws=laws)))
+    if system.units:
+        tally.once(DIMENSIONS, lambda: check_dimensions(system))
+    _search(drawn, coverage.see, examples)
+    tally.once(FIRES, coverage.check)
+    if system.period is not None:
+        tally.once(SHORTEST, lambda: check_shortest_period(system, coverage.cases))
     _search(drawn, tally.judge, examples)
-    return tally.report(elastic is None)
+    return tally.report(flip is None)
+
+
+def _properties(
+    system: HybridSystem, laws: Laws, flip: Callable[[np.ndarray], np.ndarray] | None
+) -> dict[str, Callable[[Case], None]]:
+    """The properties in the order in which they are checked: what is nearest to the author's text first."""
+    properties: dict[str, Callable[[Case], None]] = {
+        DERIVATIVES: check_derivatives,
+        COMPILED: check_compiled,
+        PERIOD: check_period,
+        SIDES_AFTER: check_sides_after,
+        LIMITS: check_limits,
+        **law_checks(laws),
+        ENDS: check_ends,
+        SIDES: check_sides,
+        LANDINGS: check_landings,
+        CROSSINGS: check_crossings,
+        JUMPS: check_jumps,
+        UNITS: check_units,
+        NAMES: check_names,
+        ORDER: check_order,
+        SCALE: check_scale,
+        SPLIT: check_split,
+        SAMPLES: check_samples,
+        CUT: check_cut,
+        CONTINUITY: check_continuity,
+        EXTENSION: check_extension,
+        FLOW_DIRECTION: check_flow_direction,
+        SALTATION: check_saltation,
+        SUM_RULE: check_sum_rule,
+    }
+    applies = {
+        PERIOD: system.period is not None,
+        LANDINGS: any(each.reset is not None for each in system.transitions),
+        LIMITS: any(each.accumulates_to for each in system.transitions),
+        ORDER: len(system.transitions) > 1,
+    }
+    properties = {name: check for name, check in properties.items() if applies.get(name, True)}
+    if flip is not None:
+        properties[ELASTIC] = lambda case: check_elastic(case, flip)
+    return properties
 
 
 def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int) -> None:
@@ -280,7 +235,7 @@ def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples
         suppress_health_check=list(HealthCheck),
         verbosity=Verbosity.quiet,
     )
-    @given(drawn)
+    @with_drawn(drawn)
     def search(case: Case) -> None:
         judge(case)
 
@@ -298,56 +253,92 @@ def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples
 class _Tally:
     """Checks cases for every property until one fails, then for that one only, so that it can shrink."""
 
-    def __init__(self, system: HybridSystem, properties: dict[str, Callable[[Case], None]]) -> None:
-        self.system = system
+    def __init__(
+        self, coverage: Coverage, properties: dict[str, Callable[[Case], None]], laws: Container[str]
+    ) -> None:
+        self.coverage = coverage
         self.properties = properties
+        self.laws = laws
         self.held = Counter(dict.fromkeys(properties, 0))
         self.discarded: dict[str, Counter[str]] = {name: Counter() for name in properties}
-        self.jumps = Counter(dict.fromkeys(system.transition_names, 0))
-        self.visits = Counter(dict.fromkeys(system.mode_names, 0))
         self.unfit: Counter[str] = Counter()
+        self.cut: Counter[str] = Counter()
         self.fit = 0
         self.failed: str | None = None
 
-    def judge(self, case: Case) -> None:
-        if self.failed:
-            names = [self.failed]
+    def once(self, name: str, check: Callable[[], None]) -> None:
+        """Check what needs no run."""
+        self.held[name], self.discarded[name] = 0, Counter()
+        try:
+            check()
+        except UnsatisfiedAssumption as reason:
+            self.discarded[name][str(reason)] += 1
         else:
-            names = list(self.properties) if self._is_fit(case) else [ENDS, DERIVATIVES, COMPILED, PERIOD]
+            self.held[name] += 1
+
+    def judge(self, case: Case) -> None:
+        """Check a case for every property that can be judged on it."""
+        is_fit = self.failed is not None or self._is_fit(case)
+        names = [self.failed] if self.failed else [*self.properties]
+        failures: list[tuple[str, PropertyError]] = []
         for name in names:
+            if failures and name not in self.laws:
+                break
+            if not (is_fit or name in WITHOUT_RUN or name in self.laws):
+                continue
             try:
                 self.properties[name](case)
             except UnsatisfiedAssumption as reason:
                 self.discarded[name][str(reason)] += 1
-            except PropertyError:
-                self.failed = name
-                raise
+            except PropertyError as error:
+                failures.append((name, error))
+                if name not in self.laws:
+                    break
             else:
                 self.held[name] += 1
+        if failures:
+            # Of several laws that fail the first to fail on the run is nearest to the mistake.
+            times = [math.inf if each.time is None else each.time for _, each in failures]
+            self.failed, first = failures[times.index(min(times))]
+            raise first
 
     def _is_fit(self, case: Case) -> bool:
         try:
-            arc = case.run.arc
+            cut = case.run.cut
         except UnsatisfiedAssumption as reason:
             self.unfit[str(reason)] += 1
             return False
         self.fit += 1
-        self.jumps.update(jump.transition for jump in arc.jumps)
-        self.visits.update([str(arc.mode[0]), *map(mode_after, arc.jumps)])
+        self.cut.update([cut] if cut else [])
         return True
 
     def report(self, without_elastic: bool) -> SystemReport:
-        name = self.system.name or "The system"
+        """What was found, if any run could be judged."""
+        system, coverage = self.coverage.system, self.coverage
+        name = system.name or "The system"
         if not self.fit:
             reasons = "".join(f"\n  {count} times: {why}" for why, count in self.unfit.most_common(3))
             raise PropertyError(
                 f"{name}: none of {self.unfit.total()} runs could be judged.{reasons}\n"
-                "  likely: ranges of states that no mode allows, a guard with the wrong direction, or a time "
-                "span that does not suit the model. Give states=, t_span= or mode=."
+                "  likely: a guard with the wrong direction or threshold, if guards are named above; else "
+                "ranges of states that no mode allows, or a time span that does not suit the model: give "
+                "states=, t_span= or mode=."
             )
-        found = [PropertyReport(name, self.held[name], self.discarded[name]) for name in self.properties]
+        found = [PropertyReport(name, self.held[name], self.discarded[name]) for name in self.held]
         if without_elastic:
             found.append(PropertyReport(ELASTIC, 0, Counter({"elastic= is not given": 1})))
-        told = compile_system(self.system).emitted.discontinuities
-        jumps = {mode: text for mode, text in zip(self.system.mode_names, told, strict=True) if text}
-        return SystemReport(name, tuple(found), self.unfit, self.jumps, self.visits, jumps)
+        told = compile_system(system).emitted.discontinuities
+        jumps = {mode: text for mode, text in zip(system.mode_names, told, strict=True) if text}
+        return SystemReport(
+            name,
+            tuple(found),
+            unfit=self.unfit,
+            cut=self.cut,
+            ends=coverage.ends,
+            jumps=coverage.jumps,
+            visits=coverage.visits,
+            one_sided=coverage.one_sided,
+            dead_ends=coverage.dead_ends,
+            numbers=numbers_read(system),
+            discontinuities=jumps,
+        )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.system.elements import Transition
-from hybrid.testing.case import Case, as_case, discard, stretches
+from hybrid.testing.case import Case, as_case, stretches
+from hybrid.testing.errors import discard
 
 CROSSINGS = "Each change of sign of a guard in its direction fires once"
 

@@ -8,7 +8,8 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.system.derivatives import derivative_fault, evaluate, reference_derivative
 from hybrid.system.functions import CONDITION
 from hybrid.system.graph import functions_of
-from hybrid.testing.case import Case, as_case, discard
+from hybrid.testing.case import Case, as_case
+from hybrid.testing.errors import discard
 
 DERIVATIVES = "Given, traced and numerical derivatives agree"
 

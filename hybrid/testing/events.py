@@ -6,14 +6,14 @@ import numpy as np
 
 from hybrid.simulation.arc import Jump
 from hybrid.system.functions import guard_function
-from hybrid.testing.case import Case, as_case, discard, guard_beyond, mode_after, stretches
-from hybrid.testing.saltation import event_told
+from hybrid.testing.case import Case, as_case, guard_beyond, jump_told, lasting, mode_after
+from hybrid.testing.errors import discard
 
 JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
 SIDES = "A mode ends where its guards say"
 
-# A run is evaluated at these places between two events, as shares of the stretch.
-INNER = np.linspace(0.02, 0.98, 7)
+# A guard is beyond zero by more than rounding at this share of its size on the run.
+BEYOND = 1e-7
 
 
 def check_jumps(case: Case) -> None:
@@ -31,7 +31,7 @@ def check_jumps(case: Case) -> None:
     mode, previous = case.mode, -np.inf
     for jump in run.arc.jumps:
         transition = case.transition(jump)
-        told = event_told(case, jump)
+        told = jump_told(case, jump)
         if jump.source != mode:
             case.fail(JUMPS, told, f"the mode was {mode!r}", hint="events that fire in the wrong order.")
         mode = mode_after(jump)
@@ -54,8 +54,7 @@ def check_jumps(case: Case) -> None:
                 f"the guard's speed is {jump.transversality:.6g}, its direction {transition.guard.direction}",
                 hint="a guard that fires in the wrong direction.",
             )
-        reset = transition.reset
-        wanted = jump.x_minus if reset is None else case.evaluate(reset.function, jump.t, jump.x_minus)
+        wanted = case.after(transition, jump.t, jump.x_minus)
         if not np.all(np.abs(jump.x_plus - wanted) <= 1e-12 * (np.abs(wanted) + run.scale)):
             case.fail(
                 JUMPS,
@@ -68,7 +67,7 @@ def check_jumps(case: Case) -> None:
 def _guard_jumps(case: Case, jump: Jump) -> bool:
     """Whether a guard is discontinuous at an event: its signs just before and just after differ."""
     transition = case.transition(jump)
-    field = case.evaluate(case.system.modes[case.system.mode_index(jump.source)].field, jump.t, jump.x_minus)
+    field = case.evaluate(case.mode_of(jump.source).field, jump.t, jump.x_minus)
     moment = 1e-9 * case.duration
     before, after = (
         float(case.evaluate(transition.guard.function, jump.t + shift, jump.x_minus + shift * field)[0])
@@ -80,40 +79,30 @@ def _guard_jumps(case: Case, jump: Jump) -> bool:
 def check_sides(case: Case) -> None:
     """Between events no guard of the mode is beyond zero in its direction, except passable ones.
 
+    The whole run is judged. A guard with a condition, and one of time alone, end no mode by their side.
+
     Raises
     ------
     PropertyError
         If a mode continues beyond a guard that ends it.
     """
-    as_case(case)
-    run = case.run
-    guards = [
-        transition
-        for transition in case.system.transitions
-        if transition.guard.direction
-        and transition.guard.when is None
-        and not transition.is_marker
-        and transition.name not in case.passable
-    ]
-    if not guards:
-        discard("no guard has a direction")
-    for j, mode, start, length in stretches(case):
-        for t in start + length * INNER:
-            x = run.arc(t)
-            for transition in (guard for guard in guards if guard.source == mode):
-                beyond = guard_beyond(case, transition, t, x)
-                if not beyond > 0.0:
-                    continue
-                slope = case.slope(guard_function(transition), transition.name, t, x)
-                if not beyond > 1e-7 * float(np.abs(slope[0, :-1]) @ run.scale + abs(slope[0, -1]) * length):
-                    continue
-                side = "above" if transition.guard.direction > 0 else "below"
-                case.fail(
-                    SIDES,
-                    f"guard of {transition.name!r}, which ends mode {mode!r} where it goes {side} zero: "
-                    f"{beyond * transition.guard.direction:.6g} at t = {t:.10g}, {case.state_told(x)}",
-                    event_told(case, run.arc.jumps[j - 1]) if j else "no event before",
-                    hint="a guard with the wrong direction, or a reset with the wrong sign that leaves the "
-                    "state beyond the guard. If the state may cross this guard and stay in the mode, name "
-                    "the transition in passable=.",
-                )
+    arc = as_case(case).whole
+    walls = [each for each in case.system.transitions if case.is_wall(each)]
+    if arc is None or not walls:
+        discard("no guard has a direction" if arc else "no mode allows the start")
+    for i in np.flatnonzero(lasting(arc)):
+        t, x, mode = float(arc.t[i]), arc.x[i], str(arc.mode[i])
+        for transition in (wall for wall in walls if wall.source == mode):
+            beyond = guard_beyond(case, transition, t, x)
+            if not beyond > BEYOND * case.guard_size(transition):
+                continue
+            side, j = "above" if transition.guard.direction > 0 else "below", int(arc.j[i])
+            case.fail(
+                SIDES,
+                f"guard of {transition.name!r}, which ends mode {mode!r} where it goes {side} zero: "
+                f"{beyond * transition.guard.direction:.6g} at t = {t:.10g}, {case.state_told(x)}",
+                jump_told(case, arc.jumps[j - 1]) if j else "no event before",
+                hint="a guard with the wrong direction, or a reset with the wrong sign that leaves the "
+                "state beyond the guard. If the state may cross this guard and stay in the mode, name "
+                "the transition in passable=.",
+            )

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from hybrid.compiler.agreement import disagreement
 from hybrid.compiler.compiled import compile_system
-from hybrid.system.graph import functions_of
-from hybrid.system.periodicity import period_fault_at
-from hybrid.testing.case import Case, as_case, discard
+from hybrid.symbolic.reads import TIME, names_read
+from hybrid.symbolic.values import TraceError
+from hybrid.system.graph import HybridSystem, functions_of
+from hybrid.system.periodicity import period_at, period_fault_at
+from hybrid.testing.case import Case, as_case
+from hybrid.testing.errors import PropertyError, discard
 
 COMPILED = "The compiled functions equal the Python functions"
 PERIOD = "The declared period is a period of every function"
+SHORTEST = "No part of the declared period is a period of every function"
+# Parts of the period, numbers of cases and of phases at which they are tried.
+PARTS = (2, 3)
+MOST_CASES = 10
+PHASES = 32
+# A share of the period that is no simple part of it.
+GOLDEN = 0.6180339887498949
 
 
 def check_compiled(case: Case) -> None:
@@ -59,3 +72,61 @@ def check_period(case: Case) -> None:
                 hint="a number in the period where a function has a parameter, or time that enters a "
                 "function outside its forcing.",
             )
+
+
+def check_shortest_period(system: HybridSystem, cases: Sequence[Case]) -> None:
+    """Half the declared period is not a period, nor a third of it, at the starts of the cases.
+
+    It finds ``4 * np.pi / p.w`` where ``2 * np.pi / p.w`` is meant, which leaves out every other point of a
+    section, and a period of a system that does not depend on time.
+
+    Raises
+    ------
+    PropertyError
+        If a part of the period is a period.
+    """
+    if system.period is None:
+        discard("no period is declared")
+    name = system.name or "the system"
+    told = f"{SHORTEST}: this does not hold for {name}."
+    if not _reads_time(system):
+        raise PropertyError(
+            f"{told}\n  a period is declared, and no function reads t\n  likely: forcing that is missing, or "
+            "a period to be removed."
+        )
+    rng = np.random.default_rng(20240507)
+    places = [
+        (case, np.array(case.x0), float(phase))
+        for case in cases[:MOST_CASES]
+        for phase in rng.uniform(0.0, 1.0, PHASES)
+    ]
+    if not any(_differ(place, GOLDEN) for place in places):
+        discard("no function changes in time")
+    for part in PARTS:
+        if not any(_differ(place, 1.0 / part) for place in places):
+            period = period_at(system.period, system.variables, cases[0].values) or math.nan
+            raise PropertyError(
+                f"{told}\n  period = {period:.10g}, and every function has the period {period / part:.10g}, "
+                f"too\n  likely: a factor {part} in period=. Declare the shortest period: sections and "
+                "orbits count in it."
+            )
+
+
+def _differ(place: tuple[Case, np.ndarray, float], share: float) -> bool:
+    """Whether a function has another value a share of the period later."""
+    case, x, phase = place
+    system = case.system
+    period = period_at(system.period, system.variables, case.values) or math.nan
+    return any(
+        period_fault_at(system.variables, function, phase * period, x, case.values, share * period)
+        is not None
+        for _, function in functions_of(system)
+    )
+
+
+def _reads_time(system: HybridSystem) -> bool:
+    """Whether a function reads the time, or cannot be followed."""
+    try:
+        return any(TIME in names_read(system, function.value) for _, function in functions_of(system))
+    except TraceError:
+        return True

@@ -6,16 +6,18 @@ import numpy as np
 
 from hybrid.errors import ModelError
 from hybrid.simulation.arc import HybridArc, Jump
-from hybrid.testing.case import Case, as_case, discard
-from hybrid.testing.saltation import event_told
+from hybrid.testing.case import Case, as_case, jump_told
+from hybrid.testing.errors import discard
 
 LANDINGS = "A reset gives the same a few units in the last place to either side of where its event lies"
 LIMITS = "The limit of a chatter goes on as a run that starts there does"
 
 # A reset that is continuous where its event lies changes by rounding alone.
 BY_ROUNDING = 1e-9
-# A chatter is followed for this many jumps.
-MOST_JUMPS = 200
+# In the mode of a limit the guard of the chatter and its speed are at most this share of those before.
+OFF_GUARD = 1e-4
+# Share of the time of a case over which a speed is taken.
+MOMENT = 1e-7
 
 
 def check_landings(case: Case) -> None:
@@ -33,19 +35,19 @@ def check_landings(case: Case) -> None:
     as_case(case)
     jumps, seen, previous = case.run.arc.jumps, False, -np.inf
     for jump in jumps:
-        reset, locked = case.transition(jump).reset, jump.t == previous
+        transition, locked = case.transition(jump), jump.t == previous
         previous = jump.t
-        if reset is None or locked:
+        if transition.reset is None or locked:
             continue
         seen = True
-        wanted = case.evaluate(reset.function, jump.t, jump.x_minus)
+        wanted = case.after(transition, jump.t, jump.x_minus)
         for way in (-np.inf, np.inf):
             t, x = np.nextafter(jump.t, way), np.nextafter(jump.x_minus, way)
-            got = case.evaluate(reset.function, t, x)
+            got = case.after(transition, t, x)
             if np.any(np.abs(got - wanted) > BY_ROUNDING * (np.abs(wanted) + case.run.scale)):
                 case.fail(
                     LANDINGS,
-                    event_told(case, jump),
+                    jump_told(case, jump),
                     f"the reset gives {case.state_told(wanted)} there",
                     f"the reset gives {case.state_told(got)} at the neighbouring floating-point numbers",
                     hint="the reset of this transition jumps at its guard, as np.mod and np.floor do, "
@@ -56,30 +58,65 @@ def check_landings(case: Case) -> None:
 
 
 def check_limits(case: Case) -> None:
-    """After the limit of a chatter the run goes on as a run does that starts there, in the same mode.
+    """After the limit of a chatter the state stays on the guard, and the run goes on as a start there does.
+
+    The mode of ``accumulates_to`` stands for infinitely many jumps: its field keeps the state on the guard of
+    the jumps, without speed through it.
 
     Raises
     ------
     PropertyError
-        If the mode or the state at the end is another one.
+        If the mode leaves the guard at once, or a run that starts there has another mode or state at its end.
     """
-    as_case(case)
-    arc = case.simulate(case.t1, max_jumps=MOST_JUMPS)
-    limits = np.flatnonzero(arc.jumps.kind == "limit")
-    if not len(limits) or not arc.status.ok:
+    arc = as_case(case).whole
+    limits = [] if arc is None else [jump for jump in arc.jumps if jump.kind == "limit" and jump.target]
+    if arc is None or not limits:
         discard("no chatter with a limit on the run")
-    jump = arc.jumps[int(limits[-1])]
+    for jump in limits:
+        _check_stays(case, jump, arc)
+    if not arc.status.ok:
+        discard("no chatter with a limit on a run that ends well")
+    jump = limits[-1]
     again = _from_limit(case, jump, arc)
     scale = np.abs(arc.x).max(axis=0)
     same = np.all(np.abs(again.x[-1] - arc.x[-1]) <= 1e-6 * scale)
     if str(again.mode[-1]) != str(arc.mode[-1]) or not same:
         case.fail(
             LIMITS,
-            event_told(case, jump),
+            jump_told(case, jump),
             f"the run ends in mode {str(arc.mode[-1])!r} at {case.state_told(arc.x[-1])}",
             f"a run from the limit ends in mode {str(again.mode[-1])!r} at {case.state_told(again.x[-1])}",
             hint="the limit of the chatter leads into the wrong part of a mode.",
         )
+
+
+def _check_stays(case: Case, jump: Jump, arc: HybridArc) -> None:
+    """Fail if the mode of a limit moves the guard of the chatter, or its speed in the mode that chatters."""
+    guard, field = case.transition(jump).guard.function, case.mode_of(jump.source).field
+    moment = MOMENT * (case.t1 - case.t0)
+
+    def value_and_speed(t: float, x: np.ndarray) -> tuple[float, float]:
+        f = case.evaluate(field, t, x)
+        ahead, behind = (float(case.evaluate(guard, t + h, x + h * f)[0]) for h in (moment, -moment))
+        return float(case.evaluate(guard, t, x)[0]), (ahead - behind) / (2.0 * moment)
+
+    chatter = [value_and_speed(t, x) for t, x, j in zip(arc.t, arc.x, arc.j, strict=True) if j <= jump.j]
+    sizes = np.abs(chatter).max(axis=0)
+    for t, x, j in zip(arc.t, arc.x, arc.j, strict=True):
+        if j != jump.j + 1:
+            continue
+        found = np.array(value_and_speed(t, x))
+        if np.any(np.abs(found) > OFF_GUARD * sizes):
+            worse = int(np.argmax(np.abs(found) / (sizes + (sizes == 0.0))))
+            case.fail(
+                LIMITS,
+                f"mode {jump.target!r}, to which the jumps of {jump.transition!r} accumulate, leaves its "
+                f"guard: its {('value', 'speed')[worse]} is {found[worse]:.6g} at t = {t:.8g}, "
+                f"{case.state_told(x)}",
+                jump_told(case, jump),
+                hint=f"the field of mode {jump.target!r}: it has to keep the state on the guard of "
+                f"{jump.transition!r}, without speed through it; or another mode is meant.",
+            )
 
 
 def _from_limit(case: Case, jump: Jump, arc: HybridArc) -> HybridArc:

@@ -1,153 +1,299 @@
-"""What the author of a model knows: quantities that stay non-negative, and quantities that never change."""
+"""What the author of a model knows, checked on runs: `hybrid.Laws`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import attrs
 import numpy as np
+from hypothesis.errors import UnsatisfiedAssumption
 
-from hybrid import arguments
-from hybrid.errors import ArgumentError
-from hybrid.system.elements import Function
-from hybrid.system.graph import HybridSystem
-from hybrid.system.labels import named
-from hybrid.testing.case import Case, as_case, discard
+from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.system.laws import Law, Laws
+from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
+from hybrid.testing.errors import PropertyError, discard
 
 # A value may differ by this share of the sizes of its terms.
-TOLERANCE = 1e-7
-# The sizes of the terms are told by a relative change of the state this large.
+TOLERANCE = 1e-8
+# The sizes of the terms are told by changes of the state by this share of the sizes of its components, at
+# some rows of a run.
 NUDGE = 1e-3
+ROWS_OF_SIZE = 20
+# Laws are judged on the first rows of a run: more of them show nothing new.
+MOST_ROWS = 1000
+GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
+KINDS = {
+    "invariant": "is non-negative",
+    "equal": "is zero",
+    "conserved": "is conserved",
+    "dissipated": "never grows by more than is put in",
+    "balance": "changes at its rate",
+}
 
 
-@attrs.frozen
-class Law:
-    """A function of ``(t, x, p)`` with a name, in one mode or, with None, in all of them."""
-
-    name: str
-    mode: str | None
-    function: Function
-
-    def holds_in(self, mode: str) -> bool:
-        """Whether it says something of a mode."""
-        return self.mode in (None, mode)
-
-
-def as_laws(argument: str, system: HybridSystem, given: object) -> tuple[Law, ...]:
-    """The laws of an argument: functions by name, or by mode mappings of names to functions.
-
-    Raises
-    ------
-    ArgumentError
-        If a mode does not exist, or a value is not a function.
-    """
-    found: list[Law] = []
-    for name, value in named(argument, given, "map names to functions of (t, x, p)").items():
-        if isinstance(value, Mapping):
-            arguments.known(f"{argument}: Mode", name, system.mode_names, "Modes")
-            pairs = [
-                (each, name, function) for each, function in named(f"{argument}[{name!r}]", value).items()
-            ]
-        else:
-            pairs = [(name, None, value)]
-        for each, mode, function in pairs:
-            arguments.instance(f"{argument}: a name", each, str)
-            if not callable(function):
-                raise ArgumentError(
-                    f"{argument}: {each!r} must be a function of (t, x, p); got {arguments.shown(function)}."
-                )
-            found.append(Law(each, mode, function))
-    return tuple(found)
-
-
-def starts_within(laws: tuple[Law, ...], case: Case, mode: str) -> bool:
-    """Whether the start of a case, in a mode, is where the laws are non-negative."""
-    wanted = [law for law in laws if law.holds_in(mode)]
-    return all(float(case.evaluate(law.function, case.t0, case.x0)[0]) >= 0.0 for law in wanted)
-
-
-def check_invariant(case: Case, law: Law) -> None:
-    """A quantity is non-negative on the whole run, before and after each jump.
-
-    It finds a wall that lets the state through: a guard with the wrong sign or direction, a reset that leaves
-    the state on the wrong side, a transition that was forgotten.
+def check_laws(case: Case) -> None:
+    """Every law of a case holds on its run: those of its system, and those given to `cases`.
 
     Raises
     ------
     PropertyError
-        If the quantity is negative by more than rounding.
+        If a law does not hold.
     """
-    places = [place for place in _places(as_case(case)) if law.holds_in(place[1])]
-    found = [_value(case, law, t, x) for _, _, t, x in places]
-    size = max((size for _, size in found), default=0.0)
-    for (where, mode, t, x), (value, _) in zip(places, found, strict=True):
-        if value < -TOLERANCE * size:
-            case.fail(
-                told(law, "non-negative"),
-                f"got {value:.8g} {where}, in mode {mode!r} at t = {t:.8g}, {case.state_told(x)}",
-                hint="a guard that lets the state through (its sign, its direction, or a transition that is "
-                "missing), or a reset that leaves the state on the wrong side.",
-            )
+    for check in law_checks(as_case(case).laws).values():
+        check(case)
 
 
-def check_conserved(case: Case, law: Law) -> None:
-    """A quantity has one value on the whole run, before and after each jump.
+def law_checks(laws: Laws) -> dict[str, Callable[[Case], None]]:
+    """A property for each law, by its words; those of states first, which are the nearest to the run."""
+    checks: dict[str, Callable[[Case], None]] = {}
 
-    It finds a force with a wrong sign or factor, a component that a reset forgets, and a loss where none is
-    meant.
+    def add(told: str, check: Callable[[Case], None]) -> None:
+        checks[told] = lambda case: _checked(case, check)
 
-    Raises
-    ------
-    PropertyError
-        If the quantity changes by more than the tolerances explain.
-    """
-    first: tuple[float, float] | None = None
-    for where, mode, t, x in _places(as_case(case)):
-        if not law.holds_in(mode):
-            first = None
-            continue
-        value, size = _value(case, law, t, x)
-        if first is None:
-            first = value, size
-        elif abs(value - first[0]) > TOLERANCE * max(size, first[1]):
-            case.fail(
-                told(law, "conserved"),
-                f"got {value:.8g} for {first[0]:.8g} {where}, in mode {mode!r} at t = {t:.8g}, "
-                f"{case.state_told(x)}",
-                hint=f"the field of mode {mode!r}, if it changed on the way, or the reset of the transition "
-                "named: a wrong sign or factor, or a component that is not written.",
-            )
+    for kind, some in laws.in_modes.items():
+        check = _check_value if kind in ("invariant", "equal") else _check_change
+        for law in some:
+            add(_told(law, kind), partial(check, law=law, kind=kind))
+    for law in laws.across:
+        add(_across_told(law), partial(_check_across, law=law))
+    for name in laws.continuous:
+        told = f"State and field are continuous at {name!r}"
+        add(told, partial(_check_continuous, name=name, told=told))
+    return checks
 
 
-def told(law: Law, what: str) -> str:
+def _checked(case: Case, check: Callable[[Case], None]) -> None:
+    """Check a law; where it fails, say so if it holds with the parameters as declared."""
+    try:
+        check(case)
+    except PropertyError as error:
+        declared = case.system.parameters
+        changed = [name for name, value in case.parameters.items() if value != declared[name]]
+        if not changed:
+            raise
+        other = attrs.evolve(case, parameters=dict(declared))
+        try:
+            check(other)
+        except (PropertyError, UnsatisfiedAssumption):
+            raise error from None
+        if not np.array_equal(_whole(other).jumps.transition, _whole(case).jumps.transition):
+            raise
+        raise PropertyError(
+            f"{error}\n  It holds with the parameters as declared: a number stands where a parameter belongs "
+            f"({', '.join(changed)}), or parameters= needs narrower ranges.",
+            error.time,
+        ) from None
+
+
+def _told(law: Law, kind: str) -> str:
     """The property in words."""
-    return f"{law.name!r} is {what}" + (f" in mode {law.mode!r}" if law.mode else "")
+    return f"{law.name!r} {KINDS[kind]}" + (f" in mode {law.of!r}" if law.of else "")
 
 
-def checks(
-    kind: str, laws: tuple[Law, ...], check: Callable[[Case, Law], None]
-) -> dict[str, Callable[[Case], None]]:
-    """A property for each law, by its words."""
-    return {told(law, kind): lambda case, law=law: check(case, law) for law in laws}  # type: ignore[misc]
+def _across_told(law: Law) -> str:
+    return (
+        f"The rule {law.name!r} holds at {law.of!r}"
+        if law.name != law.of
+        else f"The rule of {law.of!r} holds"
+    )
 
 
-def _places(case: Case) -> Iterator[tuple[str, str, float, np.ndarray]]:
-    """Where a run is looked at: its steps, and both sides of each jump."""
+def _check_value(case: Case, law: Law, kind: str) -> None:
+    """Fail if a quantity is negative, or not zero, anywhere on the whole run."""
+    arc = _whole(case)
+    tolerance = TOLERANCE * _size_on(case, law, arc)
+    for i in _rows(case, law, arc):
+        value = float(case.evaluate(law.function, arc.t[i], arc.x[i])[0])
+        if (value < -tolerance) if kind == "invariant" else (abs(value) > tolerance):
+            mode, last = str(arc.mode[i]), str(arc.jumps.transition[arc.j[i] - 1]) if arc.j[i] else ""
+            causes = [_of_mode(case, mode, kind)]
+            if last and case.system.transitions[case.system.transition_index(last)].reset is not None:
+                landed = arc.t[i] == arc.jumps.t[arc.j[i] - 1]
+                reset = f"the reset of {last!r}: a wrong sign, or a component that it does not write"
+                causes.insert(0 if landed else 1, reset)
+            case.fail(
+                _told(law, kind),
+                f"got {value:.8g} at t = {arc.t[i]:.8g}, {case.state_told(arc.x[i])}, in mode {mode!r}",
+                _before(case, arc, i),
+                hint=f"{'; or '.join(causes)}.",
+                time=arc.t[i],
+            )
+
+
+def _of_mode(case: Case, mode: str, kind: str) -> str:
+    """The likely reason for a value that goes wrong inside of a mode."""
+    if kind == "equal":
+        return f"the field of mode {mode!r}: it leaves the surface on which the quantity is zero"
+    names = [repr(each.name) for each in case.system.transitions if each.source == mode]
+    guards = f"guards of {', '.join(names)}" if names else "none"
+    return (
+        f"the transitions that leave mode {mode!r} ({guards}): a wrong sign, direction or threshold, or a "
+        "transition that is missing"
+    )
+
+
+def _check_change(case: Case, law: Law, kind: str) -> None:
+    """Fail if a quantity changes by more than its law allows, along the flow or at a jump."""
+    arc, start, last = _whole(case), 0.0, -1
+    tolerance = TOLERANCE * _size_on(case, law, arc)
+    for i in _rows(case, law, arc):
+        value = float(case.evaluate(law.function, arc.t[i], arc.x[i])[0])
+        jumps = last >= 0 and arc.j[i] != arc.j[last]
+        # Jumps at once have no rows between them that count.
+        follows = last >= 0 and (last == i - 1 or (jumps and arc.t[last] == arc.t[i]))
+        last = i
+        if not follows or (jumps and kind == "balance"):
+            start = value
+            continue
+        if not jumps and law.flow is not None:
+            start += _integral(case, law, arc, i)
+        if (value - start if kind == "dissipated" else abs(value - start)) > tolerance:
+            where = (
+                f"the reset of {str(arc.jumps.transition[arc.j[i] - 1])!r}"
+                if jumps
+                else f"the field of mode {str(arc.mode[i])!r}"
+            )
+            case.fail(
+                _told(law, kind),
+                f"got {value:.8g} for {start:.8g} {'after a jump' if jumps else 'on the way'}, at "
+                f"t = {arc.t[i]:.8g}, {case.state_told(arc.x[i])}, in mode {str(arc.mode[i])!r}",
+                _before(case, arc, i),
+                hint=f"{where}: a wrong sign or factor, a term that is missing, or a component that is not "
+                "written.",
+                time=arc.t[i],
+            )
+        if kind == "dissipated":
+            start = value
+
+
+def _rows(case: Case, law: Law, arc: HybridArc) -> Iterator[int]:
+    """The rows of a run in the modes of a law; the example is discarded if there are none."""
+    modes = {name: law.holds_in(*case.names_of_mode(name)) for name in map(str, np.unique(arc.mode))}
+    if not any(modes.values()):
+        discard(f"no run was in mode {law.of!r}")
+    lasts = lasting(arc)
+    yield from (i for i in range(min(len(arc.t), MOST_ROWS)) if lasts[i] and modes[str(arc.mode[i])])
+
+
+def _integral(case: Case, law: Law, arc: HybridArc, i: int) -> float:
+    """Integral of the flow of a law over the step that ends at row ``i``."""
+    assert law.flow is not None
+    h = arc.t[i] - arc.t[i - 1]
+    if not h > 0.0:
+        return 0.0
+    times = arc.t[i - 1] + 0.5 * h * (1.0 + GAUSS_NODES)
+    rates = [case.evaluate(law.flow, t, x)[0] for t, x in zip(times, arc(times), strict=True)]
+    return float(0.5 * h * GAUSS_WEIGHTS @ rates)
+
+
+def _check_across(case: Case, law: Law) -> None:
+    """Fail if the rule of a transition does not hold at one of its jumps."""
+    variables, p = case.system.variables, case.system.variables.parameter_view(case.values)
+
+    def rule(t: float, minus: Any, plus: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return np.asarray(law.function(t, variables.state_view(minus), variables.state_view(plus), p))
+
+    scale = np.tile(np.abs(_whole(case).x).max(axis=0), 2)
+    for jump in _jumps_of(case, law.of):
+        found = rule(jump.t, jump.x_minus, jump.x_plus)
+        if found.dtype == bool:
+            holds, got = bool(found.all()), "it does not hold"
+        else:
+            n = len(jump.x_minus)
+            both = np.concatenate([jump.x_minus, jump.x_plus])
+            size = _sizes(lambda x, t=jump.t, n=n: rule(t, x[:n], x[n:]), both, found, scale)  # type: ignore[misc]
+            holds = bool(np.all(np.abs(found) <= TOLERANCE * size))
+            got = f"got {matrix_told(found)}, not zero"
+        if not holds:
+            case.fail(
+                _across_told(law),
+                got,
+                jump_told(case, jump),
+                hint=f"the reset of {jump.transition!r}: a wrong sign or factor, or a component that it does "
+                "not write; or it fires where it should not.",
+                time=jump.t,
+            )
+
+
+def _check_continuous(case: Case, name: str, told: str) -> None:
+    """Fail if the state or the field jumps at a transition."""
+    arc, modes = _whole(case), case.system.modes
+    for jump in _jumps_of(case, name):
+        assert jump.target is not None
+        before, after = (modes[case.system.mode_index(mode)] for mode in (jump.source, jump.target))
+        (fields, sizes) = sized(case, before.field, jump.t, jump.x_minus, arc)
+        (others, more) = sized(case, after.field, jump.t, jump.x_plus, arc)
+        pairs = {
+            "the state": (jump.x_minus, jump.x_plus, np.abs(arc.x).max(axis=0)),
+            "the field": (fields, others, sizes + more),
+        }
+        for what, (minus, plus, size) in pairs.items():
+            wrong = np.abs(plus - minus) > TOLERANCE * size
+            if wrong.any():
+                i = int(np.argmax(wrong))
+                rate = (
+                    f"the rate of {case.system.state_names[i]}"
+                    if what == "the field"
+                    else case.system.state_names[i]
+                )
+                case.fail(
+                    told,
+                    f"{rate} is {minus[i]:.8g} before it, in mode {jump.source!r}, and {plus[i]:.8g} after "
+                    f"it, in mode {jump.target!r}",
+                    jump_told(case, jump),
+                    hint=f"a threshold or an offset that differs between the guard of {jump.transition!r} "
+                    "and the fields that it joins."
+                    if what == "the field"
+                    else f"the reset of {jump.transition!r}.",
+                    time=jump.t,
+                )
+
+
+def _jumps_of(case: Case, name: str | None) -> Iterator[Jump]:
+    """The jumps of a transition on the whole run, without the limits of chatters."""
+    jumps = [jump for jump in _whole(case).jumps if jump.kind != "limit"]
+    found = [jump for jump in jumps if name in case.names_of_transition(jump.transition)]
+    if not found:
+        discard(f"no run took {name!r}")
+    yield from found
+
+
+def _whole(case: Case) -> HybridArc:
     arc = case.whole
     if arc is None:
         discard("no mode allows the start")
-    for t, j, x, mode in zip(arc.t, arc.j, arc.x, arc.mode, strict=True):
-        lands = j > 0 and t == arc.jumps.t[j - 1]
-        yield f"after {str(arc.jumps.transition[j - 1])!r}" if lands else "on the way", str(mode), float(t), x
+    return arc
 
 
-def _value(case: Case, law: Law, t: float, x: Any) -> tuple[float, float]:
-    """The value of a law, and the size of its terms."""
-    value = float(case.evaluate(law.function, t, x)[0])
-    size = abs(value)
-    for i in range(len(x)):
-        aside = np.array(x, dtype=float)
-        aside[i] *= 1.0 + NUDGE
-        size = max(size, abs(float(case.evaluate(law.function, t, aside)[0]) - value) / NUDGE)
-    return value, size
+def _before(case: Case, arc: HybridArc, i: int) -> str:
+    """What happened last before row ``i``."""
+    j = int(arc.j[i])
+    return f"the last jump: {jump_told(case, arc.jumps[j - 1])}" if j > 0 else "before any jump"
+
+
+def _size_on(case: Case, law: Law, arc: HybridArc) -> float:
+    """Size of the terms of a law on a run, in any mode."""
+    rows = np.unique(np.linspace(0, len(arc.t) - 1, ROWS_OF_SIZE).astype(int))
+    return float(max(sized(case, law.function, arc.t[i], arc.x[i], arc)[1][0] for i in rows))
+
+
+def sized(case: Case, function: Any, t: float, x: Any, arc: HybridArc) -> tuple[np.ndarray, np.ndarray]:
+    """Values ``(rows,)`` of a function of ``(t, x, p)``, and the sizes of their terms on a run."""
+    values = case.evaluate(function, t, x)
+    scale = np.abs(arc.x).max(axis=0)
+    return values, _sizes(lambda y: case.evaluate(function, t, y), np.asarray(x, dtype=float), values, scale)
+
+
+def _sizes(
+    function: Callable[[np.ndarray], Any], x: np.ndarray, values: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """Sizes of the terms of a function, to which each component contributes what its size makes."""
+    sizes = np.abs(values)
+    for i in np.flatnonzero(scale):
+        aside = x.copy()
+        aside[i] += NUDGE * scale[i]
+        sizes = np.maximum(sizes, np.abs(function(aside) - values) / NUDGE)
+    return np.asarray(sizes)

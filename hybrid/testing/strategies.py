@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 import numpy as np
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
@@ -15,14 +16,23 @@ from hybrid.errors import ArgumentError
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver
 from hybrid.system.derivatives import evaluate
-from hybrid.system.graph import HybridSystem, as_system, check_mode
+from hybrid.system.graph import HybridSystem, as_system, check_mode, laws_of
 from hybrid.system.labels import named
-from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine, guard_beyond
-from hybrid.testing.laws import as_laws, starts_within
+from hybrid.system.laws import Laws
+from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine
+from hybrid.testing.starts import start_in
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
 Range = tuple[float, float] | float | SearchStrategy[float]
 Ranges = Mapping[str, Range]
+
+# For tests with cases: runs take longer than Hypothesis expects of an example, and its phase that explains a
+# failure runs many more of them.
+run_settings = settings(
+    deadline=None,
+    phases=(Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink),
+    suppress_health_check=(HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much),
+)
 
 # Values lie on a grid of this many steps to either side, so that they print short and shrink to the middle.
 GRID = 500
@@ -75,7 +85,7 @@ def parameters(
         The model.
     ranges
         By name: a range ``(low, high)``, a number to keep the parameter fixed, or a strategy; within a fifth
-        of the declared value by default. Or one strategy of dictionaries.
+        of the declared value by default, and half way to 1 for one below 1. Or one strategy of dictionaries.
 
     Raises
     ------
@@ -94,9 +104,7 @@ def _parameters(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[
     for each in chosen:
         arguments.known(f"{name}: Parameter", each, declared, "Parameters")
     drawn = {
-        each: _values(f"{name}: Range of {each!r}", chosen[each])
-        if each in chosen
-        else _grid(value, 0.2 * abs(value))
+        each: _values(f"{name}: Range of {each!r}", chosen[each]) if each in chosen else _around(value)
         for each, value in declared.items()
     }
     return st.fixed_dictionaries(drawn)
@@ -110,11 +118,13 @@ def cases(
     t_span: tuple[float, float] | None = None,
     mode: str | None = None,
     passable: Iterable[str] = (),
-    invariant: Mapping[str, Any] | None = None,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
+    **options: Any,
 ) -> SearchStrategy[Case]:
     """Runs of a system for the properties, each starting in a mode whose guards allow the start.
+
+    Starts are where the invariants of the system are not negative, and on the surfaces of its ``equal``.
 
     Parameters
     ----------
@@ -129,13 +139,13 @@ def cases(
         Mode to start in; by default any mode that allows the state.
     passable
         Names of transitions whose guard the state may cross and stay in the same mode, as with a membrane.
-    invariant
-        Functions of ``(t, x, p)`` by name, or by mode mappings of names to functions: starts are drawn where
-        they are non-negative.
     solver
         Method and tolerances, which should be tight: a run that depends on them cannot be judged.
     engine
         Computes runs and derivatives.
+    **options
+        Laws beside those that the system carries, by the names of :class:`hybrid.Laws`: ``invariant``,
+        ``equal``, ``conserved``, ``dissipated``, ``balance``, ``continuous``, ``across`` and ``elastic``.
 
     Raises
     ------
@@ -150,29 +160,48 @@ def cases(
         for name in arguments.items("passable", passable, "be names of transitions")
     )
     begin, end = _time_span(t_span) if t_span is not None else (0.0, None)
-    laws = as_laws("invariant", system, invariant)
+    known = all_laws(system, options)
     solver = check_solver(solver)
     arguments.instance("engine", engine, Engine, "Subclass hybrid.testing.Engine.")
 
     @st.composite
     def drawn_case(draw: Any) -> Case:
-        p = draw(values)
-        last = default_duration(system, p) if end is None else end
-        t0 = begin + (last - begin) * draw(st.integers(0, GRID)) / (2 * GRID)
-        duration = (last - t0) * (0.2 + 0.8 * draw(st.integers(0, GRID)) / GRID)
+        begins, lasts = draw(st.integers(0, GRID)) / (2 * GRID), 0.2 + 0.8 * draw(st.integers(0, GRID)) / GRID
         fraction = draw(st.integers(1, 99)) / 100
         choice = draw(st.integers(0, len(system.modes) - 1))
+        names = [
+            each.name
+            for each in (*system.modes[choice:], *system.modes[:choice])
+            if mode in (None, each.name, each.part_of)
+        ]
         for _ in range(STARTS_TRIED):
-            x0 = draw(state)
-            case = Case(system, p, mode, x0, t0, t0 + duration, fraction, through, solver, engine)
-            allowed = [
-                name for name in _allowed(case) if mode in (None, name) and starts_within(laws, case, name)
-            ]
-            if allowed:
-                return attrs.evolve(case, mode=allowed[choice % len(allowed)])
-        return attrs.evolve(case, mode=None)
+            p, x0 = draw(values), draw(state)
+            last = default_duration(system, p) if end is None else end
+            t0 = begin + (last - begin) * begins
+            t1 = t0 + (last - t0) * lasts
+            case = Case(system, p, None, x0, t0, t1, fraction, through, solver, engine, known)
+            for name in names:
+                start = start_in(case, name)
+                if start is not None:
+                    return attrs.evolve(case, mode=name, x0=start)
+        return case
 
     return drawn_case()
+
+
+def all_laws(system: HybridSystem, given: Mapping[str, Any]) -> Laws:
+    """The laws that a system carries, and those given by name to a check.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such kind of law, or a law does not fit the system.
+    """
+    kinds = [field.name for field in attrs.fields(Laws)]
+    for name in given:
+        arguments.known("Argument", name, kinds, "Laws")
+    laws = Laws(**{name: value for name, value in given.items() if value is not None})
+    return laws_of(system, laws)
 
 
 def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float:
@@ -191,16 +220,6 @@ def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float
     return 10.0 * float(np.median(times)) if times else 10.0
 
 
-def _allowed(case: Case) -> list[str]:
-    """Modes that allow the start of a case: it is on or beyond none of their guards."""
-    beyond = {
-        transition.source
-        for transition in case.system.transitions
-        if not guard_beyond(case, transition, case.t0, case.x0) < 0.0
-    }
-    return [name for name in case.system.mode_names if name not in beyond]
-
-
 def _values(name: str, given: Any) -> SearchStrategy[float]:
     if isinstance(given, SearchStrategy):
         return given.map(lambda value: arguments.number(f"{name}: a value drawn", value))
@@ -211,7 +230,8 @@ def _values(name: str, given: Any) -> SearchStrategy[float]:
     if ends.shape != (2,) or not np.isfinite(ends).all() or ends[0] > ends[1]:
         raise arguments.refusal(name, wanted, given)
     low, high = ends.tolist()
-    return _grid(0.5 * (low + high), 0.5 * (high - low))
+    half = 0.5 * (high - low)
+    return _grid(0.5 * (low + high), half, half)
 
 
 def _drawn_state(name: str, n: int, value: Any) -> tuple[float, ...]:
@@ -233,11 +253,24 @@ def _drawn_parameters(name: str, declared: Mapping[str, float], value: Any) -> d
     return {**declared, **{each: arguments.number(f"{name}[{each!r}]", drawn[each]) for each in drawn}}
 
 
-def _grid(centre: float, half: float) -> SearchStrategy[float]:
-    if half == 0.0:
+def _around(value: float) -> SearchStrategy[float]:
+    """Values within a fifth of a declared one. A share, such as a restitution of 0.9, stays a share."""
+    below = above = 0.2 * abs(value)
+    if 0.0 < value < 1.0:
+        above = min(above, 0.5 * (1.0 - value))
+    return _grid(value, below, above)
+
+
+def _grid(centre: float, below: float, above: float) -> SearchStrategy[float]:
+    """Values that reach as far as this below the centre and above it."""
+    if below == 0.0:
         return st.just(centre)
-    digits = 5 - int(np.floor(np.log10(half)))
-    return st.integers(-GRID, GRID).map(lambda i: round(centre + half * i / GRID, digits) if i else centre)
+    digits = 5 - int(np.floor(np.log10(below)))
+
+    def value(i: int) -> float:
+        return round(centre + (above if i > 0 else below) * i / GRID, digits) if i else centre
+
+    return st.integers(-GRID, GRID).map(value)
 
 
 def _time_span(t_span: Any) -> tuple[float, float]:

@@ -13,8 +13,10 @@ from hybrid.solvers import Solver
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
+from hybrid.system.laws import Laws
 from hybrid.system.variables import PARAMETERS, STATE, named_values
-from hybrid.testing.case import Case, as_case, discard
+from hybrid.testing.case import Case, as_case
+from hybrid.testing.errors import discard
 from hybrid.testing.invariance import compare
 from hybrid.testing.variants import free_name
 
@@ -162,5 +164,6 @@ def _measured(system: HybridSystem) -> Measured:
             attrs.evolve(each, guard=guard(each), reset=converted(each)) for each in system.transitions
         ],
         period=None if system.period is None else period,
+        laws=Laws(),
     )
     return Measured(changed, tuple(units.values()), time)

@@ -13,6 +13,7 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
+from hybrid.system.laws import Laws
 from hybrid.system.variables import PARAMETERS, named_values
 
 AGAIN = " (copy)"
@@ -81,6 +82,7 @@ def renamed(system: HybridSystem) -> HybridSystem:
         _RENAMED[system] = attrs.evolve(
             system,
             start=system.start and new_name(system.mode_names, system.start),
+            laws=Laws(),
             modes=[attrs.evolve(mode, name=new_name(system.mode_names, mode.name)) for mode in system.modes],
             transitions=[
                 attrs.evolve(
@@ -149,6 +151,7 @@ def _altered(system: HybridSystem) -> Altered:
             parameters={**system.parameters, **added},
             modes=modes,
             transitions=[*cuts, *transitions],
+            laws=Laws(),
         ),
         stay,
         normal,

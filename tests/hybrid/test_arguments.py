@@ -60,6 +60,7 @@ def table(made):
 # Classes that only the library creates, and errors.
 NOT_CALLED = {
     "PiecewiseAffineField",
+    "run_settings",
     "Status",
     "StatusCode",
     "HybridError",
@@ -108,7 +109,7 @@ def public_functions():
             for name, method in vars(each).items():
                 if inspect.isfunction(method) and (not name.startswith("_") or name == "__call__"):
                     found.append(method)
-    return [each for each in found if each.__name__ not in NOT_CALLED]
+    return [each for each in found if getattr(each, "__name__", "run_settings") not in NOT_CALLED]
 
 
 def arguments_of(function):

@@ -21,6 +21,15 @@ from tests.hybrid.arguments.values import (
     call,
 )
 
+BY_NAME = [3, [3], {"a": 3}, {"a": None}, {3: abs}]
+LAWS = {
+    **dict.fromkeys(("invariant", "equal", "conserved", "dissipated", "across"), BY_NAME),
+    "balance": [*BY_NAME, {"a": abs}, {"a": (abs, 3)}],
+    "continuous": [3, [3], [None]],
+    "elastic": ["nope", 3, ["nope"], [3], [None]],
+}
+OF_SYSTEMS = ("check_system", "check_reads", "check_dimensions")
+
 
 def checks():
     case = hybrid.testing.Case(BALL, dict(BALL.parameters), "flight", (1.0, 0.0), 0.0, 0.3)
@@ -42,16 +51,7 @@ def checks():
                     "solver": SOLVER,
                     "engine": [None, "a", 3, Odd()],
                     "passable": [None, 3, ["nope"], "nope", [3]],
-                    "invariant": [3, [3], {"a": 3}, {"a": None}, {"nope": {"a": abs}}, {3: abs}],
-                    **(
-                        {}
-                        if function is hybrid.testing.cases
-                        else {
-                            "examples": [0, *COUNT],
-                            "conserved": [3, [3], {"a": 3}, {"a": None}, {"nope": {"a": abs}}, {3: abs}],
-                            "elastic": ["nope", 3, ["nope"], [3], [None]],
-                        }
-                    ),
+                    **({} if function is hybrid.testing.cases else {"examples": [0, *COUNT], **LAWS}),
                 },
             )
             for function in (hybrid.testing.cases, hybrid.testing.check_system)
@@ -64,8 +64,11 @@ def checks():
         *(
             (call(getattr(hybrid.testing, name), None), {"case": [None, "a", 3, BALL]})
             for name in hybrid.testing.__all__
-            if name.startswith("check_") and name not in ("check_system", "check_elastic")
+            if name.startswith("check_") and name not in (*OF_SYSTEMS, "check_elastic")
         ),
+        (call(hybrid.Laws.joined, hybrid.Laws(), hybrid.Laws()), {"other": [None, "a", 3, {}, BALL]}),
+        (call(hybrid.Laws), LAWS | {"elastic": ["nope", 3, [3], [None]]}),
+        *((call(getattr(hybrid.testing, name), BALL), {"system": SYSTEM}) for name in OF_SYSTEMS[1:]),
         (
             call(hybrid.testing.check_elastic, case, ["v"]),
             {

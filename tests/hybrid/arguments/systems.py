@@ -40,6 +40,7 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "laws": [*FUNCTION, {}, Odd()],
             },
         ),
         (
@@ -61,6 +62,7 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "laws": [*FUNCTION, {}, Odd()],
             },
         ),
         (
@@ -101,6 +103,7 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "laws": [None, *FUNCTION, {}, Odd()],
                 "notes": [None, "a", 3, [1], [None], Odd()],
                 "growth": [*FUNCTION, {}, HybridSystem, BALL, Odd()],
                 "derived_from": [None, *FUNCTION, {}, HybridSystem, BALL, Odd()],

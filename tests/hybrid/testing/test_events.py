@@ -11,7 +11,6 @@ import hybrid.testing.events as events
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.testing import PropertyError, check_jumps, check_sides
 from hybrid.testing.case import Case
-from models import bouncing_ball
 
 # A crossing at a right angle to time, up and down, and a mode that is left through a guard in time.
 CLOCK = HybridSystem(
@@ -142,66 +141,31 @@ def test_a_guard_that_jumps_itself_fires_where_its_sign_changes():
         assert events._guard_jumps(case, jump) == right
 
 
-class TestSides:
-    """A ball below the ground, by a share of what is allowed between two events."""
+def membrane(guard=lambda t, x, p: x.q):
+    """A mass on a spring that is slowed by a membrane, and goes on beyond it."""
+    return HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("free", lambda t, x, p: (x.v, -x.q))],
+        transitions=[
+            Transition(
+                "free", "free", Guard(guard, -1), Reset(lambda t, x, p: {"v": 0.5 * x.v}), name="membrane"
+            )
+        ],
+    )
 
-    def checked(self, depth, **options):
-        case = case_of(bouncing_ball(), "flight", (1.0, 0.0), 0.3, **options)
-        check_sides(self.below(case, np.array([-depth * 1e-7 * case.run.scale[0], 0.0])))
 
-    @staticmethod
-    def below(case, x):
-        run = case.run
+def test_a_mode_does_not_go_on_beyond_its_guard():
+    case = Case(membrane(), {}, "free", (1.0, 0.0), 0.0, 3.0)
+    assert "guard of 'membrane', which ends mode 'free' where it goes below zero" in told(check_sides, case)
+    with pytest.raises(UnsatisfiedAssumption, match="no guard has a direction"):
+        check_sides(attrs.evolve(case, passable=("membrane",)))
 
-        class Arc:
-            jumps = run.arc.jumps
 
-            def __call__(self, t):
-                return x
-
-        object.__setattr__(case, "run", SimpleNamespace(arc=Arc(), t1=run.t1, scale=run.scale))
-        return case
-
-    def test_beyond_a_guard_by_more_than_rounding(self):
-        self.checked(0.9)
-        with pytest.raises(PropertyError, match="goes below zero"):
-            self.checked(1.1)
-
-    def test_a_guard_that_may_be_passed(self):
-        with pytest.raises(UnsatisfiedAssumption, match="no guard has a direction"):
-            self.checked(1e6, passable=("bounce",))
-
-    def test_a_ground_that_moves_fast(self):
-        """Rounding of the time counts, as a share of the stretch: the ground falls by 1000 per unit."""
-        system = HybridSystem(
-            state=("q", "v"),
-            modes=[Mode("up", lambda t, x, p: (x.v, 0.0))],
-            transitions=[
-                Transition(
-                    "up",
-                    "up",
-                    Guard(lambda t, x, p: x.q + 1000.0 * t, -1),
-                    Reset(lambda t, x, p: (x.q, -x.v)),
-                    name="ground",
-                )
-            ],
-        )
-        case = Case(system, {}, "up", (1.0, 1.0), 0.0, 2.0)
-        allowed = 1e-7 * (case.run.scale[0] + 1000.0 * 2.0)
-
-        class Arc:
-            jumps = case.run.arc.jumps
-
-            def __call__(self, t):
-                return np.array([-1000.0 * t - depth, 1.0])
-
-        run = SimpleNamespace(arc=Arc(), t1=2.0, scale=case.run.scale)
-        object.__setattr__(case, "run", run)
-        depth = 0.9 * allowed
-        check_sides(case)
-        depth = 1.1 * allowed
-        with pytest.raises(PropertyError, match="goes below zero"):
-            check_sides(case)
+def test_a_guard_of_time_alone_is_no_wall():
+    """The clock is negative for half of its period, wherever the state is."""
+    clock = membrane(lambda t, x, p: np.sin(2.0 * t) + 1e-9)
+    with pytest.raises(UnsatisfiedAssumption, match="no guard has a direction"):
+        check_sides(Case(clock, {}, "free", (1.0, 0.0), 0.0, 9.0))
 
 
 @pytest.mark.parametrize("t0", [-7.0, 0.0, 5.0])

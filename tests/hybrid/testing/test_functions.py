@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.testing import Case, functions
+from hybrid import HybridSystem, Mode
+from hybrid.testing import Case, PropertyError, check_system, functions
 
 SWING = hybrid.HybridSystem(
     state=("q", "v"),
@@ -49,3 +50,33 @@ def test_compiled_functions_are_compared_at_the_start(monkeypatch):
     assert asked == [(True, 0, 7.0, [0.5, -1.0], [0.25, 2.0])] * 2
     with pytest.raises(hybrid.testing.PropertyError, match="it is 2, not 3"):
         functions.check_compiled(case)
+
+
+def forced(period, force=lambda t, x, p: np.cos(p.w * t)):
+    return HybridSystem(
+        state=("q", "v"),
+        parameters={"w": 2.0},
+        modes=[Mode("free", lambda t, x, p: (x.v, force(t, x, p) - x.q))],
+        period=period,
+    )
+
+
+@pytest.mark.parametrize(("factor", "part"), [(2, 2), (3, 3), (6, 2)])
+def test_a_part_of_the_period_is_a_period(factor, part):
+    message = rf"every function has the period .*, too\n  likely: a factor {part} in period="
+    with pytest.raises(PropertyError, match=message):
+        check_system(forced(lambda p: factor * 2 * np.pi / p.w), examples=3)
+
+
+def test_a_pulse_needs_its_whole_period():
+    pulse = forced(1.0, lambda t, x, p: np.where(np.mod(t, 1.0) < 0.1, p.w, 0.0))
+    check_system(pulse, examples=3)
+
+
+def test_a_period_of_what_does_not_depend_on_time():
+    with pytest.raises(PropertyError, match="a period is declared, and no function reads t"):
+        check_system(forced(1.0, lambda t, x, p: p.w), examples=3)
+
+
+def test_forcing_without_amplitude_is_no_fault():
+    check_system(forced(lambda p: 4 * np.pi / p.w, lambda t, x, p: 0.0 * np.cos(p.w * t)), examples=3)

@@ -1,13 +1,10 @@
 """What counts as the same run: events, final mode, final state and status."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis.errors import UnsatisfiedAssumption
 
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.status import StatusCode
 from hybrid.testing import PropertyError
 from hybrid.testing.case import Case
 from hybrid.testing.invariance import (
@@ -18,60 +15,9 @@ from hybrid.testing.invariance import (
     check_samples,
     check_scale,
     check_split,
-    compare,
     turned,
 )
 from models import bouncing_ball, stick_slip, vibroimpact
-
-
-def arc_of(fired, x, *, ok=True):
-    """An arc that changes its mode at its end."""
-    code = StatusCode.SUCCESS if ok else StatusCode.MAX_STEPS
-    return SimpleNamespace(
-        jumps=[SimpleNamespace(transition=name) for name in fired],
-        mode=np.array(["flight", "rest"]),
-        x=np.array([[7.0, 7.0], x]),
-        status=SimpleNamespace(ok=ok, code=code),
-    )
-
-
-def fail(property_name, *lines, hint):
-    raise PropertyError("; ".join([property_name, *lines, hint]))
-
-
-def compared(arc, fired, mode):
-    run = SimpleNamespace(arc=arc_of(["a", "b", "a"], [1.0, -2.0]), tolerance=np.array([1e-6, 1e-3]))
-    case = SimpleNamespace(run=run, fail=fail, state_told=lambda x: f"x = {list(map(float, x))}")
-    compare(case, "the property", arc, fired, mode, "the hint")
-
-
-def test_runs_that_differ_within_the_tolerance_and_in_the_order_of_events_are_the_same():
-    for x in ([1.0, -2.0], [1.0 + 0.9e-6, -2.0 - 0.9e-3], [1.0 - 0.9e-6, -2.0 + 0.9e-3]):
-        compared(arc_of([], x), ["b", "a", "a"], "rest")
-
-
-@pytest.mark.parametrize(
-    ("arc", "fired", "mode"),
-    [
-        (arc_of([], [1.0, -2.0]), ["a", "b"], "rest"),
-        (arc_of([], [1.0, -2.0]), ["a", "b", "b"], "rest"),
-        (arc_of([], [1.0, -2.0]), ["a", "b", "a"], "flight"),
-        (arc_of([], [1.0, -2.0], ok=False), ["a", "b", "a"], "rest"),
-        (arc_of([], [1.0 + 1.1e-6, -2.0]), ["a", "b", "a"], "rest"),
-        (arc_of([], [1.0, -2.0 - 1.1e-3]), ["a", "b", "a"], "rest"),
-        (arc_of([], [np.nan, -2.0]), ["a", "b", "a"], "rest"),
-    ],
-)
-def test_each_difference_is_said(arc, fired, mode):
-    with pytest.raises(PropertyError) as caught:
-        compared(arc, fired, mode)
-    assert str(caught.value).split("; ") == [
-        "the property",
-        "wanted x = [1.0, -2.0] in mode 'rest' after a, b, a",
-        f"got x = {list(map(float, arc.x[-1]))} in mode {mode!r} after {', '.join(fired)}",
-        arc.status.code.name,
-        "the hint",
-    ]
 
 
 def test_time_is_reversed_by_name_or_by_a_function():

@@ -6,8 +6,9 @@ import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.testing import Case, PropertyError, check_landings, check_limits
+from hybrid.testing import Case, PropertyError, check_landings, check_limits, check_system
 from hybrid.testing.case import Engine
+from hybrid.testing.landing import LIMITS
 
 
 def wheel(reset):
@@ -79,3 +80,35 @@ def test_the_limit_of_a_chatter_goes_on_as_a_start_there():
     check_limits(case)
     with pytest.raises(PropertyError, match="limit of a chatter"):
         check_limits(attrs.evolve(case, engine=Otherwise()))
+
+
+def resting_ball(rest):
+    return HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("flight", lambda t, x, p: (x.v, -9.81)), Mode("rest", rest)],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, -1),
+                Reset(lambda t, x, p: {"q": 0.0, "v": -0.5 * x.v}),
+                accumulates_to="rest",
+                name="bounce",
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize(
+    ("rest", "what"),
+    [(lambda t, x, p: (x.v, -9.81), "its speed is"), (lambda t, x, p: (-1.0, 0.0), "its value is -")],
+)
+def test_the_mode_of_a_limit_stays_on_the_guard(rest, what):
+    options = {"mode": "flight", "states": {"q": (0.1, 1.0)}, "t_span": (0.0, 5.0), "examples": 10}
+    report = check_system(resting_ball(lambda t, x, p: (0.0, 0.0)), **options)
+    assert next(each for each in report.properties if each.name == LIMITS).examples > 0
+    with pytest.raises(PropertyError) as caught:
+        check_system(resting_ball(rest), **options)
+    message = str(caught.value)
+    assert "mode 'rest', to which the jumps of 'bounce' accumulate, leaves its guard" in message
+    assert what in message

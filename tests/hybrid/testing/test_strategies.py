@@ -1,5 +1,6 @@
 """Ranges from which states, parameters and spans are drawn."""
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import Phase, find, given, settings
@@ -60,10 +61,16 @@ def test_numbers_have_five_digits_after_the_first_of_half_the_range(low, high, s
 
 
 def test_parameters_are_drawn_within_a_fifth_of_what_is_declared():
-    strategy = parameters(BALL_SYSTEM)
-    for name, value in BALL_SYSTEM.parameters.items():
+    strategy = parameters(attrs.evolve(BALL_SYSTEM, parameters={"g": 9.81, "e": 0.5}))
+    for name, value in (("g", 9.81), ("e", 0.5)):
         assert extremes(strategy, lambda drawn, name=name, value=value: (drawn[name] / value - 1.0) / 0.2)
     assert extremes(parameters(BALL_SYSTEM, {"e": (0.0, 0.5)}), lambda drawn: 4.0 * drawn["e"] - 1.0)
+
+
+def test_a_share_stays_a_share():
+    """A restitution of 0.9 is drawn from 0.72 to 0.95: one above 1 would be another law."""
+    strategy = parameters(attrs.evolve(BALL_SYSTEM, parameters={"g": 9.81, "e": 0.9}))
+    assert extremes(strategy, lambda drawn: (drawn["e"] - 0.9) / (0.18 if drawn["e"] < 0.9 else 0.05))
 
 
 @given(cases(BALL_SYSTEM, states={"q": (0.5, 1.0)}, t_span=(3.0, 5.0)))

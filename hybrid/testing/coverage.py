@@ -1,0 +1,217 @@
+"""What the runs of a model reach: its modes, its transitions, and both sides of each condition."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from hybrid.simulation.arc import HybridArc
+from hybrid.status import StatusCode
+from hybrid.system.derivatives import evaluate
+from hybrid.system.elements import Guard, Mode, Transition
+from hybrid.system.graph import HybridSystem
+from hybrid.system.watched import LIBRARY
+from hybrid.testing.case import MOST_OF_WHOLE, Case
+from hybrid.testing.errors import PropertyError
+from hybrid.testing.starts import nearest_zero
+
+FIRES = "Every guard can fire, and no condition refuses every crossing"
+# States are also drawn from the ranges times powers of ten between these.
+WIDER = (-3.0, 3.0)
+# Number of states at which a guard is evaluated that no run has made fire, and from which zeros are sought.
+STATES = 500
+STARTS = 100
+# A condition refuses every crossing if it refuses this many places on the guard, and allows none.
+PLACES = 20
+# A guard is zero at a jump if it is at most this share of its size on the run.
+ON_GUARD = 1e-9
+# How runs end that reach the end of their span, or an end that the model provides.
+AS_MEANT = (StatusCode.SUCCESS, StatusCode.TERMINAL)
+
+
+@attrs.frozen(eq=False)
+class Coverage:
+    """Counts over whole runs, none of which is cut.
+
+    Attributes
+    ----------
+    jumps, visits
+        How often each transition was taken, and each mode entered or started in, by name.
+    refused
+        How often a guard with a condition was crossed in its direction without firing, by name.
+    ends
+        How runs ended before the end of their span, by what is said of it.
+    """
+
+    system: HybridSystem
+    jumps: Counter[str]
+    visits: Counter[str]
+    refused: Counter[str]
+    ends: Counter[str]
+    cases: list[Case] = attrs.field(factory=list)
+
+    @classmethod
+    def of(cls, system: HybridSystem) -> Coverage:
+        """Nothing seen yet of a system."""
+        # A transition at the start corrects the mode of a start, and drawn starts need none.
+        flown = [each for each in system.transitions if not each.guard.at_start]
+        conditional = [each.name for each in flown if each.guard.when is not None and _is_users(each)]
+        zeros = ([each.name for each in flown], system.mode_names, conditional)
+        jumps, visits, refused = (Counter(dict.fromkeys(names, 0)) for names in zeros)
+        return cls(system, jumps, visits, refused, Counter())
+
+    def see(self, case: Case) -> None:
+        """Count the run of a case."""
+        self.cases.append(case)
+        arc = case.whole
+        if arc is None:
+            return
+        self.jumps.update(jump.transition for jump in arc.jumps if jump.kind != "limit")
+        self.visits.update([str(arc.mode[0]), *(jump.target for jump in arc.jumps if jump.target)])
+        for transition in self.system.transitions:
+            if transition.name in self.refused:
+                self.refused[transition.name] += _refusals(case, arc, transition)
+        if arc.status.code == StatusCode.MAX_JUMPS:
+            self.ends[f"after {MOST_OF_WHOLE} jumps (MAX_JUMPS)"] += 1
+        elif arc.status.code not in AS_MEANT:
+            last = f" of {arc.jumps.transition[-1]}" if len(arc.jumps) else ""
+            self.ends[f"with {arc.status.code.name}{last}"] += 1
+
+    @property
+    def never_seen(self) -> tuple[str, ...]:
+        """Transitions that no run took and modes that no run visited."""
+        return tuple(name for count in (self.jumps, self.visits) for name in count if not count[name])
+
+    @property
+    def one_sided(self) -> tuple[str, ...]:
+        """Transitions that were taken, and whose condition has refused no crossing."""
+        return tuple(name for name, refused in self.refused.items() if self.jumps[name] and not refused)
+
+    @property
+    def dead_ends(self) -> tuple[str, ...]:
+        """Modes that no transition leaves although the state moves in them, and modes that none enters."""
+        system = self.system
+        left = {each.source for each in system.transitions}
+        entered = {name for each in system.transitions for name in (each.target, each.accumulates_to)}
+        found = [
+            f"NEVER LEFT: no transition leaves mode {mode.name!r}, in which the state moves."
+            for mode in system.modes
+            if len(system.modes) > 1 and mode.name not in left and self._moves(mode)
+        ]
+        found += [
+            f"NEVER ENTERED: no transition leads to mode {name!r}."
+            for name in system.mode_names
+            if len(system.modes) > 1 and name not in entered and name != system.start
+        ]
+        return tuple(found)
+
+    def _moves(self, mode: Mode) -> bool:
+        variables = self.system.variables
+        places = ((case.t0, np.array(case.x0), case.values) for case in self.cases)
+        found = (evaluate(variables, mode.field, *place) for place in places)
+        return any(rates is not None and rates.any() for rates in found)
+
+    def check(self) -> None:
+        """Fail if the guard of a transition that no run took has one sign, or its condition allows nothing.
+
+        Raises
+        ------
+        PropertyError
+            If there is no place on the guard, among many states in the ranges and far beyond, where the
+            transition could fire.
+        """
+        for transition in self.system.transitions:
+            if not self.jumps[transition.name] and not transition.guard.at_start and _is_users(transition):
+                self._check_guard(transition)
+
+    def _check_guard(self, transition: Transition) -> None:
+        name, guard = transition.name, transition.guard
+        places = list(self._places())
+        sides = {side for case, t, x in places for side in _side(case, guard, t, x)}
+        found = ((case, t, nearest_zero(case, [guard.function], t, x)) for case, t, x in places[:STARTS])
+        zeros = [(case, t, x) for case, t, x in found if x is not None]
+        if len(sides) == 1 and not zeros:
+            told = {1.0: "positive", -1.0: "negative", 0.0: "zero"}[sides.pop()]
+            self._fail(
+                f"guard of {name!r} is {told} at all {len(places)} states that were tried, in the ranges and "
+                "far beyond",
+                f"a wrong sign, or a wrong threshold, in the guard of {name!r}: it never crosses zero.",
+            )
+        if guard.when is None:
+            return
+        allowed = [answer for place in zeros for answer in _answers(transition, *place)]
+        if len(allowed) >= PLACES and not any(allowed):
+            self._fail(
+                f"condition of {name!r} refuses the crossing of its guard at all {len(allowed)} places that "
+                "were tried, in the ranges and far beyond",
+                f"a wrong sign in the condition of {name!r}, or the wrong direction of its guard.",
+            )
+
+    def _places(self) -> Iterator[tuple[Case, float, np.ndarray]]:
+        """Times and states in the ranges and far beyond."""
+        rng = np.random.default_rng(20240507)
+        for i in range(STATES if self.cases else 0):
+            case = self.cases[i % len(self.cases)]
+            x, t = np.array(case.x0), rng.uniform() * (case.t1 - case.t0)
+            if i >= len(self.cases):
+                x *= 10.0 ** rng.uniform(*WIDER, x.shape) * rng.choice([-1.0, 1.0], x.shape)
+                t *= 10.0 ** rng.uniform(*WIDER) * rng.choice([-1.0, 1.0])
+            yield case, case.t0 + t, x
+
+    def _fail(self, line: str, hint: str) -> None:
+        name = self.system.name or "the system"
+        raise PropertyError(
+            f"{FIRES}: this does not hold for {name}.\n  {line}; no run took it\n  likely: {hint}"
+        )
+
+
+def _side(case: Case, guard: Guard, t: float, x: np.ndarray) -> list[float]:
+    """The sign of a guard, or nothing where it has no value."""
+    values = evaluate(case.system.variables, guard.function, t, x, case.values)
+    return [] if values is None else [float(np.sign(values[0]))]
+
+
+def _answers(transition: Transition, case: Case, t: float, x: np.ndarray) -> list[bool]:
+    """Whether the condition holds at a place on the guard; nothing if the flow does not cross it so."""
+    guard, mode = transition.guard, case.mode_of(transition.source)
+    variables, values = case.system.variables, case.values
+    rates = evaluate(variables, mode.field, t, x, values)
+    allowed = evaluate(variables, guard.when, t, x, values)
+    if rates is None or allowed is None:
+        return []
+    moment = 1e-6 * (case.t1 - case.t0)
+    sides = [side for h in (-moment, moment) for side in _side(case, guard, t + h, x + h * rates)]
+    crosses = len(sides) == 2 and sides[0] * sides[1] < 0.0 and guard.direction in (0, sides[1])
+    return [bool(allowed[0] > 0.0)] if crosses else []
+
+
+def _refusals(case: Case, arc: HybridArc, transition: Transition) -> int:
+    """How often a guard changes sign in its direction between two rows of one stay, without an event."""
+    guard, sides = transition.guard, np.zeros(len(arc.t))
+    for i in np.flatnonzero(arc.mode == transition.source):
+        sides[i] = sum(_side(case, guard, arc.t[i], arc.x[i]))
+    # A stay ends on a guard, by rounding on either side of it.
+    ends = np.append(arc.j[1:] != arc.j[:-1], False)
+    sides[ends] = 0.0
+    crossed = (arc.j[1:] == arc.j[:-1]) & (sides[1:] * sides[:-1] < 0.0)
+    refused = int(np.sum(crossed & ((guard.direction == 0) | (sides[1:] == guard.direction))))
+    # Of two guards with opposite conditions one fires where the other refuses.
+    others = [
+        each for each in arc.jumps if each.source == transition.source and each.transition != transition.name
+    ]
+    values = [
+        evaluate(case.system.variables, guard.function, each.t, each.x_minus, case.values) for each in others
+    ]
+    on_guard = ON_GUARD * case.guard_size(transition)
+    return refused + sum(value is not None and abs(value[0]) <= on_guard for value in values)
+
+
+def _is_users(transition: Transition) -> bool:
+    """Whether guard and condition are the user's own: those that the library derives may be idle."""
+    functions = [each for each in (transition.guard.function, transition.guard.when) if each is not None]
+    codes = [getattr(each, "__code__", getattr(type(each).__call__, "__code__", None)) for each in functions]
+    return not any(code is not None and Path(code.co_filename).is_relative_to(LIBRARY) for code in codes)

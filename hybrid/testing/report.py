@@ -1,0 +1,151 @@
+"""What a check of a system found: what matters first, then what holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import attrs
+
+# A property is reported as hardly checked if less than this share of its examples could be judged.
+HARDLY = 0.1
+# Reasons told of each kind, the most frequent ones.
+MOST_TOLD = 3
+
+
+@attrs.frozen
+class PropertyReport:
+    """Result for one property.
+
+    Attributes
+    ----------
+    name
+        The property, as a sentence.
+    examples
+        Number of examples on which the property was checked and held.
+    discarded
+        Number of examples that could not be judged, by reason.
+    """
+
+    name: str
+    examples: int
+    discarded: Counter[str]
+
+    @property
+    def checked(self) -> bool:
+        """Whether the property was checked on any example."""
+        return self.examples > 0
+
+    @property
+    def hardly(self) -> bool:
+        """Whether it was checked on few of its examples."""
+        return self.checked and self.examples < HARDLY * (self.examples + self.discarded.total())
+
+    def __str__(self) -> str:
+        if not self.checked:
+            return f"{self.name} ({_most_common(self.discarded)})"
+        lost = f", {self.discarded.total()} not ({_most_common(self.discarded)})" if self.discarded else ""
+        return f"{self.name}: held on {self.examples} examples{lost}"
+
+
+@attrs.frozen
+class SystemReport:
+    """What :func:`check_system` checked; every property held.
+
+    Attributes
+    ----------
+    properties
+        One :class:`PropertyReport` per property.
+    unfit
+        Number of runs that could not be judged, by reason; only the laws and the model functions were checked
+        on them.
+    cut
+        Number of runs of which only a part was judged, by reason.
+    ends
+        Number of runs that ended before their time, by how they ended.
+    jumps
+        How often each transition was taken, by name, on whole runs.
+    visits
+        How often each mode was entered or started in, by name.
+    one_sided
+        Transitions that were taken, and whose condition has refused no crossing.
+    dead_ends
+        Modes that no transition leaves although the state moves in them, and modes that none enters.
+    numbers
+        Numbers that the model functions read from modules and closures, by name.
+    discontinuities
+        Where the field of a mode is discontinuous, by mode: tangent vectors are not valid beyond.
+    """
+
+    name: str
+    properties: tuple[PropertyReport, ...]
+    unfit: Counter[str]
+    cut: Counter[str]
+    ends: Counter[str]
+    jumps: Counter[str]
+    visits: Counter[str]
+    one_sided: tuple[str, ...]
+    dead_ends: tuple[str, ...]
+    numbers: Mapping[str, float]
+    discontinuities: Mapping[str, str]
+
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Properties that were checked on no example."""
+        return tuple(found.name for found in self.properties if not found.checked)
+
+    @property
+    def never_seen(self) -> tuple[str, ...]:
+        """Transitions that no run took and modes that no run visited."""
+        return tuple(name for count in (self.jumps, self.visits) for name in count if not count[name])
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: no property failed.", *self._matters()]
+        held = [found for found in self.properties if found.checked and not found.hardly]
+        most = max((found.examples for found in held), default=0)
+        names = [f"{found.name} ({found.examples})" if found.discarded else found.name for found in held]
+        lines.append(f"- Holds on {most} examples, or as many as are given: {'; '.join(names)}.")
+        return "\n".join(lines)
+
+    def _matters(self) -> list[str]:
+        lines = []
+        if self.never_seen:
+            lines.append(f"- NEVER SEEN: {', '.join(self.never_seen)}. Give ranges that reach them.")
+        lines += [f"- {dead_end}" for dead_end in self.dead_ends]
+        if self.one_sided:
+            lines.append(
+                f"- ONE SIDE ONLY: the condition of {', '.join(self.one_sided)} has refused no crossing. "
+                "Give ranges where it does not hold."
+            )
+        if self.unfit:
+            lines.append(f"- NOT JUDGED: {_reasons(self.unfit)}. Laws and functions were checked there.")
+        if self.ends:
+            lines.append(f"- ENDED EARLY: {_reasons(self.ends)}.")
+        if self.cut:
+            lines.append(f"- CUT, for all but laws and ends: {_reasons(self.cut)}.")
+        lines += [f"- HARDLY CHECKED: {found}." for found in self.properties if found.hardly]
+        unchecked = [str(found) for found in self.properties if not found.checked]
+        if unchecked:
+            lines.append(f"- NOT CHECKED: {'; '.join(unchecked)}.")
+        for mode, jumps in self.discontinuities.items():
+            lines.append(
+                f"- The field of mode {mode!r} jumps where {jumps}: tangent vectors are not valid beyond. "
+                "Make its pieces modes joined by guards there."
+            )
+        if self.numbers:
+            told = ", ".join(f"{name} = {value:.6g}" for name, value in self.numbers.items())
+            lines.append(f"- Read from outside the model, and never varied: {told}.")
+        return lines
+
+
+def _most_common(reasons: Counter[str]) -> str:
+    reason, most = reasons.most_common(1)[0]
+    share = "" if most == reasons.total() else f"{most} of them: "
+    return f"{share}{reason.rstrip('.')}"
+
+
+def _reasons(reasons: Counter[str]) -> str:
+    """Counts with their reasons, the most frequent first."""
+    told = [f"{count} runs ({reason.rstrip('.')})" for reason, count in reasons.most_common(MOST_TOLD)]
+    others = reasons.total() - sum(count for _, count in reasons.most_common(MOST_TOLD))
+    return ", ".join([*told, *([f"{others} others"] if others else [])])

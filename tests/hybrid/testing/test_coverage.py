@@ -1,0 +1,93 @@
+"""What runs reach: guards that cannot fire, conditions that refuse everything, modes that are dead ends."""
+
+import attrs
+import numpy as np
+import pytest
+
+import models
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.testing import PropertyError, check_system
+
+FLIGHT = Mode("flight", lambda t, x, p: (x.v, -9.81))
+NEAR = {"states": {"q": (0.0, 1.0)}, "t_span": (0.0, 1.0), "examples": 10}
+
+
+def ball(guard, *, reset=lambda t, x, p: {"v": -0.5 * x.v}, when=None, modes=(), transitions=()):
+    hit = Transition("flight", "flight", Guard(guard, -1, when=when), Reset(reset), name="hit")
+    return HybridSystem(
+        state=("q", "v"), modes=[FLIGHT, *modes], transitions=[hit, *transitions], name="ball"
+    )
+
+
+@pytest.mark.parametrize(
+    ("guard", "told"),
+    [(lambda t, x, p: x.q**2 + 1.0, "positive"), (lambda t, x, p: -np.exp(x.q) - 1e-3, "negative")],
+)
+def test_a_guard_that_never_crosses_zero(guard, told):
+    with pytest.raises(PropertyError, match=f"guard of 'hit' is {told} at all 500 states that were tried"):
+        check_system(ball(guard), **NEAR)
+
+
+def test_a_condition_that_refuses_every_crossing():
+    """The guard falls only while the velocity is negative, which the condition excludes."""
+    faulty = ball(lambda t, x, p: x.q, when=lambda t, x, p: x.v > 0.0)
+    with pytest.raises(PropertyError, match="condition of 'hit' refuses the crossing of its guard at all"):
+        check_system(faulty, **NEAR)
+
+
+def test_both_sides_of_a_condition():
+    """A hole in the floor: to the left of 0 the ball falls through."""
+    holed = HybridSystem(
+        state=("q", "v", "x"),
+        modes=[Mode("flight", lambda t, x, p: (x.v, -9.81, 0.0))],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, -1, when=lambda t, x, p: x.x > 0.0),
+                Reset(lambda t, x, p: {"q": 0.0, "v": -0.5 * x.v}),
+                name="floor",
+            )
+        ],
+    )
+    fall = {"t_span": (0.0, 2.0), "examples": 20}
+    report = check_system(holed, states={"q": 0.1, "v": 0.0}, **fall)
+    assert report.jumps["floor"] > 0
+    assert report.one_sided == ()
+    right = check_system(holed, states={"q": 0.1, "v": 0.0, "x": (0.5, 1.0)}, **fall)
+    assert right.one_sided == ("floor",)
+    assert "ONE SIDE ONLY: the condition of floor has refused no crossing" in str(right)
+
+
+def test_what_the_ranges_do_not_reach_is_told_first():
+    """A clock that strikes at t = 100, and a disk that few states are in, can fire."""
+    for guard in (lambda t, x, p: 100.0 - t, lambda t, x, p: np.hypot(x.q - 50.0, x.v) - 0.1):
+        report = check_system(ball(guard), **NEAR)
+        assert report.never_seen == ("hit",)
+        assert str(report).splitlines()[1] == "- NEVER SEEN: hit. Give ranges that reach them."
+
+
+def test_modes_that_nothing_leaves_or_enters():
+    land = Transition("flight", "roll", Guard(lambda t, x, p: x.v, -1, when=lambda t, x, p: x.q > 0.5))
+    start = Transition("launch", "flight", Guard(lambda t, x, p: x.v + 1.0, +1))
+    modes = [Mode("roll", lambda t, x, p: (x.v, 0.0)), Mode("launch", lambda t, x, p: (x.v, 1.0))]
+    report = check_system(ball(lambda t, x, p: x.q, modes=modes, transitions=[land, start]), **NEAR)
+    assert "- NEVER LEFT: no transition leaves mode 'roll', in which the state moves." in str(report)
+    assert "- NEVER ENTERED: no transition leads to mode 'launch'." in str(report)
+
+
+def test_a_mode_at_rest_is_no_dead_end():
+    rest = Mode("rest", lambda t, x, p: (0.0, 0.0))
+    (hit,) = ball(lambda t, x, p: x.q).transitions
+    hit = attrs.evolve(hit, accumulates_to="rest")
+    system = HybridSystem(state=("q", "v"), modes=[FLIGHT, rest], transitions=[hit])
+    assert check_system(system, **NEAR | {"t_span": (0.0, 3.0)}).dead_ends == ()
+
+
+def test_runs_that_end_early_are_counted():
+    report = check_system(models.bouncing_ball(), states={"q": (0.1, 0.5)}, t_span=(0.0, 9.0), examples=10)
+    assert report.ends == {"with ACCUMULATION of bounce": report.ends.total()}
+    assert report.ends.total() > 0
+    assert "ENDED EARLY: " in str(report)
+    assert report.cut["it has more than 5 jumps"] > 0
+    assert "CUT, for all but laws and ends: " in str(report)
