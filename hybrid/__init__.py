@@ -15,7 +15,8 @@ from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section
-from hybrid.simulation.arc import Grazing, HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Grazing, Jump
 from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Solver, Taylor, Tsit5

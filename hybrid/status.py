@@ -219,3 +219,13 @@ def steep_status(where: str, powers: Mapping[str, str], *, inside: bool) -> Stat
         "tangent vectors there, and results computed from them are not valid.",
         f"{remedy} Runs without tangent vectors are not affected.",
     )
+
+
+def apart_status(jumps: int, others: int) -> Status:
+    """Status of a run whose derivatives come from a run with other jumps."""
+    return Status(
+        StatusCode.INDISTINCT_TANGENTS,
+        f"The run with derivatives makes {others} jumps where the run itself makes {jumps}: the tolerances "
+        "decide, so the derivatives are not those of this run.",
+        "Tighten the tolerances, or end the run before the shallow crossing.",
+    )

@@ -50,7 +50,10 @@ DEFAULTS = {
         "elastic": None,
     },
     hybrid.global_error: {**RUN, "max_jumps": 100_000},
-    hybrid.simulate: {**RUN, "tangent": None, "samples": None, "keep_jumps": None, "max_jumps": 100_000},
+    hybrid.simulate: {
+        **{**RUN, "tangent": None, "samples": None, "keep_jumps": None, "max_jumps": 100_000},
+        "sensitivities": (),
+    },
     hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None, "progress": None},
     hybrid.periodic_orbit: {
         **RUN,
@@ -128,7 +131,7 @@ def test_defaults_of_work_precision():
 def test_every_public_call_is_listed():
     listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
     # Bases, errors and results are made by the library.
-    made = {"Solver", "Status", "StatusCode", "TwoOrbitExponents"}
+    made = {"HybridArc", "Solver", "Status", "StatusCode", "TwoOrbitExponents"}
     for package in (hybrid, lyapunov):
         for name in package.__all__:
             each = getattr(package, name)

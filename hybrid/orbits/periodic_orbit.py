@@ -17,9 +17,10 @@ from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.orbits.rest import EPSILON, drift
-from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.jumps import Jump
 from hybrid.simulation.periods import split_time
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate

@@ -19,7 +19,8 @@ from hybrid.plot.jumps import plot_global_error, plot_jumps
 from hybrid.plot.orbits import plot_orbit, plot_section
 from hybrid.plot.style import COLOURS
 from hybrid.plot.work_precision import plot_work_precision
-from hybrid.simulation.arc import HybridArc, Jumps
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jumps
 from hybrid.system.graph import HybridSystem
 
 __all__ = [

@@ -9,7 +9,8 @@ import numpy as np
 from hybrid import arguments
 from hybrid.display.tables import with_unit
 from hybrid.plot.style import COLOURS, Rows, axes_for, colour_of, mark, plain, small_legend
-from hybrid.simulation.arc import HybridArc, Jumps
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jumps
 from hybrid.simulation.labelled import Names
 
 if TYPE_CHECKING:

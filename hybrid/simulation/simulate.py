@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -13,10 +13,12 @@ from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
-from hybrid.simulation.arc import Grazing, HybridArc, Jumps, Pieces, hybrid_points, join
+from hybrid.simulation.arc import HybridArc, Pieces, hybrid_points, join
 from hybrid.simulation.ending import status_of
+from hybrid.simulation.jumps import Grazing, Jumps
 from hybrid.simulation.memory import empty_record, memory_for_records, record_layout
 from hybrid.simulation.periods import check_time
+from hybrid.simulation.sensitivity import with_sensitivities
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import StatusCode
@@ -41,6 +43,7 @@ def simulate(
     samples: ArrayLike | None = None,
     keep_jumps: bool | None = None,
     max_jumps: int = 100_000,
+    sensitivities: Iterable[str] = (),
 ) -> HybridArc:
     """Solve a hybrid system from ``x0`` over ``t_span``.
 
@@ -72,6 +75,9 @@ def simulate(
         ``arc.jump_count`` is their number in any case.
     max_jumps
         The run ends with a status at this many jumps.
+    sensitivities
+        Names of parameters: the arc then has the derivatives of its end, its samples and the times of its
+        jumps in these parameters and in the start, at fixed times; see :class:`HybridArc`.
 
     Returns
     -------
@@ -102,6 +108,7 @@ def simulate(
         raise ArgumentError(
             "keep_jumps=False needs samples=: the points of an arc are made of its jumps too."
         )
+    names = _parameter_names(system, sensitivities)
     trajectory = start(
         system,
         x0,
@@ -114,9 +121,24 @@ def simulate(
         horizon=t1 - t0,
     )
     check_time("t_span", t1, trajectory.model.period)
+    first, begin = trajectory.mode, trajectory.x
     arc = _Recorder(trajectory, times, t1, bool(keep_jumps)).run(t1, most)
     trajectory.release()
-    return arc
+    if not names:
+        return arc
+    return with_sensitivities(
+        arc, names, begin, first, (t0, t1), solver=solver, max_jumps=most, samples=times, simulate=simulate
+    )
+
+
+def _parameter_names(system: HybridSystem, given: Any) -> tuple[str, ...]:
+    names = arguments.items("sensitivities", given, "be names of parameters")
+    for name in names:
+        arguments.known("sensitivities: Parameter", name, system.parameters, "Parameters")
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ArgumentError(f"sensitivities: {twice[0]!r} is given twice. Give each name once.")
+    return tuple(names)
 
 
 def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
@@ -206,7 +228,7 @@ class _Recorder:
         if not self.keeps_jumps:
             return None
         model = self.trajectory.model
-        columns = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
+        columns: Any = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
         return Jumps(self.trajectory.system, model.parameters, model.period, *columns)
 
     def _advance(self, t1: float, max_jumps: int) -> int:

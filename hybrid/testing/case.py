@@ -13,7 +13,8 @@ from hybrid import arguments
 from hybrid.compiler.agreement import compiled_value
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
-from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump
 from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, Solver

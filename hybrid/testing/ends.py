@@ -7,7 +7,8 @@ from itertools import zip_longest
 import attrs
 import numpy as np
 
-from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump
 from hybrid.status import StatusCode
 from hybrid.testing.case import Case, as_case, guard_beyond, jump_told
 from hybrid.testing.errors import discard

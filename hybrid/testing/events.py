@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.simulation.arc import Jump
+from hybrid.simulation.jumps import Jump
 from hybrid.system.functions import guard_function
 from hybrid.testing.case import Case, as_case, guard_beyond, jump_told, lasting, mode_after
 from hybrid.testing.errors import discard

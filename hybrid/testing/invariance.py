@@ -10,7 +10,8 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
-from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump
 from hybrid.system.graph import HybridSystem
 from hybrid.testing.case import Case, Run, as_case, matrix_told, mode_after
 from hybrid.testing.errors import discard

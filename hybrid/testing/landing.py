@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.errors import ModelError
-from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump
 from hybrid.testing.case import Case, as_case, jump_told
 from hybrid.testing.errors import discard
 

@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 from hypothesis.errors import UnsatisfiedAssumption
 
-from hybrid.simulation.arc import HybridArc, Jump
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump
 from hybrid.system.laws import Law, Laws
 from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
 from hybrid.testing.errors import PropertyError, discard

@@ -6,7 +6,7 @@ import numpy as np
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.simulation.arc import Jump
+from hybrid.simulation.jumps import Jump
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.testing.case import Case, as_case, jump_told, matrix_told, mode_after
 from hybrid.testing.errors import discard

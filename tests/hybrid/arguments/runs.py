@@ -53,6 +53,7 @@ def runs(made):
                 # Without samples an arc needs its jumps.
                 "keep_jumps": [*FLAG[1:], False],
                 "max_jumps": COUNT,
+                "sensitivities": [None, 3, "k", ["nope"], [3], [None], ["k", "k"]],
             },
         ),
         (

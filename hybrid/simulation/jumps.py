@@ -1,0 +1,294 @@
+"""Jumps and touches of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from html import escape
+from typing import TYPE_CHECKING, Protocol, overload
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.compiler.compiled import compile_system
+from hybrid.display.tables import counted, html_table
+from hybrid.errors import ArgumentError
+from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.saltation import matrices_at
+from hybrid.system.elements import END
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
+
+# In the order of the kernel's codes.
+KINDS = ("transverse", "grazing", "limit")
+# Jumps that a notebook shows.
+MOST_SHOWN = 20
+
+
+@attrs.frozen(eq=False)
+class Jump:
+    """One fired transition at hybrid time ``(t, j)``.
+
+    Attributes
+    ----------
+    t, j
+        Time, and the number of jumps before this one.
+    transition, source, target
+        Names of the transition and of the modes before and after; ``target`` is None where it ended the run.
+    x_minus, x_plus
+        States ``(n,)`` before and after.
+    transversality
+        ``D_t g + D_x g f_minus``, the guard's speed at the crossing; near zero the crossing grazes and the
+        saltation matrix grows without bound, unless the jump was set off by another.
+    kind
+        ``"transverse"``, ``"grazing"`` for a crossing so shallow that the tolerances cannot tell it from a
+        touch, ``"limit"`` for the end of a chatter.
+    """
+
+    t: float
+    j: int
+    transition: str
+    source: str
+    target: str | None
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+    transversality: float
+    kind: str
+    _all: Jumps = attrs.field(repr=False)
+
+    @property
+    def saltation(self) -> np.ndarray:
+        """Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
+
+        If a jump triggers others at the same instant, by landing beyond their guards, all of them happen at
+        the time of its own guard. The product of the matrices is the tangent map of all these jumps, provided
+        that the matrices before the last one can be inverted.
+        """
+        return self._all.saltation[self.j]
+
+
+@attrs.frozen(eq=False)
+class Grazing:
+    """A touch: a guard that comes so close to zero that the tolerances cannot tell the sides, and turns back.
+
+    Attributes
+    ----------
+    t, j
+        Time, and the number of jumps before.
+    transition
+        Name of the transition that did not fire.
+    x
+        State ``(n,)``.
+    value, acceleration
+        The guard and its second derivative along the flow there; its speed is zero.
+    """
+
+    t: float
+    j: int
+    transition: str
+    x: np.ndarray
+    value: float
+    acceleration: float
+
+
+class Sensitivities(Protocol):
+    """What knows the derivatives of a run: `hybrid.simulation.sensitivity`."""
+
+    @property
+    def samples(self) -> np.ndarray | None:
+        """Times of the samples, if there are any."""
+        ...
+
+    @property
+    def end(self) -> np.ndarray:
+        """Derivatives ``(n, m)`` of the last state in the parameters."""
+        ...
+
+    @property
+    def sampled(self) -> np.ndarray:
+        """Derivatives ``(N, n, n + m)`` of the samples in the start and in the parameters."""
+        ...
+
+    @property
+    def times(self) -> np.ndarray:
+        """Derivatives ``(jumps, n + m)`` of the times of jumps."""
+        ...
+
+
+def known(sensitivities: Sensitivities | None) -> Sensitivities:
+    """The derivatives of a run, or an ArgumentError if it has none."""
+    if sensitivities is None:
+        raise ArgumentError("This run has no derivatives in parameters. Run simulate with sensitivities=.")
+    return sensitivities
+
+
+@attrs.frozen(eq=False, repr=False)
+class Jumps(Sequence[Jump]):
+    """The jumps of an arc in order; ``jumps["impact"]`` are those of one transition, or of all its copies.
+
+    Each :class:`Jump` is made when it is looked at; the arrays hold all of them.
+
+    Attributes
+    ----------
+    transversality
+        As in :class:`Jump`, ``(jumps,)``.
+    """
+
+    system: HybridSystem
+    _parameters: np.ndarray
+    _period: float
+    _phase: np.ndarray
+    _cycle: np.ndarray
+    _transition: np.ndarray
+    transversality: np.ndarray
+    _kind: np.ndarray
+    _has_matrix: np.ndarray
+    _states: np.ndarray
+    _recorded: np.ndarray
+    _sensitivities: Sensitivities | None = None
+
+    @property
+    def t_sensitivity(self) -> np.ndarray:
+        """Derivatives ``(jumps, m)`` of the times in the parameters that ``sensitivities=`` names.
+
+        Each is ``-(D_x g X + D_p g) / (D_t g + D_x g f)`` with the derivatives ``X`` of the state before the
+        jump; nan for the limit of a chatter.
+
+        Raises
+        ------
+        ArgumentError
+            If the run had no ``sensitivities``.
+        """
+        return known(self._sensitivities).times[:, self._states.shape[2] :]
+
+    @property
+    def t_gradient(self) -> np.ndarray:
+        """Derivatives ``(jumps, n)`` of the times in the start; as ``t_sensitivity``."""
+        return known(self._sensitivities).times[:, : self._states.shape[2]]
+
+    @cached_property
+    def t(self) -> np.ndarray:
+        """Times ``(jumps,)``."""
+        return self._cycle * self._period + self._phase
+
+    @property
+    def transition_index(self) -> np.ndarray:
+        """Indices ``(jumps,)`` of the transitions in the system."""
+        return self._transition
+
+    @cached_property
+    def transition(self) -> np.ndarray:
+        """Names of the transitions, ``(jumps,)``."""
+        return np.array(self.system.transition_names, dtype=str)[self.transition_index]
+
+    @cached_property
+    def kind(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps,)``."""
+        return np.array(KINDS)[self._kind]
+
+    @property
+    def x_minus(self) -> np.ndarray:
+        """States before the jumps, ``(jumps, n)``."""
+        return self._states[:, 0]
+
+    @property
+    def x_plus(self) -> np.ndarray:
+        """States after the jumps, ``(jumps, n)``."""
+        return self._states[:, 1]
+
+    @cached_property
+    def saltation(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
+        missing = np.flatnonzero(self._has_matrix == 0)
+        if not missing.size:
+            return self._recorded
+        fired, phases = self.transition_index[missing].tolist(), self._phase[missing].tolist()
+        parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
+        model = compile_system(self.system).model(parameters)
+        matrices = np.empty((len(self), *self._recorded.shape[1:]))
+        matrices[self._has_matrix == 1] = self._recorded
+        matrices[missing], _ = matrices_at(
+            self.system, model, fired, phases, np.ascontiguousarray(self.x_minus[missing])
+        )
+        return matrices
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The jumps over the axis ``jump``: times, transitions, kinds, states before and after."""
+        import xarray
+
+        names = Names(self.system.state_names, self.system.units)
+        variables = {
+            "t": ("jump", self.t, names.of("t")),
+            "transition": ("jump", self.transition),
+            "kind": ("jump", self.kind),
+            "x_minus": (("jump", "state"), self.x_minus, names.states),
+            "x_plus": (("jump", "state"), self.x_plus, names.states),
+            "transversality": ("jump", self.transversality),
+        }
+        return xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
+
+    def __len__(self) -> int:
+        return len(self._phase)
+
+    def __repr__(self) -> str:
+        return f"<{counted(len(self), 'jump')}>"
+
+    def _repr_html_(self) -> str:
+        """The first jumps as a table for a notebook."""
+        names = ("t", "transition", "from", "to", "kind", "transversality")
+        rows = [
+            [
+                f"{jump.t:.9g}",
+                jump.transition,
+                jump.source,
+                END if jump.target is None else jump.target,
+                jump.kind,
+                f"{jump.transversality:.6g}",
+            ]
+            for jump in self[:MOST_SHOWN]
+        ]
+        left = len(self) - len(rows)
+        more = f"\n<p>and {left} more</p>" if left else ""
+        return f"<p>{escape(repr(self))}</p>\n{html_table(names, rows)}{more}"
+
+    @overload
+    def __getitem__(self, index: int) -> Jump: ...
+    @overload
+    def __getitem__(self, index: slice | str) -> list[Jump]: ...
+    def __getitem__(self, index: int | slice | str) -> Jump | list[Jump]:
+        if isinstance(index, str):
+            fired = np.isin(self.transition_index, self.system.copies_of(index))
+            return [self._jump(i) for i in np.flatnonzero(fired).tolist()]
+        if isinstance(index, slice):
+            return [self._jump(i) for i in range(*index.indices(len(self)))]
+        whole = arguments.whole_number(index)
+        if whole is None:
+            raise arguments.refusal(
+                "jumps: the index", "be a whole number, a slice or the name of a transition", index
+            )
+        if not -len(self) <= whole < len(self):
+            raise IndexError(f"jump {whole} of an arc with {len(self)} jumps")
+        return self._jump(whole % len(self))
+
+    def __iter__(self) -> Iterator[Jump]:
+        return (self._jump(i) for i in range(len(self)))
+
+    def _jump(self, i: int) -> Jump:
+        transition = self.system.transitions[self.transition_index[i]]
+        kind = KINDS[self._kind[i]]
+        target = transition.accumulates_to if kind == "limit" else transition.target
+        return Jump(
+            float(self.t[i]),
+            i,
+            transition.name,
+            transition.source,
+            target or transition.target,
+            self.x_minus[i],
+            self.x_plus[i],
+            float(self.transversality[i]),
+            kind,
+            self,
+        )

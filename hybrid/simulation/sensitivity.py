@@ -1,0 +1,162 @@
+"""Derivatives of a run in its start and in parameters: of the end, of samples, and of the times of jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from weakref import WeakKeyDictionary
+
+import attrs
+import numpy as np
+
+from hybrid.compiler.compiled import compile_system
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump, Jumps
+from hybrid.simulation.trajectory import start
+from hybrid.solvers import Solver
+from hybrid.status import apart_status
+from hybrid.system.functions import guard_function
+from hybrid.system.graph import HybridSystem
+from hybrid.transform.extended import extended
+
+_ALONE: WeakKeyDictionary[HybridSystem, dict[int, HybridSystem]] = WeakKeyDictionary()
+
+
+@attrs.frozen(eq=False)
+class Sensitivities:
+    """Derivatives of one run, at fixed times, in the start ``(n)`` and in parameters ``(m)``.
+
+    The parameters are carried as components of the state that do not move, so that fields, guards and resets
+    which depend on them, and the saltation matrices of their jumps, need no rule of their own.
+
+    Attributes
+    ----------
+    names
+        Names of the parameters.
+    arc
+        The run of the extended system.
+    jumps
+        The jumps of the run itself, if they were kept.
+    """
+
+    names: tuple[str, ...]
+    arc: HybridArc
+    jumps: Jumps | None
+    dimension: int
+    x0: np.ndarray
+    mode: str
+    t0: float
+    samples: np.ndarray | None
+    solver: Solver | None
+    simulate: Callable[..., HybridArc]
+
+    @property
+    def end(self) -> np.ndarray:
+        """Derivatives ``(n, m)`` of the last state in the parameters."""
+        assert self.arc.fundamental is not None
+        return self.arc.fundamental[: self.dimension]
+
+    @cached_property
+    def sampled(self) -> np.ndarray:
+        """Derivatives ``(N, n, n + m)`` of the samples in the start and in the parameters."""
+        assert self.samples is not None
+        return np.stack([tangents[: self.dimension] for _, tangents in self._at(self.samples)])
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Derivatives ``(jumps, n + m)`` of the times of jumps; nan for the limit of a chatter."""
+        jumps = self.arc.jumps if self.jumps is None else self.jumps
+        found = np.full((len(jumps), len(self.x0)), np.nan)
+        before = np.append(self.t0, jumps.t[:-1])
+        # A jump that another sets off happens at the time of that one.
+        first = np.flatnonzero((jumps.t > before) & (jumps.kind != "limit"))
+        middles = 0.5 * (before[first] + jumps.t[first])
+        for i, t, (x, tangents) in zip(first, middles, self._at(middles), strict=True):
+            found[i] = self._time_of(jumps[int(i)], float(t), x, tangents)
+        for k in range(1, len(jumps)):
+            if jumps.t[k] == jumps.t[k - 1] and jumps.kind[k] != "limit":
+                found[k] = found[k - 1]
+        return found
+
+    def _at(self, times: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The state at each time, and the tangent vectors ``(n + m, n + m)`` there."""
+        trajectory = start(
+            self.arc.system,
+            self.x0,
+            self.t0,
+            mode=self.mode,
+            parameters=self.arc.parameters,
+            solver=self.solver,
+            tangent=np.eye(len(self.x0)),
+        )
+        found = []
+        for t in times:
+            trajectory.advance(float(t), trajectory.no_record())
+            found.append((trajectory.x, trajectory.tangent_matrix))
+        return found
+
+    def _time_of(self, jump: Jump, t: float, x: np.ndarray, tangents: np.ndarray) -> np.ndarray:
+        """Derivatives ``(n + m,)`` of the time of a jump, from a state before it in its mode."""
+        system = self.arc.system
+        alone = _alone(system, system.mode_index(jump.source))
+        run = self.simulate(
+            alone, x, (t, jump.t), parameters=self.arc.parameters, solver=self.solver, tangent=tangents
+        )
+        index = system.transition_index(jump.transition)
+        function = guard_function(system.transitions[index])
+        values = system.parameter_values(self.arc.parameters)
+        place = np.append(jump.x_minus[: self.dimension], self.x0[self.dimension :])
+        slope = compile_system(system).derivative(function, index, jump.t, place, values)[0, :-1]
+        assert run.fundamental is not None
+        return -(slope @ run.fundamental) / jump.transversality
+
+
+def with_sensitivities(
+    arc: HybridArc,
+    names: tuple[str, ...],
+    x0: np.ndarray,
+    mode: str,
+    t_span: tuple[float, float],
+    *,
+    solver: Solver | None,
+    max_jumps: int,
+    samples: np.ndarray | None,
+    simulate: Callable[..., HybridArc],
+) -> HybridArc:
+    """The arc of a run with its derivatives, from the run of the extended system that goes the same way.
+
+    If that run has other jumps, both are right within the tolerances, and the status says so.
+    """
+    system = extended(arc.system, names)
+    n, m = arc.system.dimension, len(names)
+    begin = np.concatenate([x0, [arc.parameters[name] for name in names]])
+    parameters = {name: value for name, value in arc.parameters.items() if name not in names}
+    again = simulate(
+        system,
+        begin,
+        t_span,
+        mode=mode,
+        parameters=parameters,
+        solver=solver,
+        tangent=np.eye(n + m)[:, n:],
+        max_jumps=max_jumps,
+    )
+    own = arc.jumps if arc.keeps_jumps else None
+    known = Sensitivities(names, again, own, n, begin, mode, t_span[0], samples, solver, simulate)
+    status = arc.status
+    # How many jumps of a chatter are followed, up to its limit, is no property of the run.
+    apart = again.jump_count != arc.jump_count and "limit" not in again.jumps.kind
+    if apart or again.status.code != arc.status.code:
+        status = apart_status(arc.jump_count, again.jump_count)
+    elif status.ok and not again.status.ok:
+        status = again.status
+    jumps = None if own is None else attrs.evolve(own, sensitivities=known)
+    return attrs.evolve(arc, jumps=jumps, sensitivities=known, status=status)
+
+
+def _alone(system: HybridSystem, mode: int) -> HybridSystem:
+    """A mode without its guards, whose flow reaches up to a jump and no farther than that."""
+    made = _ALONE.setdefault(system, {})
+    if mode not in made:
+        made[mode] = attrs.evolve(system, modes=[system.modes[mode]], transitions=(), start=None)
+    return made[mode]

@@ -1,0 +1,102 @@
+"""Parameters as states that do not move: what depends on them is then carried by tangent vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import attrs
+
+from hybrid.symbolic.reads import names_read
+from hybrid.symbolic.values import TraceError
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.functions import WholeReset
+from hybrid.system.graph import HybridSystem
+from hybrid.system.laws import Laws
+from hybrid.system.variables import PARAMETERS, STATE, named_values
+
+_EXTENDED: WeakKeyDictionary[HybridSystem, dict[tuple[str, ...], HybridSystem]] = WeakKeyDictionary()
+
+
+def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
+    """The system whose state ends with these parameters, which every field and reset leaves as they are.
+
+    A tangent vector along such a component is the derivative of the flow in the parameter, and a guard that
+    moves with the parameter has a gradient there, so that the saltation matrix moves the event. If the period
+    depends on one of the parameters the system has none: time is a plain number.
+    """
+    made = _EXTENDED.setdefault(system, {})
+    if names not in made:
+        made[names] = _Extension(system, names).system()
+    return made[names]
+
+
+class _Extension:
+    def __init__(self, system: HybridSystem, names: tuple[str, ...]) -> None:
+        self.original, self.names = system, names
+        self.kept = tuple(name for name in system.parameters if name not in names)
+
+    def system(self) -> HybridSystem:
+        original = self.original
+        state: tuple[str, ...] | int = (
+            original.state + len(self.names)
+            if isinstance(original.state, int)
+            else (*original.state, *self.names)
+        )
+        return attrs.evolve(
+            original,
+            state=state,
+            parameters={name: original.parameters[name] for name in self.kept},
+            modes=[self._mode(mode) for mode in original.modes],
+            transitions=[self._transition(each) for each in original.transitions],
+            period=self._period(),
+            units={},
+            laws=Laws(),
+            notes=(),
+            growth=None,
+        )
+
+    def _mode(self, mode: Mode) -> Mode:
+        rates, still = self._function(mode.field), (0.0,) * len(self.names)
+        return attrs.evolve(mode, field=lambda t, x, p: (*rates(t, x, p), *still), jacobian=None)
+
+    def _transition(self, transition: Transition) -> Transition:
+        guard, reset, n = transition.guard, transition.reset, self.original.dimension
+        new = None
+        if reset is not None:
+            values = self._function(WholeReset(reset.function, self.original.state))
+            new = Reset(lambda t, x, p: (*values(t, x, p), *x[n:]))
+        when = None if guard.when is None else self._function(guard.when)
+        moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
+        return attrs.evolve(transition, guard=moved, reset=new)
+
+    def _period(self) -> Any:
+        period = self.original.period
+        if not callable(period):
+            return period
+        try:
+            reads = names_read(self.original, lambda t, x, p: period(p))
+        except TraceError:
+            return None
+        if not reads.isdisjoint(self.names):
+            return None
+        return lambda p: period(self._parameters((), p, self.original.parameters.__getitem__))
+
+    def _parameters(self, x: Any, p: Any, moved: Callable[[str], Any]) -> Any:
+        """All parameters of the original, those that are states from ``moved``."""
+        names = tuple(self.original.parameters)
+        values = [moved(name) if name in self.names else getattr(p, name) for name in names]
+        return named_values(PARAMETERS, names, values)
+
+    def _function(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """A function of the original system as one of the extended state."""
+        original, n = self.original, self.original.dimension
+        places = {name: n + i for i, name in enumerate(self.names)}
+
+        def called(t: Any, x: Any, p: Any) -> Any:
+            is_plain = isinstance(original.state, int)
+            own = x[:n] if is_plain else named_values(STATE, original.state_names, x[:n])
+            return function(t, own, self._parameters(x, p, lambda name: x[places[name]]))
+
+        return called
