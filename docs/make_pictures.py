@@ -14,8 +14,9 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hybrid import DOP853, HybridSystem, periodic_orbit, simulate, stroboscopic_section
-from hybrid.plot import COLOURS, plot_arc, plot_graph, plot_phase
+import models
+from hybrid import DOP853, HybridSystem, continue_orbit, periodic_orbit, simulate, stroboscopic_section
+from hybrid.plot import COLOURS, plot_arc, plot_branch, plot_graph, plot_phase
 from lyapunov import chart
 from lyapunov.plot import plot_chart, style
 
@@ -110,6 +111,13 @@ def chart_picture(system: HybridSystem, folder: Path) -> None:
         save(axes.figure, folder / "chart.png")
 
 
+def branch_picture(folder: Path) -> None:
+    """The branch of one impact per period, with its fold and its grazings."""
+    branch = continue_orbit(periodic_orbit(models.impact_oscillator(), (0.9, 1.0)), "w", (0.6, 2.0))
+    axes = plot_branch(branch, "x", figsize=(6.4, 3.2))
+    save(axes.figure, folder / "branch.png")
+
+
 def save(figure: Any, path: Path) -> None:
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
@@ -137,6 +145,7 @@ def main() -> None:
         graph_picture(system, folder)
         split_picture(model_of(PLAIN, "oscillator"), folder)
         chart_picture(system, folder)
+        branch_picture(folder)
 
 
 if __name__ == "__main__":

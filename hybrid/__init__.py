@@ -11,6 +11,8 @@ from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
+from hybrid.continuation.branch import Bifurcation, Branch
+from hybrid.continuation.continue_orbit import continue_orbit
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
@@ -36,6 +38,8 @@ __all__ = [
     "DOP853",
     "Answer",
     "ArgumentError",
+    "Bifurcation",
+    "Branch",
     "CompiledSystem",
     "GlobalError",
     "Grazing",
@@ -59,6 +63,7 @@ __all__ = [
     "Tsit5",
     "WorkPrecision",
     "compile_system",
+    "continue_orbit",
     "filippov",
     "from_equations",
     "global_error",

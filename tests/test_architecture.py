@@ -42,6 +42,7 @@ ROOMS = (
     "hybrid.compiler",
     "hybrid.simulation",
     "hybrid.orbits",
+    "hybrid.continuation",
     "hybrid.plot",
     "hybrid.accuracy",
     "hybrid.sweep",

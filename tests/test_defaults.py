@@ -41,6 +41,7 @@ DEFAULTS = {
         **{"times": None, "saltation": None, "fundamental": None, "exponents": None},
         **{"steps": None, "seconds": None},
     },
+    hybrid.continue_orbit: {"solver": None, "max_steps": 2000},
     hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "laws": None},
     hybrid.from_equations: PLAIN,
     hybrid.Laws: {
@@ -84,6 +85,7 @@ DEFAULTS = {
     hybrid.plot.plot_global_error: FIGURE,
     hybrid.plot.plot_graph: FIGURE,
     hybrid.plot.plot_jumps: FIGURE,
+    hybrid.plot.plot_branch: {"y": 0, **FIGURE},
     hybrid.plot.plot_orbit: {"x": 0, "y": None, **FIGURE},
     hybrid.plot.plot_phase: FIGURE,
     hybrid.plot.plot_section: {"x": 0, "y": None, "size": None, **FIGURE},
@@ -131,7 +133,7 @@ def test_defaults_of_work_precision():
 def test_every_public_call_is_listed():
     listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
     # Bases, errors and results are made by the library.
-    made = {"HybridArc", "Solver", "Status", "StatusCode", "TwoOrbitExponents"}
+    made = {"Bifurcation", "Branch", "HybridArc", "Solver", "Status", "StatusCode", "TwoOrbitExponents"}
     for package in (hybrid, lyapunov):
         for name in package.__all__:
             each = getattr(package, name)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
+from hybrid import arguments
+from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import ROUNDING_OF_TIME
 from hybrid.orbits.labelled import described_orbit, labelled_orbit
+from hybrid.orbits.sensitivity import OrbitSensitivity, sensitivity_of
+from hybrid.orbits.shots import Family, Point
 from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
-from hybrid.solvers import Solver
+from hybrid.solvers import Solver, Taylor
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -80,6 +85,39 @@ class PeriodicOrbit:
     def to_xarray(self) -> xarray.Dataset:
         """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""
         return labelled_orbit(self)
+
+    @property
+    def forcing_periods(self) -> int:
+        """Number of forcing periods until the orbit closes; 0 for an autonomous system."""
+        forcing = self.system.forcing_period(self.parameters)
+        return 0 if forcing is None else max(1, round(self.period / forcing))
+
+    def sensitivity(self, names: Iterable[str], *, solver: Solver | None = None) -> OrbitSensitivity:
+        """Derivatives in parameters: of the point, ``.x0 (n, m)``, ``.period (m,)``, ``.multipliers (n, m)``.
+
+        Parameters
+        ----------
+        names
+            Names of the parameters.
+        solver
+            Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
+
+        Raises
+        ------
+        ArgumentError
+            If the orbit has not converged, a parameter does not exist, or the orbit is not isolated: a
+            multiplier is 1, besides the one along an autonomous orbit.
+        """
+        if not self.status.ok:
+            raise ArgumentError(f"The orbit has not converged: {self.status.message}")
+        given = arguments.items("names", names, "be names of parameters", least=1)
+        for name in given:
+            arguments.known("names: Parameter", name, self.system.parameters, "Parameters")
+        method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+        families = [
+            Family(self.system, name, dict(self.parameters), self.forcing_periods, method) for name in given
+        ]
+        return sensitivity_of(families, Point(np.array(self.x0), self.t0, self.mode, self.period, 0.0))
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""

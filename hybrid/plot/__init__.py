@@ -10,9 +10,11 @@ from types import ModuleType
 from typing import Any
 
 from hybrid import arguments
+from hybrid.continuation.branch import Branch
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
+from hybrid.plot.branches import plot_branch
 from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
 from hybrid.plot.jumps import plot_global_error, plot_jumps
@@ -29,6 +31,7 @@ __all__ = [
     "drawn",
     "plot",
     "plot_arc",
+    "plot_branch",
     "plot_ends",
     "plot_global_error",
     "plot_graph",
@@ -58,13 +61,14 @@ def drawn(result: Any, **options: Any) -> Any:
         # Any sweep has these two, a chart too, so the names above come first.
         return plot_sweep(result, **options)
     wanted = (
-        "be a system, an arc, a section, an orbit, a spectrum, jumps, a GlobalError, a comparison of models, "
-        "or a dataset of chart, simulate_many or sweep; print other results"
+        "be a system, an arc, a section, an orbit, a branch, a spectrum, jumps, a GlobalError, a comparison "
+        "of models, or a dataset of chart, simulate_many or sweep; print other results"
     )
     raise arguments.refusal("result", wanted, result)
 
 
 drawn.register(HybridArc, plot_arc)
+drawn.register(Branch, plot_branch)
 drawn.register(HybridSystem, plot_graph)
 drawn.register(Jumps, plot_jumps)
 drawn.register(Section, plot_section)

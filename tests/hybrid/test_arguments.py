@@ -37,7 +37,8 @@ def made():
     """The objects that methods and plots are called on."""
     return {
         "arc": hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.0)),
-        "orbit": hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0)),
+        "orbit": (orbit := hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0))),
+        "branch": hybrid.continue_orbit(orbit, "w", (0.99, 1.01)),
         "comparison": lyapunov.compare_models({"a": OSCILLATOR}, (0.0, 0.0), reference="a", intervals=5),
         "chart": lyapunov.chart(OSCILLATOR, {"c": [0.1, 0.2]}, (0.0, 0.0), intervals=5, section=3),
         "work": hybrid.work_precision(
@@ -60,6 +61,8 @@ def table(made):
 # Classes that only the library creates, and errors.
 NOT_CALLED = {
     "PiecewiseAffineField",
+    "Bifurcation",
+    "Branch",
     "run_settings",
     "Status",
     "StatusCode",

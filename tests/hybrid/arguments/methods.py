@@ -29,6 +29,21 @@ def methods(made):
         (call(contact.Hertz.duration, contact.Hertz(1e8), 90.0, 0.4), {"mass": POSITIVE, "speed": POSITIVE}),
         (call(hybrid.HybridArc.__call__, arc, 0.5), {"t": [*NUMBERS, math.nan, -1.0, 2.0, [0.5, math.nan]]}),
         (call(hybrid.PeriodicOrbit.arc, made["orbit"]), {"solver": SOLVER}),
+        (
+            call(hybrid.PeriodicOrbit.sensitivity, made["orbit"], ["w"]),
+            {"names": [None, 3, "w", ["nope"], [3], [None], []], "solver": SOLVER},
+        ),
+        (call(hybrid.Branch.orbit, made["branch"], 0), {"i": [None, "a", 1.5, 10**9, True]}),
+        (
+            call(hybrid.continue_orbit, made["orbit"], "w", (0.9, 1.1)),
+            {
+                "orbit": [None, "a", 3, BALL],
+                "parameter": [None, *NAME],
+                "span": [None, 3, (2.0, 3.0), (1.1, 0.9), (0.9,), "ab"],
+                "solver": SOLVER,
+                "max_steps": [0, *COUNT],
+            },
+        ),
         (call(hybrid.Solver.tightened, hybrid.DOP853(), 10.0), {"factor": POSITIVE}),
         (call(HybridSystem.mode_index, BALL, "flight"), {"name": [None, *NAME]}),
         (call(HybridSystem.parts_of, BALL, "flight"), {"name": [None, *NAME]}),

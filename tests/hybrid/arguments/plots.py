@@ -65,6 +65,10 @@ def plots(made):
             {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES, "figsize": FIGSIZE},
         ),
         (
+            call(hybrid.plot.plot_branch, made["branch"]),
+            {"branch": [None, "a", 3, arc], "y": COMPONENT, "ax": AXES, "figsize": FIGSIZE},
+        ),
+        (
             call(hybrid.plot.plot_work_precision, made["work"]),
             {
                 "result": [None, "a", 3, BALL],

@@ -1,0 +1,1 @@
+"""Families of periodic orbits over a parameter, and where they change."""

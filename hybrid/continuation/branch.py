@@ -1,0 +1,141 @@
+"""A branch of periodic orbits over a parameter, and the bifurcations on it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.display.tables import counted
+from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.simulation.labelled import Names, attributes
+from hybrid.status import Status
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@attrs.frozen(eq=False)
+class Bifurcation:
+    """Where a branch changes.
+
+    Attributes
+    ----------
+    kind
+        ``"fold"``, ``"flip"`` (period doubling), ``"torus"`` (Neimark-Sacker), ``"branch point"``, or
+        ``"grazing"``: a guard is touched without speed, and the sequence of transitions ends.
+    parameter, value
+        Name of the parameter, and its value there.
+    orbit
+        The orbit there.
+    message
+        What happens, in words.
+    """
+
+    kind: str
+    parameter: str
+    value: float
+    orbit: PeriodicOrbit
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.kind} at {self.parameter} = {self.value:.10g}: {self.message}"
+
+
+@attrs.frozen(eq=False, repr=False)
+class Branch:
+    """Periodic orbits with one sequence of transitions, in order along the branch.
+
+    Attributes
+    ----------
+    system, name
+        The model, and the name of the parameter.
+    orbits
+        The orbits, in order. The points of a forced system are all at the same phase.
+    stable
+        Whether all multipliers, without that along an autonomous orbit, are inside the unit circle, ``(N,)``.
+    bifurcations
+        Each :class:`Bifurcation`, in order along the branch.
+    status
+        Why the branch ends where it does.
+    """
+
+    system: HybridSystem
+    name: str
+    orbits: tuple[PeriodicOrbit, ...]
+    stable: np.ndarray
+    bifurcations: tuple[Bifurcation, ...]
+    status: Status
+
+    @property
+    def parameter(self) -> np.ndarray:
+        """Values of the parameter, ``(N,)``."""
+        return np.array([orbit.parameters[self.name] for orbit in self.orbits])
+
+    @property
+    def x0(self) -> np.ndarray:
+        """Points of the orbits, ``(N, n)``."""
+        return np.array([orbit.x0 for orbit in self.orbits])
+
+    @property
+    def mode(self) -> np.ndarray:
+        """Modes at these points, ``(N,)``."""
+        return np.array([orbit.mode for orbit in self.orbits])
+
+    @property
+    def period(self) -> np.ndarray:
+        """Periods, ``(N,)``."""
+        return np.array([orbit.period for orbit in self.orbits])
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers, ``(N, n)``, largest first."""
+        return np.array([orbit.multipliers for orbit in self.orbits])
+
+    @property
+    def signature(self) -> tuple[str, ...]:
+        """Names of the modes of the first orbit, in order."""
+        return self.orbits[0].signature
+
+    @property
+    def transitions(self) -> tuple[str, ...]:
+        """Names of the transitions of the first orbit, in order."""
+        return self.orbits[0].transitions
+
+    def orbit(self, i: int) -> PeriodicOrbit:
+        """The orbit of a point of the branch."""
+        whole = arguments.whole_number(i)
+        if whole is None or not -len(self) <= whole < len(self):
+            raise arguments.refusal("i", f"be a whole number from {-len(self)} to {len(self) - 1}", i)
+        return self.orbits[whole]
+
+    def __len__(self) -> int:
+        return len(self.orbits)
+
+    def __repr__(self) -> str:
+        values = self.parameter
+        span = f"{self.name} = {values.min():.6g} to {values.max():.6g}"
+        kinds = ", ".join(each.kind for each in self.bifurcations) or "no bifurcations"
+        return f"<Branch {span}, {counted(len(self), 'orbit')}, {kinds}, {self.status.brief}>"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The branch over the axis ``point``, with the parameter as a coordinate.
+
+        Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot.
+        """
+        import xarray
+
+        names = Names(self.system.state_names, self.system.units)
+        variables = {
+            "x0": (("point", "state"), self.x0, names.states),
+            "mode": ("point", self.mode),
+            "period": ("point", self.period, names.of("t")),
+            "multipliers": (("point", "multiplier"), self.multipliers),
+            "stable": ("point", self.stable),
+        }
+        coords = {self.name: ("point", self.parameter, names.of(self.name)), **names.coords()}
+        made_by = attributes("branch", self.status, self.system, self.orbits[0].parameters)
+        return xarray.Dataset(variables, coords, made_by)
