@@ -135,7 +135,7 @@ def disagreement(
         return None
     # Size of a row's derivatives, of which those that cancel are judged by the size of the value.
     known = np.isfinite(wanted)
-    value_size = np.where(np.isfinite(found), np.abs(found), 0.0) / np.abs(x).max()
+    value_size = np.where(np.isfinite(found), np.abs(found), 0.0) / (np.abs(x).max() or 1.0)
     size = np.where(known, np.abs(wanted), 0.0).max(axis=1) + value_size
     found = compiled.derivative(function, index, t, x, values)
     wrong = known & ~(np.abs(found - wanted) <= SAME_DERIVATIVE * size[:, None])

@@ -166,6 +166,12 @@ def _names_in(code: CodeType) -> tuple[frozenset[str], frozenset[str]]:
     return frozenset(names), frozenset(attributes)
 
 
+def is_of_library(function: Any) -> bool:
+    """Whether a function is the library's own, as those are that it derives."""
+    code = getattr(function, "__code__", getattr(type(function).__call__, "__code__", None))
+    return code is not None and Path(code.co_filename).is_relative_to(LIBRARY)
+
+
 @cache
 def is_installed(filename: str) -> bool:
     """Whether code belongs to an installed package, to Python or to this library."""

@@ -26,7 +26,7 @@ from hybrid.system.graph import HybridSystem, laws_of
 from hybrid.system.laws import Laws
 from hybrid.system.variables import named_values
 from hybrid.testing.errors import PropertyError, discard
-from hybrid.testing.reads import is_clock
+from hybrid.testing.reads import is_passed
 from hybrid.testing.sizes import sizes_along
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
@@ -244,7 +244,11 @@ class Case:
         guard = transition.guard
         if guard.direction == 0 or transition.is_marker or guard.when is not None:
             return False
-        return transition.name not in self.passable and not is_clock(self.system, transition.name)
+        return not self.is_passed(transition)
+
+    def is_passed(self, transition: Transition) -> bool:
+        """Whether the state goes on beyond a guard in the same mode: a clock, a counter, a membrane."""
+        return transition.name in self.passable or is_passed(self.system, transition.name)
 
     def slope(self, function: ModelFunction, owner: str, t: float, x: np.ndarray) -> np.ndarray:
         """The derivative ``(rows, n + 1)``, as runs use it, of a function of mode or transition ``owner``."""

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from pathlib import Path
+from itertools import cycle, islice
 
 import attrs
 import numpy as np
 
 from hybrid.simulation.arc import HybridArc
 from hybrid.status import StatusCode
+from hybrid.symbolic.reads import names_read
+from hybrid.symbolic.values import TraceError
 from hybrid.system.derivatives import evaluate
-from hybrid.system.elements import Guard, Mode, Transition
+from hybrid.system.elements import Function, Guard, Mode, Transition
 from hybrid.system.graph import HybridSystem
-from hybrid.system.watched import LIBRARY
+from hybrid.system.watched import is_of_library
 from hybrid.testing.case import MOST_OF_WHOLE, Case
 from hybrid.testing.errors import PropertyError
-from hybrid.testing.starts import nearest_zero
+from hybrid.testing.starts import nearest_zero, start_in
 
 FIRES = "Every guard can fire, and no condition refuses every crossing"
 # States are also drawn from the ranges times powers of ten between these.
@@ -25,6 +27,11 @@ WIDER = (-3.0, 3.0)
 # Number of states at which a guard is evaluated that no run has made fire, and from which zeros are sought.
 STATES = 500
 STARTS = 100
+# Number of cases that are aimed at a transition that no run took; how far outside of the drawn starts they
+# may begin, as a share of the range; and how long before the transition, as a share of their time.
+AIMED = 3
+ROOM = 0.25
+MOMENT = 0.02
 # A condition refuses every crossing if it refuses this many places on the guard, and allows none.
 PLACES = 20
 # A guard is zero at a jump if it is at most this share of its size on the run.
@@ -115,6 +122,35 @@ class Coverage:
         found = (evaluate(variables, mode.field, *place) for place in places)
         return any(rates is not None and rates.any() for rates in found)
 
+    def aimed(self) -> Iterator[Case]:
+        """Cases that take a transition which no run took: they start just before a place where it fires.
+
+        The places are among the drawn starts, and the new starts are where the laws allow them.
+        """
+        starts = np.array([case.x0 for case in self.cases if case.mode is not None])
+        if not len(starts):
+            return
+        low, high = starts.min(axis=0), starts.max(axis=0)
+        room, rng = ROOM * (high - low), np.random.default_rng(20240507)
+        places = [
+            (self.cases[i % len(self.cases)], rng.uniform(low, high), rng.uniform()) for i in range(STATES)
+        ]
+        for transition in self.system.transitions:
+            if self.jumps[transition.name] or transition.guard.at_start or not _is_users(transition):
+                continue
+            found = 0
+            for case, x, share in places:
+                t = case.t0 + share * (case.t1 - case.t0)
+                zero = nearest_zero(case, [transition.guard.function], t, x)
+                if zero is None or np.any(zero < low - room) or np.any(zero > high + room):
+                    continue
+                aimed = _just_before(transition, case, t, zero)
+                if aimed is not None:
+                    yield aimed
+                    found += 1
+                if found == AIMED:
+                    break
+
     def check(self) -> None:
         """Fail if the guard of a transition that no run took has one sign, or its condition allows nothing.
 
@@ -141,7 +177,15 @@ class Coverage:
                 "far beyond",
                 f"a wrong sign, or a wrong threshold, in the guard of {name!r}: it never crosses zero.",
             )
-        if guard.when is None:
+        ways = [way for place in zeros for way in _ways(transition, *place)]
+        if guard.direction and len(ways) >= PLACES and guard.direction not in ways:
+            told, other = ("rises", "falls") if guard.direction < 0 else ("falls", "rises")
+            self._fail(
+                f"guard of {name!r} {told} at all {len(ways)} places that were tried, in the ranges and far "
+                f"beyond, and fires where it {other}",
+                f"the wrong direction of {name!r}, or a wrong sign in its guard.",
+            )
+        if guard.when is None or self._is_discrete(guard.when):
             return
         allowed = [answer for place in zeros for answer in _answers(transition, *place)]
         if len(allowed) >= PLACES and not any(allowed):
@@ -150,6 +194,18 @@ class Coverage:
                 "were tried, in the ranges and far beyond",
                 f"a wrong sign in the condition of {name!r}, or the wrong direction of its guard.",
             )
+
+    def _is_discrete(self, condition: Function) -> bool:
+        """Whether a condition reads a component that no field moves: drawn values say nothing of it."""
+        system = self.system
+        places = [(case.t0, np.array(case.x0), case.values) for case in self.cases]
+        rates = [evaluate(system.variables, mode.field, *place) for mode in system.modes for place in places]
+        moved = np.any([each != 0.0 for each in rates if each is not None], axis=0)
+        try:
+            read = names_read(system, condition)
+        except TraceError:
+            return True
+        return any(name in read for name, moves in zip(system.state_names, moved, strict=True) if not moves)
 
     def _places(self) -> Iterator[tuple[Case, float, np.ndarray]]:
         """Times and states in the ranges and far beyond."""
@@ -175,18 +231,35 @@ def _side(case: Case, guard: Guard, t: float, x: np.ndarray) -> list[float]:
     return [] if values is None else [float(np.sign(values[0]))]
 
 
-def _answers(transition: Transition, case: Case, t: float, x: np.ndarray) -> list[bool]:
-    """Whether the condition holds at a place on the guard; nothing if the flow does not cross it so."""
-    guard, mode = transition.guard, case.mode_of(transition.source)
-    variables, values = case.system.variables, case.values
-    rates = evaluate(variables, mode.field, t, x, values)
-    allowed = evaluate(variables, guard.when, t, x, values)
-    if rates is None or allowed is None:
+def _ways(transition: Transition, case: Case, t: float, x: np.ndarray) -> list[float]:
+    """The sign of a guard after a place on it, in the mode that it ends; nothing if it is not crossed."""
+    guard = transition.guard
+    rates = evaluate(case.system.variables, case.mode_of(transition.source).field, t, x, case.values)
+    if rates is None:
         return []
     moment = 1e-6 * (case.t1 - case.t0)
     sides = [side for h in (-moment, moment) for side in _side(case, guard, t + h, x + h * rates)]
-    crosses = len(sides) == 2 and sides[0] * sides[1] < 0.0 and guard.direction in (0, sides[1])
-    return [bool(allowed[0] > 0.0)] if crosses else []
+    return [sides[1]] if len(sides) == 2 and sides[0] * sides[1] < 0.0 else []
+
+
+def _answers(transition: Transition, case: Case, t: float, x: np.ndarray) -> list[bool]:
+    """Whether the condition holds at a place on the guard; nothing if the flow does not cross it so."""
+    guard = transition.guard
+    allowed = [1.0] if guard.when is None else evaluate(case.system.variables, guard.when, t, x, case.values)
+    crosses = any(guard.direction in (0, way) for way in _ways(transition, case, t, x))
+    return [bool(allowed[0] > 0.0)] if crosses and allowed is not None else []
+
+
+def _just_before(transition: Transition, case: Case, t: float, x: np.ndarray) -> Case | None:
+    """A case that starts shortly before a place on a guard at which the transition fires; or None."""
+    if _answers(transition, case, t, x) != [True]:
+        return None
+    moment = MOMENT * (case.t1 - case.t0)
+    rates = evaluate(case.system.variables, case.mode_of(transition.source).field, t, x, case.values)
+    before = tuple((x - moment * rates).tolist())
+    aimed = attrs.evolve(case, mode=None, x0=before, t0=t - moment, t1=t - moment + case.t1 - case.t0)
+    start = start_in(aimed, transition.source)
+    return None if start is None else attrs.evolve(aimed, mode=transition.source, x0=start)
 
 
 def _refusals(case: Case, arc: HybridArc, transition: Transition) -> int:
@@ -212,6 +285,5 @@ def _refusals(case: Case, arc: HybridArc, transition: Transition) -> int:
 
 def _is_users(transition: Transition) -> bool:
     """Whether guard and condition are the user's own: those that the library derives may be idle."""
-    functions = [each for each in (transition.guard.function, transition.guard.when) if each is not None]
-    codes = [getattr(each, "__code__", getattr(type(each).__call__, "__code__", None)) for each in functions]
-    return not any(code is not None and Path(code.co_filename).is_relative_to(LIBRARY) for code in codes)
+    guard = transition.guard
+    return not (is_of_library(guard.function) or (guard.when is not None and is_of_library(guard.when)))

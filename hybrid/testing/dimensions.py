@@ -15,6 +15,7 @@ import numpy as np
 from hybrid.symbolic.values import TRUTHS, WHERE, values_of
 from hybrid.system.functions import CONDITION
 from hybrid.system.graph import HybridSystem, as_system, functions_of
+from hybrid.system.watched import is_of_library
 from hybrid.testing.errors import PropertyError, discard
 
 DIMENSIONS = "The units of every function fit"
@@ -224,6 +225,9 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
     time = Quantity(unit_of(system.units["t"]))
     state = {name: Quantity(unit_of(system.units[name])) for name in system.state_names}
     for _, function in functions_of(system):
+        if function.kind == "reset" and is_of_library(function.function):
+            # The projection onto a surface, whose gradient may have components of several units.
+            continue
         kind, wanted = function.kind, {}
         if kind == "field":
             wanted = {f"the derivative of {name}": _product(unit, time, -1) for name, unit in state.items()}

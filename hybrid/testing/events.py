@@ -42,6 +42,8 @@ def check_jumps(case: Case) -> None:
         band += abs(jump.transversality) * case.duration
         # A reset may land beyond a guard, which then fires at the same instant.
         landed = jump.t == previous and value * transition.guard.direction > 0.0
+        # A start that lies beyond sets off a correction of its mode.
+        landed = landed or transition.guard.at_start
         previous = jump.t
         if not (landed or abs(value) <= 1e-9 * band or _guard_jumps(case, jump)):
             case.fail(

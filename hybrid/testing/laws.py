@@ -51,7 +51,7 @@ def law_checks(laws: Laws) -> dict[str, Callable[[Case], None]]:
     checks: dict[str, Callable[[Case], None]] = {}
 
     def add(told: str, check: Callable[[Case], None]) -> None:
-        checks[told] = lambda case: _checked(case, check)
+        checks[told] = lambda case: declared_too(case, check)
 
     for kind, some in laws.in_modes.items():
         check = _check_value if kind in ("invariant", "equal") else _check_change
@@ -65,8 +65,8 @@ def law_checks(laws: Laws) -> dict[str, Callable[[Case], None]]:
     return checks
 
 
-def _checked(case: Case, check: Callable[[Case], None]) -> None:
-    """Check a law; where it fails, say so if it holds with the parameters as declared."""
+def declared_too(case: Case, check: Callable[[Case], None]) -> None:
+    """Check a case; where that fails, say so if it holds with the parameters as declared."""
     try:
         check(case)
     except PropertyError as error:

@@ -6,25 +6,57 @@ from collections.abc import Callable
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from hybrid.symbolic.reads import names_read
+import numpy as np
+
+from hybrid.symbolic.reads import TIME, names_read
 from hybrid.symbolic.values import TraceError
+from hybrid.system.derivatives import evaluate, sample_points
+from hybrid.system.elements import Reset, Transition
+from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.testing.errors import PropertyError, discard
 
 READS = "Every parameter is read, and no number stands in for one"
-_CLOCKS: WeakKeyDictionary[HybridSystem, dict[str, bool]] = WeakKeyDictionary()
+_PASSED: WeakKeyDictionary[HybridSystem, dict[str, bool]] = WeakKeyDictionary()
 
 
-def is_clock(system: HybridSystem, transition: str) -> bool:
-    """Whether the guard of a transition is a function of time alone."""
-    found = _CLOCKS.setdefault(system, {})
+def is_passed(system: HybridSystem, transition: str) -> bool:
+    """Whether the state passes the guard of a transition, so that it is no wall.
+
+    It passes a guard of time alone; and one whose reset leads back to the mode and changes something, but
+    nothing of what the guard and its speed are made of, as a counter does.
+    """
+    found = _PASSED.setdefault(system, {})
     if transition not in found:
-        guard = system.transitions[system.transition_index(transition)].guard
         try:
-            found[transition] = names_read(system, guard.function).isdisjoint(system.state_names)
+            found[transition] = _is_passed(system, system.transitions[system.transition_index(transition)])
         except TraceError:
             found[transition] = False
     return found[transition]
+
+
+def _is_passed(system: HybridSystem, transition: Transition) -> bool:
+    felt = names_read(system, transition.guard.function) - {TIME}
+    if felt.isdisjoint(system.state_names):
+        return True
+    if transition.source != transition.target or transition.reset is None:
+        return False
+    mode = system.modes[system.mode_index(transition.source)]
+    for i, name in enumerate(system.state_names):
+        if name in felt:
+            felt |= names_read(system, lambda t, x, p, i=i: mode.field(t, x, p)[i])
+    changed = _changed(system, transition.reset)
+    return bool(changed) and felt.isdisjoint(changed)
+
+
+def _changed(system: HybridSystem, reset: Reset) -> set[str]:
+    """The components that a reset changes, at some points."""
+    variables, whole = system.variables, WholeReset(reset.function, system.state)
+    changed = np.zeros(system.dimension, dtype=bool)
+    for t, x in sample_points(system.dimension):
+        values = evaluate(variables, whole, t, x, variables.defaults)
+        changed |= True if values is None else values != x
+    return {name for name, moves in zip(system.state_names, changed, strict=True) if moves}
 
 
 def check_reads(system: HybridSystem) -> None:
@@ -41,8 +73,9 @@ def check_reads(system: HybridSystem) -> None:
     numbers = numbers_read(as_system("system", system))
     letters = {name.casefold(): name for name in system.parameters}
     for name, value in numbers.items():
-        parameter = letters.get(name.casefold())
-        if parameter is not None:
+        # The radius r is not the gas constant R, but MU = 0.3 is the friction mu = 0.3.
+        parameter = name if name in system.parameters else letters.get(name.casefold())
+        if parameter is not None and (name == parameter or system.parameters[parameter] == value):
             _fail(
                 system,
                 f"{name} = {value:.6g} is read from outside the model, and parameter {parameter!r} is "

@@ -85,7 +85,8 @@ def parameters(
         The model.
     ranges
         By name: a range ``(low, high)``, a number to keep the parameter fixed, or a strategy; within a fifth
-        of the declared value by default, and half way to 1 for one below 1. Or one strategy of dictionaries.
+        of the declared value by default, and half way at most to the next declared ones, so that thresholds
+        keep their order. Or one strategy of dictionaries.
 
     Raises
     ------
@@ -104,7 +105,9 @@ def _parameters(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[
     for each in chosen:
         arguments.known(f"{name}: Parameter", each, declared, "Parameters")
     drawn = {
-        each: _values(f"{name}: Range of {each!r}", chosen[each]) if each in chosen else _around(value)
+        each: _values(f"{name}: Range of {each!r}", chosen[each])
+        if each in chosen
+        else _around(value, declared.values())
         for each, value in declared.items()
     }
     return st.fixed_dictionaries(drawn)
@@ -253,12 +256,16 @@ def _drawn_parameters(name: str, declared: Mapping[str, float], value: Any) -> d
     return {**declared, **{each: arguments.number(f"{name}[{each!r}]", drawn[each]) for each in drawn}}
 
 
-def _around(value: float) -> SearchStrategy[float]:
-    """Values within a fifth of a declared one. A share, such as a restitution of 0.9, stays a share."""
-    below = above = 0.2 * abs(value)
-    if 0.0 < value < 1.0:
-        above = min(above, 0.5 * (1.0 - value))
-    return _grid(value, below, above)
+def _around(value: float, declared: Iterable[float]) -> SearchStrategy[float]:
+    """Values within a fifth of a declared one, half way at most to the next declared ones.
+
+    Drawn values keep the order of the declared ones: a lower threshold stays below an upper one. A share,
+    such as a restitution of 0.9, stays a share.
+    """
+    others = {*declared, *((1.0,) if 0.0 < value < 1.0 else ())}
+    below = min((0.5 * (value - each) for each in others if each < value), default=np.inf)
+    above = min((0.5 * (each - value) for each in others if each > value), default=np.inf)
+    return _grid(value, min(below, 0.2 * abs(value)), min(above, 0.2 * abs(value)))
 
 
 def _grid(centre: float, below: float, above: float) -> SearchStrategy[float]:

@@ -91,3 +91,74 @@ def test_runs_that_end_early_are_counted():
     assert "ENDED EARLY: " in str(report)
     assert report.cut["it has more than 5 jumps"] > 0
     assert "CUT, for all but laws and ends: " in str(report)
+
+
+def test_a_guard_that_is_crossed_the_other_way_alone():
+    """The level only rises, and the guard waits for its fall."""
+    tank = HybridSystem(
+        state=("h",),
+        modes=[Mode("fill", lambda t, x, p: (1.0,)), Mode("drain", lambda t, x, p: (-1.0,))],
+        transitions=[
+            Transition(
+                "fill",
+                "drain",
+                Guard(lambda t, x, p: x.h - 1.0, -1, when=lambda t, x, p: x.h > 0.5),
+                name="full",
+            ),
+            Transition("drain", "fill", Guard(lambda t, x, p: x.h + 9.0, -1), name="empty"),
+        ],
+    )
+    with pytest.raises(PropertyError, match=r"guard of 'full' rises at all .* and fires where it falls"):
+        check_system(tank, states={"h": (0.1, 0.9)}, examples=5)
+
+
+def test_a_condition_on_a_counter_is_not_judged_by_drawn_values():
+    gears = HybridSystem(
+        state=("v", "n"),
+        modes=[Mode("drive", lambda t, x, p: (1.0, 0.0))],
+        transitions=[
+            Transition(
+                "drive",
+                "drive",
+                Guard(lambda t, x, p: x.v - 1.0, +1, when=lambda t, x, p: x.n == 1.0),
+                Reset(lambda t, x, p: {"v": 0.0, "n": 2.0}),
+                name="up",
+            )
+        ],
+    )
+    assert check_system(gears, examples=5, t_span=(0.0, 2.0)).never_seen == ("up",)
+
+
+def test_runs_are_aimed_at_what_no_run_took():
+    """Two carts latch if they meet slowly, which the drawn starts do not."""
+
+    def joined(t, x, p):
+        v = 0.5 * (x.u + x.v)
+        return {"x": x.y, "u": v, "v": v}
+
+    def carts(reset):
+        return HybridSystem(
+            state=("x", "u", "y", "v"),
+            modes=[
+                Mode("apart", lambda t, x, p: (x.u, 0.0, x.v, 0.0)),
+                Mode("latched", lambda t, x, p: (x.u, 0.0, x.u, 0.0)),
+            ],
+            transitions=[
+                Transition(
+                    "apart",
+                    "latched",
+                    Guard(lambda t, x, p: x.y - x.x, -1, when=lambda t, x, p: x.u - x.v < 0.05),
+                    Reset(reset),
+                    name="latch",
+                )
+            ],
+        )
+
+    together = {
+        "equal": {"latched": {"together": lambda t, x, p: x.u - x.v}},
+        "examples": 20,
+        "mode": "apart",
+    }
+    assert not check_system(carts(joined), **together).never_seen
+    with pytest.raises(PropertyError, match="'together' is zero in mode 'latched'"):
+        check_system(carts(lambda t, x, p: {"u": 0.5 * (x.u + x.v)}), **together)

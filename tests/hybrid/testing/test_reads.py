@@ -1,6 +1,5 @@
 """Parameters that nothing reads, and numbers that stand in for one, are found without a run."""
 
-import attrs
 import numpy as np
 import pytest
 from hypothesis.errors import UnsatisfiedAssumption
@@ -9,7 +8,7 @@ import models
 from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 from hybrid.symbolic.reads import names_read
 from hybrid.testing import PropertyError, check_reads, check_system
-from hybrid.testing.reads import is_clock
+from hybrid.testing.reads import is_passed
 
 MU = 0.3
 G = 9.81
@@ -49,6 +48,17 @@ def test_a_number_from_a_closure_under_the_name_of_a_parameter():
 
     with pytest.raises(PropertyError, match=r"mu = 0.5 is read from outside"):
         check_reads(model(0.5))
+
+
+def test_a_number_with_another_value_is_another_quantity():
+    """The gas constant R and the radius r."""
+    R = 8.3
+
+    check_reads(block(lambda t, x, p: -R * x.q - p.mu * x.v))
+    ring = HybridSystem(
+        state=("q",), parameters={"r": 0.2}, modes=[Mode("m", lambda t, x, p: (-R * p.r * x.q,))]
+    )
+    check_reads(ring)
 
 
 def test_other_numbers_of_the_module_are_told():
@@ -93,8 +103,23 @@ def test_right_models_read_all_their_parameters(name):
     check_reads(getattr(models, name)())
 
 
-def test_guards_of_time_alone():
-    hit = Transition("slide", "slide", Guard(lambda t, x, p: x.q, -1), name="hit")
-    tick = Transition("slide", "slide", Guard(lambda t, x, p: np.sin(t), +1), name="tick")
-    system = attrs.evolve(block(), transitions=[hit, tick])
-    assert (is_clock(system, "hit"), is_clock(system, "tick")) == (False, True)
+def test_guards_that_the_state_passes():
+    """A clock, and a counter of turns; not a wall, nor one whose reset is forgotten."""
+
+    def back(name, guard, reset=lambda t, x, p: {"v": -x.v}):
+        return Transition("slide", "slide", Guard(guard, -1), Reset(reset), name=name)
+
+    def angle(t, x, p):
+        return x.q
+
+    system = HybridSystem(
+        state=("q", "v", "n"),
+        modes=[Mode("slide", lambda t, x, p: (x.v, -x.q, 0.0))],
+        transitions=[
+            back("wall", angle),
+            back("forgotten", angle, lambda t, x, p: x),
+            back("tick", lambda t, x, p: np.sin(t)),
+            back("count", angle, lambda t, x, p: {"n": x.n + 1.0}),
+        ],
+    )
+    assert [is_passed(system, name) for name in system.transition_names] == [False, False, True, True]

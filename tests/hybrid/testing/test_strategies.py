@@ -153,3 +153,16 @@ def test_modes_are_those_that_allow_the_start(x, modes):
         assert find(strategy, lambda case, mode=mode: case.mode == mode, settings=FAST)
     with pytest.raises(NoSuchExample):
         find(strategy, lambda case: case.mode not in modes, settings=FAST)
+
+
+RELAY = HybridSystem(
+    state=("T",),
+    parameters={"low": 19.0, "high": 21.0, "k": -1.0},
+    modes=[Mode("on", lambda t, x, p: (p.k * (x.T - p.low - p.high),))],
+)
+
+
+@given(parameters(RELAY))
+def test_drawn_parameters_keep_their_order(drawn):
+    """With a fifth of each the lower threshold of a relay would be drawn above the upper one."""
+    assert drawn["k"] < 0.0 < drawn["low"] <= 20.0 <= drawn["high"]
