@@ -40,9 +40,11 @@ def check_cut(case: Case) -> None:
         If the run changes, or a saltation matrix at the plane is not the identity.
     """
     as_case(case)
-    if case.passable:
-        discard("a passable transition would fire again in the copy of its mode")
+    if any(case.is_passed(each) for each in case.system.transitions):
+        discard("a transition that the state passes would fire again in the copy of its mode")
     run = case.run
+    if any(case.follows_at_once(jump) for jump in run.arc.jumps):
+        discard("several jumps at one instant may cross the cut together")
     times = [case.t0, *run.arc.jumps.t, run.t1]
     j = int(case.fraction * (len(times) - 1))
     t = times[j] + case.fraction * (times[j + 1] - times[j])
