@@ -80,7 +80,8 @@ class SwitchingSurface:
                 for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
             ]
 
-        return expressed(trace(field, self.variables.state, self.variables.parameter_names))
+        traced = trace(field, self.variables.state, self.variables.parameter_names)
+        return expressed([_cancelled(each) for each in traced])
 
     def arrives_from_below(self, t: Any, x: Any, p: Any) -> Any:
         """Whether an orbit that comes from below stays on the surface."""
@@ -193,6 +194,22 @@ def _dot(a: Iterable[Any], b: Iterable[Any], total: Any) -> Any:
         if not _is_zero(factor):
             total = total + factor * other
     return total
+
+
+def _cancelled(expression: Any) -> Any:
+    """The expression without what cancels in its sums: what both fields share, such as a forcing.
+
+    A difference of two equal terms is zero but for rounding, and its series is rounding alone.
+    """
+    from sympy import Add, expand_mul
+
+    from hybrid.symbolic.nodes import MOST_EXPANDED, is_larger_than, nodes_of
+
+    if is_larger_than(MOST_EXPANDED, expression):
+        return expression
+    sums = {each: expand_mul(each) for each in nodes_of(Add, expression)}
+    simpler = {each: made for each, made in sums.items() if made.free_symbols < each.free_symbols}
+    return expression.xreplace(simpler)
 
 
 def _is_zero(value: Any) -> bool:

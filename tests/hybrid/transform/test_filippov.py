@@ -452,3 +452,23 @@ def test_a_run_that_slides_can_be_taken_up_again():
         second = hybrid.simulate(system, first.x[-1], (3.0, 4.0), mode="sliding")
         assert not second.jumps
         assert second.mode[0] == "sliding"
+
+
+def test_a_forcing_that_both_fields_share_cancels_along_the_surface():
+    """A controller holds ``v = -l q``, whatever force is common to both sides: ``q = q0 exp(-l t)``."""
+
+    def field(side):
+        return lambda t, x, p: (x.v, side * p.K + p.d * np.cos(p.w * t))
+
+    controlled = filippov(
+        state=("q", "v"),
+        parameters={"K": 4.0, "l": 1.5, "d": 0.5, "w": 2.0},
+        below=field(+1.0),
+        above=field(-1.0),
+        switching=lambda t, x, p: x.v + p.l * x.q,
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    arc = simulate(controlled, (0.1, -0.15), (0.0, 3.0), mode="sliding")
+    assert arc.status.ok
+    assert arc.steps < 50
+    np.testing.assert_allclose(arc.x[-1], 0.1 * np.exp(-4.5) * np.array([1.0, -1.5]), rtol=1e-10)
