@@ -468,7 +468,7 @@ def test_a_forcing_that_both_fields_share_cancels_along_the_surface():
         switching=lambda t, x, p: x.v + p.l * x.q,
         period=lambda p: 2 * np.pi / p.w,
     )
-    arc = simulate(controlled, (0.1, -0.15), (0.0, 3.0), mode="sliding")
+    arc = hybrid.simulate(controlled, (0.1, -0.15), (0.0, 3.0), mode="sliding")
     assert arc.status.ok
     assert arc.steps < 50
     np.testing.assert_allclose(arc.x[-1], 0.1 * np.exp(-4.5) * np.array([1.0, -1.5]), rtol=1e-10)
