@@ -13,6 +13,7 @@ from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.continuation.branch import Bifurcation, Branch
 from hybrid.continuation.continue_orbit import continue_orbit
+from hybrid.continuation.switch_branch import switch_branch
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
@@ -76,6 +77,7 @@ __all__ = [
     "split",
     "stroboscopic_section",
     "sweep",
+    "switch_branch",
     "work_precision",
 ]
 

@@ -41,6 +41,7 @@ DEFAULTS = {
         **{"times": None, "saltation": None, "fundamental": None, "exponents": None},
         **{"steps": None, "seconds": None},
     },
+    hybrid.switch_branch: {"solver": None},
     hybrid.continue_orbit: {"solver": None, "max_steps": 2000},
     hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "laws": None},
     hybrid.from_equations: PLAIN,

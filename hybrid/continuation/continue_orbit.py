@@ -109,7 +109,7 @@ def _both_ways(
     events: list[Event] = []
     why: list[str] = []
     for sign in (-1.0, 1.0):
-        begin = walk.begin(_quiet(walk.family, point), sign)
+        begin = walk.begin(quiet_point(walk.family, point), sign)
         if begin is None:
             raise ArgumentError("orbit is not found again: solve it with tighter tolerances.")
         found: list[Place] = []
@@ -130,14 +130,14 @@ def _both_ways(
             places, events = [*places, *found], [*events, *met]
         if why[-1] == "closed":
             break
-    orbits = tuple(_orbit(walk.family, place.shot, orbit.t0) for place in places)
+    orbits = tuple(orbit_of(walk.family, place.shot, orbit.t0) for place in places)
     stable = np.array([bool(np.all(np.abs(walk.multipliers(place)) < 1.0)) for place in places])
     bifurcations = tuple(
         Bifurcation(
             each.kind,
             walk.family.name,
             each.place.value,
-            _orbit(walk.family, each.place.shot, orbit.t0),
+            orbit_of(walk.family, each.place.shot, orbit.t0),
             each.message,
         )
         for each in events
@@ -145,7 +145,7 @@ def _both_ways(
     return Branch(walk.family.system, walk.family.name, orbits, stable, bifurcations, SUCCESS), why
 
 
-def _quiet(family: Family, point: Point) -> Point:
+def quiet_point(family: Family, point: Point) -> Point:
     """A point of the same orbit away from its jumps."""
     shot = family.shoot(point)
     if len(shot.arc.jumps) and family.is_near_section(shot):
@@ -168,7 +168,7 @@ def _family(orbit: PeriodicOrbit, name: str, solver: Solver) -> Family:
     return Family(orbit.system, name, dict(orbit.parameters), orbit.forcing_periods, solver)
 
 
-def _orbit(family: Family, shot: Shot, t0: float) -> PeriodicOrbit:
+def orbit_of(family: Family, shot: Shot, t0: float) -> PeriodicOrbit:
     """The orbit of a shot as a result; of a forced system at the phase of the time ``t0``."""
     point, arc = shot.point, shot.arc
     x, mode, t = point.x, point.mode, point.t
@@ -183,7 +183,7 @@ def _orbit(family: Family, shot: Shot, t0: float) -> PeriodicOrbit:
     targets = [jump.target for jump in arc.jumps if jump.target is not None]
     return PeriodicOrbit(
         system=family.system,
-        parameters={**family.system.parameters, **family.parameters, family.name: point.value},
+        parameters={**family.system.parameters, **family.parameters, family.name: float(point.value)},
         x0=np.array(x),
         mode=mode,
         t0=t,

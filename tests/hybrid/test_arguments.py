@@ -21,7 +21,7 @@ import lyapunov.study.regimes
 import models
 from hybrid.arguments import floats, number, one_of
 from hybrid.errors import HybridError
-from models import contact
+from models import buck_converter, contact
 from models.dry_friction_oscillator import den_hartog_amplitude
 from models.one_impact import one_impact_orbits
 from tests.hybrid.arguments.methods import methods
@@ -32,12 +32,21 @@ from tests.hybrid.arguments.systems import systems
 from tests.hybrid.arguments.values import BALL, OSCILLATOR
 
 
+def flip_of_the_converter():
+    converter, given = buck_converter(), {"parameters": {"E": 20.0}}
+    arc = hybrid.simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", **given)
+    orbit = hybrid.periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, **given)
+    (flip,) = hybrid.continue_orbit(orbit, "E", (15.0, 30.0)).bifurcations
+    return flip
+
+
 @pytest.fixture(scope="module")
 def made():
     """The objects that methods and plots are called on."""
     return {
         "arc": hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.0)),
         "orbit": (orbit := hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0))),
+        "flip": flip_of_the_converter(),
         "branch": hybrid.continue_orbit(orbit, "w", (0.99, 1.01)),
         "comparison": lyapunov.compare_models({"a": OSCILLATOR}, (0.0, 0.0), reference="a", intervals=5),
         "chart": lyapunov.chart(OSCILLATOR, {"c": [0.1, 0.2]}, (0.0, 0.0), intervals=5, section=3),

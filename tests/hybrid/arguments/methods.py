@@ -35,6 +35,10 @@ def methods(made):
         ),
         (call(hybrid.Branch.orbit, made["branch"], 0), {"i": [None, "a", 1.5, 10**9, True]}),
         (
+            call(hybrid.switch_branch, made["flip"]),
+            {"bifurcation": [None, "a", 3, made["orbit"]], "solver": SOLVER},
+        ),
+        (
             call(hybrid.continue_orbit, made["orbit"], "w", (0.9, 1.1)),
             {
                 "orbit": [None, "a", 3, BALL],

@@ -17,6 +17,7 @@ from hybrid import (
     continue_orbit,
     periodic_orbit,
     simulate,
+    switch_branch,
 )
 from models.one_impact import one_impact_orbits
 
@@ -243,3 +244,35 @@ def test_a_picture(impacts):
     assert ax.get_xlabel() == "w"
     labels = {text.get_text() for text in ax.get_legend().get_texts()}
     assert labels == {"fold", "grazing"}
+
+
+class TestSwitching:
+    def test_at_a_flip_to_twice_the_period(self):
+        """The orbit of period two of the quadratic map, ``a^2 u^2 - a u + 1 = a``, doubles at 5/4."""
+        orbit = periodic_orbit(quadratic_map(0.5), (0.4, np.sqrt(3.0) - 1.0), period=1.0)
+        flip = continue_orbit(orbit, "a", (0.3, 1.0)).bifurcations[-1]
+        doubled = switch_branch(flip)
+        assert doubled.period == pytest.approx(2.0, rel=1e-12)
+        assert doubled.transitions == ("tick", "tick")
+        a, u = doubled.parameters["a"], doubled.x0[1]
+        assert a**2 * u**2 - a * u + 1.0 - a == pytest.approx(0.0, abs=1e-9)
+        branch = continue_orbit(doubled, "a", (0.7, 1.4))
+        assert set(kinds(branch)) == {"flip"}
+        assert [each.value for each in branch.bifurcations] == pytest.approx([1.25, 1.25], abs=1e-9)
+
+    def test_at_a_branch_point(self):
+        """The other orbits of the pitchfork have ``x^2 = b``."""
+        fork = HybridSystem(
+            state=("x", "y"),
+            parameters={"b": -0.5},
+            modes=[Mode("m", lambda t, x, p: (p.b * x.x - x.x**3, np.cos(2 * np.pi * t) - x.y))],
+            period=1.0,
+        )
+        (point,) = continue_orbit(periodic_orbit(fork, (0.0, 0.0)), "b", (-1.0, 1.0)).bifurcations
+        other = switch_branch(point)
+        assert other.x0[0] ** 2 == pytest.approx(other.parameters["b"], rel=1e-6)
+
+    def test_errors(self, impacts):
+        fold = next(each for each in impacts.bifurcations if each.kind == "fold")
+        with pytest.raises(ArgumentError, match="bifurcation is a fold, where no other branch"):
+            switch_branch(fold)
