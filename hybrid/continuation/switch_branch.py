@@ -18,6 +18,8 @@ PERIODS = {"flip": 2, "branch point": 1}
 # The first orbit is this far from the bifurcation, in units of its size, or nearer by halves.
 DISTANCE = 0.02
 NEAREST = 1e-6
+# Near a bifurcation the equations are nearly singular, and rounding moves the unknowns by more than the gap.
+SETTLED = 1e-8
 
 
 def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> PeriodicOrbit:
@@ -59,7 +61,9 @@ def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> 
     family = Family(orbit.system, bifurcation.parameter, dict(orbit.parameters), periods, method)
     point = Point(np.array(orbit.x0), orbit.t0, orbit.mode, period, bifurcation.value)
     shot = family.shoot(quiet_point(family, point))
-    units = np.append(shot.scale, [period, abs(bifurcation.value) or 1.0])
+    # The value may be zero where another one is declared.
+    size = max(abs(bifurcation.value), abs(orbit.system.parameters[bifurcation.parameter])) or 1.0
+    units = np.append(shot.scale, [period, size])
     matrix, _ = family.equations(shot, shot, units)
     # Of the two directions in which the equations are singular, that at a fixed parameter.
     one, other = np.linalg.svd(matrix)[2][-2:]
@@ -96,7 +100,7 @@ def _at_distance(
             row[-2] = 0.0
         bordered = np.vstack([matrix, row])
         change = np.linalg.lstsq(bordered, np.append(right, distance - row @ gone), rcond=None)[0]
-        if np.all(np.abs(trial.gap) <= CLOSED * trial.scale) and np.abs(change).max() <= CLOSED:
+        if np.all(np.abs(trial.gap) <= CLOSED * trial.scale) and np.abs(change).max() <= SETTLED:
             return trial
         point = family.along(point, units * change)
     return None
