@@ -16,7 +16,7 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Function, Guard, Mode, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.watched import is_of_library
-from hybrid.testing.case import MOST_OF_WHOLE, Case
+from hybrid.testing.case import MOST_OF_WHOLE, Case, lasting
 from hybrid.testing.errors import PropertyError
 from hybrid.testing.starts import nearest_zero, start_in
 
@@ -31,6 +31,8 @@ STARTS = 100
 AIMED = 3
 ROOM = 0.25
 MOMENT = 0.02
+# A mode that never lasts is told after this many visits.
+FEW = 3
 # A condition refuses every crossing if it refuses this many places on the guard, and allows none.
 PLACES = 20
 # A guard is zero at a jump if it is at most this share of its size on the run.
@@ -51,6 +53,8 @@ class Coverage:
         How often a guard with a condition was crossed in its direction without firing, by name.
     ends
         How runs ended before the end of their span, by what is said of it.
+    lasting
+        Modes in which a run has stayed for some time.
     """
 
     system: HybridSystem
@@ -58,6 +62,7 @@ class Coverage:
     visits: Counter[str]
     refused: Counter[str]
     ends: Counter[str]
+    lasting: set[str] = attrs.field(factory=set)
     cases: list[Case] = attrs.field(factory=list)
 
     @classmethod
@@ -77,6 +82,7 @@ class Coverage:
         if arc is None:
             return
         self.jumps.update(jump.transition for jump in arc.jumps if jump.kind != "limit")
+        self.lasting.update(str(mode) for mode in np.unique(arc.mode[lasting(arc)]))
         self.visits.update([str(arc.mode[0]), *(jump.target for jump in arc.jumps if jump.target)])
         for transition in self.system.transitions:
             if transition.name in self.refused:
@@ -99,7 +105,7 @@ class Coverage:
 
     @property
     def dead_ends(self) -> tuple[str, ...]:
-        """Modes that no transition leaves although the state moves in them, and modes that none enters."""
+        """Modes that nothing leaves although the state moves , that nothing enters, that never last."""
         system = self.system
         left = {each.source for each in system.transitions}
         entered = {name for each in system.transitions for name in (each.target, each.accumulates_to)}
@@ -112,6 +118,11 @@ class Coverage:
             f"NEVER ENTERED: no transition leads to mode {name!r}."
             for name in system.mode_names
             if len(system.modes) > 1 and name not in entered and name != system.start
+        ]
+        found += [
+            f"NEVER LASTS: each of {visits} runs left mode {name!r} at the instant at which it entered."
+            for name, visits in self.visits.items()
+            if visits >= FEW and name not in self.lasting
         ]
         return tuple(found)
 

@@ -14,6 +14,7 @@ from hybrid.symbolic.reads import TIME, names_read
 from hybrid.symbolic.values import TraceError
 from hybrid.system.graph import HybridSystem, functions_of
 from hybrid.system.periodicity import period_at, period_fault_at
+from hybrid.system.watched import is_of_library
 from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import PropertyError, discard
 
@@ -65,6 +66,9 @@ def check_period(case: Case) -> None:
         discard("no period is declared")
     phase = case.t0 % period
     for _, function in functions_of(system):
+        if is_of_library(function.function):
+            # Made from functions that are checked, and zero but for rounding where these cancel.
+            continue
         fault = period_fault_at(system.variables, function, phase, x, case.values, period)
         if fault is not None:
             case.fail(

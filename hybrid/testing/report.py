@@ -70,7 +70,8 @@ class SystemReport:
     one_sided
         Transitions that were taken, and whose condition has refused no crossing.
     dead_ends
-        Modes that no transition leaves although the state moves in them, and modes that none enters.
+        Modes that no transition leaves although the state moves in them, modes that none enters, and modes
+        that each run leaves at once.
     numbers
         Numbers that the model functions read from modules and closures, by name.
     discontinuities

@@ -162,3 +162,18 @@ def test_runs_are_aimed_at_what_no_run_took():
     assert not check_system(carts(joined), **together).never_seen
     with pytest.raises(PropertyError, match="'together' is zero in mode 'latched'"):
         check_system(carts(lambda t, x, p: {"u": 0.5 * (x.u + x.v)}), **together)
+
+
+def test_a_mode_that_never_lasts():
+    """The charger is full at the voltage at which it begins."""
+    charger = HybridSystem(
+        state=("u",),
+        modes=[Mode("off", lambda t, x, p: (-1.0,)), Mode("charge", lambda t, x, p: (1.0,))],
+        transitions=[
+            Transition("off", "charge", Guard(lambda t, x, p: x.u, -1), Reset(lambda t, x, p: {"u": 1.0})),
+            Transition("charge", "off", Guard(lambda t, x, p: x.u - 0.5, +1)),
+        ],
+    )
+    report = check_system(charger, states={"u": (0.1, 1.0)}, mode="off", t_span=(0.0, 4.0), examples=5)
+    assert "- NEVER LASTS: each of " in str(report)
+    assert "left mode 'charge' at the instant at which it entered" in str(report)
