@@ -105,7 +105,7 @@ class Coverage:
 
     @property
     def dead_ends(self) -> tuple[str, ...]:
-        """Modes that nothing leaves although the state moves , that nothing enters, that never last."""
+        """Modes that nothing leaves though the state moves there, that nothing enters, that never last."""
         system = self.system
         left = {each.source for each in system.transitions}
         entered = {name for each in system.transitions for name in (each.target, each.accumulates_to)}
