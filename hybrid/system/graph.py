@@ -102,7 +102,8 @@ class HybridSystem(Portable):
         For reports and figures.
     units
         Units by name, of components of the state, of parameters, and of time under the name ``"t"``; any may
-        be left out. Results as datasets and pictures show them; no calculation uses them.
+        be left out. Results as datasets and pictures show them, and `hybrid.testing` checks that the functions
+        fit them; no run uses them.
     laws
         What the author knows of the runs, such as a conserved energy: `Laws`. The checks of
         `hybrid.testing` use them, and say so if one does not fit the system; no calculation does.
