@@ -102,7 +102,7 @@ class HybridSystem(Portable):
         For reports and figures.
     units
         Units by name, of components of the state, of parameters, and of time under the name ``"t"``; any may
-        be left out. Results as datasets and pictures show them, and `hybrid.testing` checks that the functions
+        be left out. Results as datasets and pictures show them, and `hybrid.testing` checks that functions
         fit them; no run uses them.
     laws
         What the author knows of the runs, such as a conserved energy: `Laws`. The checks of
