@@ -9,7 +9,7 @@ from hybrid import arguments
 from hybrid.continuation.branch import Bifurcation, Branch
 from hybrid.continuation.walk import Event, Place, Walk
 from hybrid.errors import ArgumentError
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, family_of
 from hybrid.orbits.shots import Family, Point, Shot
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
@@ -93,7 +93,7 @@ def continue_orbit(
         raise ArgumentError(f"span must be (low, high) around {parameter} = {value}; got {got}.")
     most = arguments.count("max_steps", max_steps, 1)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-    walk = Walk(_family(orbit, parameter, method), high - low)
+    walk = Walk(family_of(orbit, parameter, method), high - low)
     point = Point(np.array(orbit.x0), orbit.t0, orbit.mode, orbit.period, value)
     with CTRL_C:
         found, why = _both_ways(walk, point, orbit, low, high, most)
@@ -108,13 +108,13 @@ def _both_ways(
     places: list[Place] = []
     events: list[Event] = []
     why: list[str] = []
+    begin = walk.begin(quiet_shot(walk.family, point))
+    if begin is None:
+        raise ArgumentError("orbit is not found again: solve it with tighter tolerances.")
     for sign in (-1.0, 1.0):
-        begin = walk.begin(quiet_point(walk.family, point), sign)
-        if begin is None:
-            raise ArgumentError("orbit is not found again: solve it with tighter tolerances.")
         found: list[Place] = []
         met: list[Event] = []
-        for item in walk.walk(begin, low, high, most):
+        for item in walk.walk(attrs.evolve(begin, tangent=sign * begin.tangent), low, high, most):
             if isinstance(item, Place):
                 found.append(item)
             elif isinstance(item, Event):
@@ -145,12 +145,12 @@ def _both_ways(
     return Branch(walk.family.system, walk.family.name, orbits, stable, bifurcations, SUCCESS), why
 
 
-def quiet_point(family: Family, point: Point) -> Point:
-    """A point of the same orbit away from its jumps."""
+def quiet_shot(family: Family, point: Point) -> Shot:
+    """One pass around the orbit of a point, from a place away from its jumps."""
     shot = family.shoot(point)
-    if len(shot.arc.jumps) and family.is_near_section(shot):
-        return family.moved(shot, np.zeros(len(point.x) + 2))[0]
-    return point
+    if not family.is_near_section(shot):
+        return shot
+    return family.shoot(family.moved(shot, np.zeros(len(point.x) + 2))[0])
 
 
 def _status(why: list[str]) -> Status:
@@ -164,10 +164,6 @@ def _status(why: list[str]) -> Status:
     )
 
 
-def _family(orbit: PeriodicOrbit, name: str, solver: Solver) -> Family:
-    return Family(orbit.system, name, dict(orbit.parameters), orbit.forcing_periods, solver)
-
-
 def orbit_of(family: Family, shot: Shot, t0: float) -> PeriodicOrbit:
     """The orbit of a shot as a result; of a forced system at the phase of the time ``t0``."""
     point, arc = shot.point, shot.arc
@@ -176,8 +172,7 @@ def orbit_of(family: Family, shot: Shot, t0: float) -> PeriodicOrbit:
         ahead = (t0 - point.t) % point.period
         i = int(np.searchsorted(arc.t, point.t + ahead, side="right")) - 1
         x, mode, t = arc(point.t + ahead)[:-1], str(arc.mode[max(i, 0)]), t0
-    multipliers = np.linalg.eigvals(shot.fundamental)
-    multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
+    multipliers = shot.multipliers
     with np.errstate(divide="ignore"):
         moduli = np.log(np.abs(multipliers))
     targets = [jump.target for jump in arc.jumps if jump.target is not None]

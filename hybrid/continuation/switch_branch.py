@@ -6,10 +6,10 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.continuation.branch import Bifurcation
-from hybrid.continuation.continue_orbit import orbit_of, quiet_point
+from hybrid.continuation.continue_orbit import orbit_of, quiet_shot
 from hybrid.errors import ArgumentError
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.orbits.shots import CLOSED, MOST_CORRECTIONS, Family, Point, Shot
+from hybrid.orbits.shots import Family, Point
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 
@@ -18,8 +18,6 @@ PERIODS = {"flip": 2, "branch point": 1}
 # The first orbit is this far from the bifurcation, in units of its size, or nearer by halves.
 DISTANCE = 0.02
 NEAREST = 1e-6
-# Near a bifurcation the equations are nearly singular, and rounding moves the unknowns by more than the gap.
-SETTLED = 1e-8
 
 
 def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> PeriodicOrbit:
@@ -60,7 +58,7 @@ def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> 
     periods, period = times * orbit.forcing_periods, times * orbit.period
     family = Family(orbit.system, bifurcation.parameter, dict(orbit.parameters), periods, method)
     point = Point(np.array(orbit.x0), orbit.t0, orbit.mode, period, bifurcation.value)
-    shot = family.shoot(quiet_point(family, point))
+    shot = quiet_shot(family, point)
     # The value may be zero where another one is declared.
     size = max(abs(bifurcation.value), abs(orbit.system.parameters[bifurcation.parameter])) or 1.0
     units = np.append(shot.scale, [period, size])
@@ -71,36 +69,9 @@ def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> 
     direction /= np.linalg.norm(direction)
     distance = DISTANCE
     while distance > NEAREST:
-        found = _at_distance(family, shot, units, direction, distance)
+        guess = family.along(shot.point, distance * units * direction)
+        found = None if guess is None else family.corrected(guess, shot, units, direction)
         if found is not None:
-            return orbit_of(family, found, orbit.t0)
+            return orbit_of(family, found[0], orbit.t0)
         distance /= 2.0
     raise ArgumentError(f"no other branch is found near the {bifurcation.kind}: tighten solver=.")
-
-
-def _at_distance(
-    family: Family, shot: Shot, units: np.ndarray, direction: np.ndarray, distance: float
-) -> Shot | None:
-    """The orbit at a distance from a shot along a direction ``(n + 2,)``, in units of the unknowns."""
-    begin = shot.point
-    point = family.along(begin, distance * units * direction)
-    for _ in range(MOST_CORRECTIONS):
-        if point is None:
-            return None
-        try:
-            trial = family.shoot(point)
-        except ArgumentError:
-            return None
-        if not trial.whole or trial.transitions != shot.transitions:
-            return None
-        matrix, right = family.equations(trial, shot, units)
-        gone = np.append(point.x - begin.x, [point.period - begin.period, point.value - begin.value]) / units
-        row = direction.copy()
-        if family.forced:
-            row[-2] = 0.0
-        bordered = np.vstack([matrix, row])
-        change = np.linalg.lstsq(bordered, np.append(right, distance - row @ gone), rcond=None)[0]
-        if np.all(np.abs(trial.gap) <= CLOSED * trial.scale) and np.abs(change).max() <= SETTLED:
-            return trial
-        point = family.along(point, units * change)
-    return None

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from hybrid.continuation.touch import Key, Touch, measures, touch_ahead
-from hybrid.orbits.shots import Family, Point, Shot
+from hybrid.orbits.shots import Family, Shot
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
@@ -73,22 +73,10 @@ class Walk:
         """Units ``(n + 2,)`` of the unknowns."""
         return np.append(shot.scale, [shot.point.period, self.size])
 
-    def begin(self, point: Point, sign: float) -> Place | None:
-        """The place of an orbit, with the tangent towards larger or smaller values of the parameter."""
-        shot = self.family.shoot(point)
-        if not shot.whole:
-            return None
-        anchor, units = shot, self.units(shot)
-        corrected = self.family.corrected(point, anchor, units, fixed=True)
-        if corrected is None:
-            return None
-        place = self._place(corrected[0], None)
-        return (
-            None if place is None else attrs.evolve(place, tangent=place.tangent * sign * self._sense(place))
-        )
-
-    def _sense(self, place: Place) -> float:
-        return 1.0 if place.tangent[-1] >= 0.0 else -1.0
+    def begin(self, shot: Shot) -> Place | None:
+        """The place of an orbit, with the tangent towards larger values of the parameter."""
+        found = self.family.at_value(shot.point, shot, self.units(shot)) if shot.whole else None
+        return None if found is None else self._place(found, np.eye(len(shot.gap) + 2)[-1])
 
     def step(self, place: Place, length: float) -> tuple[Place, int] | None:
         """The place at a distance along the tangent, and how many corrections it took; or None."""
@@ -99,39 +87,21 @@ class Walk:
         corrected = self.family.corrected(guess, place.shot, units)
         if corrected is None:
             return None
-        found = self._place(corrected[0], place)
-        if found is None or found.tangent @ place.tangent < LEAST_COSINE:
-            return None
-        return found, corrected[1]
+        found = self._place(corrected[0], place.tangent)
+        return None if found.tangent @ place.tangent < LEAST_COSINE else (found, corrected[1])
 
-    def at_value(self, place: Place, value: float) -> Place | None:
-        """The orbit at another value of the parameter, near a place; None if there is none."""
-        units = self.units(place.shot)
-        change = place.tangent * ((value - place.value) / (place.tangent[-1] * units[-1]))
-        guess = self.family.along(place.shot.point, units * change)
-        corrected = None if guess is None else self.family.corrected(guess, place.shot, units, fixed=True)
-        return None if corrected is None else self._place(corrected[0], place)
-
-    def _place(self, shot: Shot, before: Place | None) -> Place | None:
-        """The place of a shot; None where the branch has no unique tangent."""
+    def _place(self, shot: Shot, onward: np.ndarray) -> Place:
+        """The place of a shot, with the tangent that goes on in a direction ``(n + 2,)``."""
         matrix, _ = self.family.equations(shot, shot, self.units(shot))
         tangent = np.linalg.svd(matrix)[2][-1]
-        if before is not None and tangent @ before.tangent < 0.0:
-            tangent = -tangent
-        return Place(shot, tangent)
+        return Place(shot, -tangent if tangent @ onward < 0.0 else tangent)
 
     def with_quiet_section(self, place: Place) -> Place:
         """The same orbit from a point away from its jumps."""
-        if not self.family.is_near_section(place.shot):
-            return place
         units = self.units(place.shot)
         point, turned = self.family.moved(place.shot, units * place.tangent)
         shot = self.family.shoot(point)
-        if not shot.whole:
-            return place
-        scaled = turned / self.units(shot)
-        found = self._place(shot, Place(shot, scaled))
-        return place if found is None else found
+        return self._place(shot, turned / self.units(shot)) if shot.whole else place
 
     def walk(self, place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
         """Places along the branch with the events between them; the last item is why it ends."""
@@ -228,7 +198,7 @@ class Walk:
 
     def multipliers(self, place: Place) -> np.ndarray:
         """Multipliers without the one along an autonomous orbit."""
-        values = np.linalg.eigvals(place.shot.fundamental)
+        values = place.shot.multipliers
         if self.family.forced:
             return values
         return np.delete(values, int(np.argmin(np.abs(values - 1.0))))

@@ -114,9 +114,7 @@ class PeriodicOrbit:
         for name in given:
             arguments.known("names: Parameter", name, self.system.parameters, "Parameters")
         method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-        families = [
-            Family(self.system, name, dict(self.parameters), self.forcing_periods, method) for name in given
-        ]
+        families = [family_of(self, name, method) for name in given]
         return sensitivity_of(families, Point(np.array(self.x0), self.t0, self.mode, self.period, 0.0))
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
@@ -130,3 +128,8 @@ class PeriodicOrbit:
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
+
+
+def family_of(orbit: PeriodicOrbit, name: str, solver: Solver) -> Family:
+    """The orbits over one parameter that this one belongs to."""
+    return Family(orbit.system, name, dict(orbit.parameters), orbit.forcing_periods, solver)

@@ -61,11 +61,11 @@ def _of_parameter(family: Family, point: Point) -> tuple[np.ndarray, np.ndarray,
     step = STEP * (abs(point.value) or 1.0)
     shot = family.shoot(point)
     units = np.append(shot.scale, [point.period, step])
-    made = family.corrected(point, shot, units, fixed=True) if shot.whole else None
-    slope = None if made is None else _slope(family, made[0], units)
+    made = family.at_value(point, shot, units) if shot.whole else None
+    slope = None if made is None else _slope(family, made, units)
     if made is None or slope is None:
         raise ArgumentError(f"orbit is not isolated, or not smooth in {family.name}: it has no derivative.")
-    n, shot = len(point.x), made[0]
+    n, shot = len(point.x), made
     changes = []
     for h in (step, step / 2):
         ends = [_neighbour(family, shot, units, slope, sign * h) for sign in (1.0, -1.0)]
@@ -86,13 +86,12 @@ def _slope(family: Family, shot: Shot, units: np.ndarray) -> np.ndarray | None:
 
 def _neighbour(family: Family, shot: Shot, units: np.ndarray, slope: np.ndarray, change: float) -> np.ndarray:
     """Multipliers ``(n,)`` of the orbit at another value of the parameter, in the order of those here."""
-    here = np.linalg.eigvals(shot.fundamental)
-    here = here[np.argsort(-np.abs(here), kind="stable")]
+    here = shot.multipliers
     guess = family.along(shot.point, change * slope)
-    made = None if guess is None else family.corrected(guess, shot, units, fixed=True)
+    made = None if guess is None else family.at_value(guess, shot, units)
     if made is None:
         return np.full(len(here), np.nan)
-    there, found = list(np.linalg.eigvals(made[0].fundamental)), []
+    there, found = list(made.multipliers), []
     for each in here:
         found.append(there.pop(int(np.argmin(np.abs(np.array(there) - each)))))
     return np.array(found)

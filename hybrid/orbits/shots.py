@@ -70,6 +70,12 @@ class Shot:
         return self.slopes[:, :-2]
 
     @property
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers ``(n,)``, largest first."""
+        values = np.linalg.eigvals(self.fundamental)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    @property
     def transitions(self) -> tuple[str, ...]:
         """Names of the transitions in the order in which they fire."""
         return tuple(map(str, self.arc.jumps.transition))
@@ -164,9 +170,12 @@ class Family:
         return attrs.evolve(point, x=point.x + change[:-2], period=period, value=value)
 
     def corrected(
-        self, point: Point, anchor: Shot, units: np.ndarray, *, fixed: bool = False
+        self, point: Point, anchor: Shot, units: np.ndarray, across: np.ndarray | None = None
     ) -> tuple[Shot, int] | None:
-        """The orbit nearest to a point, by the shortest Newton steps; ``fixed`` keeps the parameter."""
+        """The orbit nearest to a point, by the shortest Newton steps, and how many; None if there is none.
+
+        With ``across (n + 2,)``, a direction of the scaled unknowns, no step has a part along it.
+        """
         wanted = anchor.transitions
         for corrections in range(MOST_CORRECTIONS + 1):
             try:
@@ -176,19 +185,22 @@ class Family:
             if not shot.whole or shot.transitions != wanted:
                 return None
             matrix, right = self.equations(shot, anchor, units)
-            if fixed:
-                matrix = matrix[:, :-1]
+            if across is not None:
+                matrix, right = np.vstack([matrix, across]), np.append(right, 0.0)
             change = np.linalg.lstsq(matrix, right, rcond=1e-14)[0]
-            if fixed:
-                change = np.append(change, 0.0)
             closed = np.all(np.abs(shot.gap) <= CLOSED * shot.scale)
-            if (closed and np.abs(change).max() <= CONVERGED) or (closed and corrections == MOST_CORRECTIONS):
+            if closed and (np.abs(change).max() <= CONVERGED or corrections == MOST_CORRECTIONS):
                 return shot, corrections
             moved = self.along(shot.point, units * change)
             if moved is None or np.abs(change).max() > 1.0:
                 return None
             point = moved
         return None
+
+    def at_value(self, point: Point, anchor: Shot, units: np.ndarray) -> Shot | None:
+        """The orbit near a point at the same value of the parameter; None if there is none."""
+        made = self.corrected(point, anchor, units, np.eye(len(units))[-1])
+        return None if made is None else made[0]
 
     def equations(self, shot: Shot, anchor: Shot, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Scaled derivatives of the gap, a phase condition for an autonomous orbit, and the right side."""
@@ -229,19 +241,24 @@ class Family:
         nearest = np.minimum(np.abs(times - point.t), np.abs(times - point.t - point.period))
         return bool(np.any(nearest < NEAR_SECTION * point.period))
 
+    @cached_property
+    def _others(self) -> dict[str, float]:
+        """The parameters of the extended system."""
+        return {name: value for name, value in self.parameters.items() if name != self.name}
+
     def _run(self, point: Point, t: float, tangent: np.ndarray) -> HybridArc:
         return simulate(
             extended(self.system, (self.name,)),
             np.append(point.x, point.value),
             (point.t, t),
             mode=point.mode,
-            parameters={name: value for name, value in self.parameters.items() if name != self.name},
+            parameters=self._others,
             solver=self.solver,
             tangent=tangent,
         )
 
     def _field(self, mode: str, t: float, x: np.ndarray, system: HybridSystem) -> np.ndarray:
-        values = system.parameter_values({k: v for k, v in self.parameters.items() if k != self.name})
+        values = system.parameter_values(self._others)
         rates: Any = evaluate(system.variables, system.modes[system.mode_index(mode)].field, t, x, values)
         n = self.system.dimension
         return np.full(n, np.nan) if rates is None else np.asarray(rates[:n])

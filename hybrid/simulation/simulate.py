@@ -121,13 +121,13 @@ def simulate(
         horizon=t1 - t0,
     )
     check_time("t_span", t1, trajectory.model.period)
-    first, begin = trajectory.mode, trajectory.x
+    begun = (trajectory.x, trajectory.mode) if names else None
     arc = _Recorder(trajectory, times, t1, bool(keep_jumps)).run(t1, most)
     trajectory.release()
-    if not names:
+    if begun is None:
         return arc
     return with_sensitivities(
-        arc, names, begin, first, (t0, t1), solver=solver, max_jumps=most, samples=times, simulate=simulate
+        arc, names, *begun, (t0, t1), solver=solver, max_jumps=most, samples=times, simulate=simulate
     )
 
 

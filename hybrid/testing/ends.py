@@ -39,11 +39,11 @@ def check_ends(case: Case) -> None:
     PropertyError
         If the run ends in ``STUCK``, ``NON_FINITE`` or ``STEP_TOO_SMALL``.
     """
-    arc = _whole(case)
+    arc = whole_run(case)
     if arc.status.code not in BROKEN:
         return
     neighbour = attrs.evolve(case, x0=tuple(x * (1.0 + NEAR / (i + 2)) for i, x in enumerate(case.x0)))
-    if _whole(neighbour).status.code not in BROKEN:
+    if whole_run(neighbour).status.code not in BROKEN:
         discard("the run breaks, and runs from starts nearby do not")
     if arc.status.code == StatusCode.STUCK and np.abs(arc.x[-1]).max() > GROWN * np.abs(arc.x[0]).max():
         discard("jumps follow one another within the rounding of time, since the state grows without bound")
@@ -62,7 +62,7 @@ def check_sides_after(case: Case) -> None:
     PropertyError
         If a reset lands beyond a guard.
     """
-    arc = _whole(case)
+    arc = whole_run(case)
     jumps = list(arc.jumps)
     for jump, after in zip_longest(jumps, jumps[1:]):
         # A run that breaks at a jump may end before the next.
@@ -70,7 +70,8 @@ def check_sides_after(case: Case) -> None:
             _check_landing(case, jump, after)
 
 
-def _whole(case: Case) -> HybridArc:
+def whole_run(case: object) -> HybridArc:
+    """The whole run of a case; the example is discarded if no mode allows its start."""
     arc = as_case(case).whole
     if arc is None:
         discard("no mode allows the start")

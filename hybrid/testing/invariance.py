@@ -15,6 +15,7 @@ from hybrid.simulation.jumps import Jump
 from hybrid.system.graph import HybridSystem
 from hybrid.testing.case import Case, Run, as_case, matrix_told, mode_after
 from hybrid.testing.errors import discard
+from hybrid.testing.events import BEYOND
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
 
 CUT = "Cutting a flow by an identity transition changes nothing"
@@ -25,8 +26,6 @@ SPLIT = "A run that is split and resumed goes on as if it had not been"
 SAMPLES = "Samples, also exactly at an event, change nothing and are the states after it"
 ELASTIC = "An elastic system runs backwards to where it started"
 
-# A guard is beyond zero by more than rounding at this share of its size on the run.
-BEYOND = 1e-7
 # Runs that differ only by rounding must agree to this, relative to the size of the state.
 ROUNDING = 1e-9
 

@@ -14,6 +14,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.system.laws import Law, Laws
 from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
+from hybrid.testing.ends import whole_run
 from hybrid.testing.errors import PropertyError, discard
 
 # A value may differ by this share of the sizes of its terms.
@@ -79,7 +80,7 @@ def declared_too(case: Case, check: Callable[[Case], None]) -> None:
             check(other)
         except (PropertyError, UnsatisfiedAssumption):
             raise error from None
-        if not np.array_equal(_whole(other).jumps.transition, _whole(case).jumps.transition):
+        if not np.array_equal(whole_run(other).jumps.transition, whole_run(case).jumps.transition):
             raise
         raise PropertyError(
             f"{error}\n  It holds with the parameters as declared: a number stands where a parameter belongs "
@@ -103,7 +104,7 @@ def _across_told(law: Law) -> str:
 
 def _check_value(case: Case, law: Law, kind: str) -> None:
     """Fail if a quantity is negative, or not zero, anywhere on the whole run."""
-    arc = _whole(case)
+    arc = whole_run(case)
     tolerance = TOLERANCE * _size_on(case, law, arc)
     for i in _rows(case, law, arc):
         value = float(case.evaluate(law.function, arc.t[i], arc.x[i])[0])
@@ -137,7 +138,7 @@ def _of_mode(case: Case, mode: str, kind: str) -> str:
 
 def _check_change(case: Case, law: Law, kind: str) -> None:
     """Fail if a quantity changes by more than its law allows, along the flow or at a jump."""
-    arc, start, last = _whole(case), 0.0, -1
+    arc, start, last = whole_run(case), 0.0, -1
     tolerance = TOLERANCE * _size_on(case, law, arc)
     for i in _rows(case, law, arc):
         value = float(case.evaluate(law.function, arc.t[i], arc.x[i])[0])
@@ -197,7 +198,7 @@ def _check_across(case: Case, law: Law) -> None:
         with np.errstate(all="ignore"):
             return np.asarray(law.function(t, variables.state_view(minus), variables.state_view(plus), p))
 
-    scale = np.tile(np.abs(_whole(case).x).max(axis=0), 2)
+    scale = np.tile(np.abs(whole_run(case).x).max(axis=0), 2)
     for jump in _jumps_of(case, law.of):
         found = rule(jump.t, jump.x_minus, jump.x_plus)
         if found.dtype == bool:
@@ -221,7 +222,7 @@ def _check_across(case: Case, law: Law) -> None:
 
 def _check_continuous(case: Case, name: str, told: str) -> None:
     """Fail if the state or the field jumps at a transition."""
-    arc, modes = _whole(case), case.system.modes
+    arc, modes = whole_run(case), case.system.modes
     for jump in _jumps_of(case, name):
         assert jump.target is not None
         before, after = (modes[case.system.mode_index(mode)] for mode in (jump.source, jump.target))
@@ -255,18 +256,11 @@ def _check_continuous(case: Case, name: str, told: str) -> None:
 
 def _jumps_of(case: Case, name: str | None) -> Iterator[Jump]:
     """The jumps of a transition on the whole run, without the limits of chatters."""
-    jumps = [jump for jump in _whole(case).jumps if jump.kind != "limit"]
+    jumps = [jump for jump in whole_run(case).jumps if jump.kind != "limit"]
     found = [jump for jump in jumps if name in case.names_of_transition(jump.transition)]
     if not found:
         discard(f"no run took {name!r}")
     yield from found
-
-
-def _whole(case: Case) -> HybridArc:
-    arc = case.whole
-    if arc is None:
-        discard("no mode allows the start")
-    return arc
 
 
 def _before(case: Case, arc: HybridArc, i: int) -> str:

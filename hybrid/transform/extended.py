@@ -81,9 +81,9 @@ class _Extension:
             return None
         if not reads.isdisjoint(self.names):
             return None
-        return lambda p: period(self._parameters((), p, self.original.parameters.__getitem__))
+        return lambda p: period(self._parameters(p, self.original.parameters.__getitem__))
 
-    def _parameters(self, x: Any, p: Any, moved: Callable[[str], Any]) -> Any:
+    def _parameters(self, p: Any, moved: Callable[[str], Any]) -> Any:
         """All parameters of the original, those that are states from ``moved``."""
         names = tuple(self.original.parameters)
         values = [moved(name) if name in self.names else getattr(p, name) for name in names]
@@ -97,6 +97,6 @@ class _Extension:
         def called(t: Any, x: Any, p: Any) -> Any:
             is_plain = isinstance(original.state, int)
             own = x[:n] if is_plain else named_values(STATE, original.state_names, x[:n])
-            return function(t, own, self._parameters(x, p, lambda name: x[places[name]]))
+            return function(t, own, self._parameters(p, lambda name: x[places[name]]))
 
         return called
