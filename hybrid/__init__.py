@@ -11,10 +11,10 @@ from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
-from hybrid.continuation.branch import Bifurcation, Branch
-from hybrid.continuation.continue_orbit import continue_orbit
-from hybrid.continuation.switch_branch import switch_branch
 from hybrid.errors import ArgumentError, HybridError, ModelError
+from hybrid.orbits.continuation.branch import Bifurcation, Branch
+from hybrid.orbits.continuation.continue_orbit import continue_orbit
+from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section

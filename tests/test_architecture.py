@@ -42,7 +42,6 @@ ROOMS = (
     "hybrid.compiler",
     "hybrid.simulation",
     "hybrid.orbits",
-    "hybrid.continuation",
     "hybrid.plot",
     "hybrid.accuracy",
     "hybrid.sweep",

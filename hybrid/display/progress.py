@@ -32,11 +32,12 @@ PATIENCE = 2.0
 
 @contextmanager
 def progress_bar(
-    total: int, title: str, shown: bool | None, unit: str = "interval", done: int = 0
+    total: int | None, title: str, shown: bool | None, unit: str = "interval", done: int = 0
 ) -> Iterator[Progress]:
     """A progress bar with the time left, on standard error or in a notebook; a silent stand-in if False.
 
     With None a bar appears in a terminal or a notebook after two seconds. ``done`` units are done already.
+    If nobody knows the ``total`` (None), the bar counts.
     """
     if shown is False or (shown is None and not _is_watched()):
         yield _Silent()

@@ -12,9 +12,10 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import ROUNDING_OF_TIME
+from hybrid.orbits.continuation.family import Family
+from hybrid.orbits.continuation.place import Place, begun, start_of
 from hybrid.orbits.labelled import described_orbit, labelled_orbit
 from hybrid.orbits.sensitivity import OrbitSensitivity, sensitivity_of
-from hybrid.orbits.shots import Family, Point
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
@@ -114,8 +115,27 @@ class PeriodicOrbit:
         for name in given:
             arguments.known("names: Parameter", name, self.system.parameters, "Parameters")
         method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-        families = [family_of(self, name, method) for name in given]
-        return sensitivity_of(families, Point(np.array(self.x0), self.t0, self.mode, self.period, 0.0))
+        place = self.place(tuple(given), np.ones(len(given)), method)
+        return sensitivity_of(place, self.t0)
+
+    def place(self, names: tuple[str, ...], sizes: np.ndarray, solver: Solver) -> Place:
+        """The orbit among those over some parameters, whose units are ``sizes (k,)``.
+
+        Raises
+        ------
+        ArgumentError
+            If the orbit is not found again.
+        """
+        family = Family(self.system, names, dict(self.parameters), self.forcing_periods, solver, ())
+        arc, values = self.arc(solver), np.array([self.parameters[name] for name in names])
+        started = start_of(family, arc, self.period, values) if arc.status.ok else None
+        place = None if started is None else begun(*started, sizes)
+        if place is None:
+            raise ArgumentError(
+                "orbit is not found again, stretch by stretch: solve it with tighter tolerances, and see "
+                "that the fields have values a little beyond their guards."
+            )
+        return place
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""
@@ -128,8 +148,3 @@ class PeriodicOrbit:
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
-
-
-def family_of(orbit: PeriodicOrbit, name: str, solver: Solver) -> Family:
-    """The orbits over one parameter that this one belongs to."""
-    return Family(orbit.system, name, dict(orbit.parameters), orbit.forcing_periods, solver)

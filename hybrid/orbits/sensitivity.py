@@ -6,7 +6,8 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.shots import Family, Point, Shot
+from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.place import Place, share_of
 
 # Relative change of a parameter for the differences of multipliers, which are extrapolated.
 STEP = 1e-4
@@ -37,61 +38,75 @@ class OrbitSensitivity:
     multipliers: np.ndarray
 
 
-def sensitivity_of(families: list[Family], point: Point) -> OrbitSensitivity:
-    """The derivatives of the orbit through a point, in the parameter of each family.
+def sensitivity_of(place: Place, t: float) -> OrbitSensitivity:
+    """The derivatives of an orbit in the free parameters, of its point at a time.
 
-    The end of the orbit, less its start, is zero: its derivatives in the start, the period and the parameter
-    give those of the point and of the period (implicit function theorem).
+    The equations of the orbit are zero: their derivatives in the unknowns and in the parameters give those of
+    the unknowns (implicit function theorem).
 
     Raises
     ------
     ArgumentError
         If the orbit is not isolated.
     """
-    columns = [_of_parameter(family, attrs.evolve(point, value=_value(family))) for family in families]
-    x0, period, multipliers = (np.stack(each, axis=-1) for each in zip(*columns, strict=True))
-    return OrbitSensitivity(tuple(family.name for family in families), x0, period, multipliers)
+    orbit, units, k = place.orbit, place.units, len(place.sizes)
+    matrix, _ = orbit.equations(orbit, units)
+    sizes = np.linalg.svd(matrix[:, :-k], compute_uv=False)
+    if not sizes[-1] > SINGULAR * sizes[0]:
+        raise _no_derivative(place)
+    slopes = np.linalg.solve(matrix[:, :-k], -matrix[:, -k:] / units[-k:]) * units[:-k, None]
+    first = orbit.loop.x.size
+    columns = [_multipliers(place, np.append(slopes[:, j], np.eye(k)[j]), j) for j in range(k)]
+    return OrbitSensitivity(
+        place.family.names,
+        _of_point(orbit, slopes, t),
+        slopes[-1] - slopes[first],
+        np.stack(columns, axis=-1),
+    )
 
 
-def _value(family: Family) -> float:
-    return float(family.parameters[family.name])
+def _of_point(orbit: Pass, slopes: np.ndarray, t: float) -> np.ndarray:
+    """Derivatives ``(n, k)`` of the point at a time; of an autonomous orbit in the plane across the field."""
+    loop, n = orbit.loop, orbit.loop.x.shape[1]
+    i, share = share_of(orbit, t)
+    begin, end = loop.times[i : i + 2]
+    flow = orbit.family.flow(
+        orbit.family.route[i], loop.x[i], float(begin), float(begin + share * (end - begin)), loop.values
+    )
+    start = slopes[i * n : (i + 1) * n] - np.outer(flow.first_rate, slopes[loop.x.size + i])
+    found = flow.slopes[:, :n] @ start + flow.slopes[:, n:]
+    if orbit.family.forced:
+        # The stretch passes the point some periods after the time, which stays.
+        later = round((begin + share * (end - begin) - t) / loop.period)
+        longer = slopes[-1] - slopes[loop.x.size]
+        return np.asarray(found + later * np.outer(flow.last_rate, longer))
+    across, along = flow.last_rate / orbit.scale**2, flow.last_rate
+    return np.asarray(found - np.outer(along, across @ found) / (across @ along))
 
 
-def _of_parameter(family: Family, point: Point) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    step = STEP * (abs(point.value) or 1.0)
-    shot = family.shoot(point)
-    units = np.append(shot.scale, [point.period, step])
-    made = family.at_value(point, shot, units) if shot.whole else None
-    slope = None if made is None else _slope(family, made, units)
-    if made is None or slope is None:
-        raise ArgumentError(f"orbit is not isolated, or not smooth in {family.name}: it has no derivative.")
-    n, shot = len(point.x), made
+def _multipliers(place: Place, slope: np.ndarray, j: int) -> np.ndarray:
+    """Derivatives ``(n,)`` of the multipliers in one parameter, by extrapolated differences."""
+    step = STEP * (abs(place.values[j]) or 1.0)
     changes = []
     for h in (step, step / 2):
-        ends = [_neighbour(family, shot, units, slope, sign * h) for sign in (1.0, -1.0)]
+        ends = [_neighbour(place, sign * h * slope) for sign in (1.0, -1.0)]
         changes.append((ends[0] - ends[1]) / (2 * h))
-    period = family.slope_of_period(point.value) if family.forced else slope[n]
-    return slope[:n], np.array(period), (4 * changes[1] - changes[0]) / 3
+    return np.asarray((4 * changes[1] - changes[0]) / 3)
 
 
-def _slope(family: Family, shot: Shot, units: np.ndarray) -> np.ndarray | None:
-    """Derivatives ``(n + 2,)`` of the unknowns in the parameter; None if the orbit is not isolated."""
-    matrix, _ = family.equations(shot, shot, units)
-    sizes = np.linalg.svd(matrix[:, :-1], compute_uv=False)
-    if not sizes[-1] > SINGULAR * sizes[0]:
-        return None
-    scaled = np.linalg.solve(matrix[:, :-1], -matrix[:, -1] / units[-1])
-    return np.append(scaled * units[:-1], 1.0)
-
-
-def _neighbour(family: Family, shot: Shot, units: np.ndarray, slope: np.ndarray, change: float) -> np.ndarray:
-    """Multipliers ``(n,)`` of the orbit at another value of the parameter, in the order of those here."""
-    here = shot.multipliers
-    guess = family.along(shot.point, change * slope)
-    made = None if guess is None else family.at_value(guess, shot, units)
+def _neighbour(place: Place, change: np.ndarray) -> np.ndarray:
+    """Multipliers ``(n,)`` of the orbit at other values of the parameters, in the order of those here."""
+    orbit, units, here = place.orbit, place.units, place.orbit.multipliers
+    fixed = np.eye(len(units))[-len(place.sizes) :]
+    made = place.family.corrected(orbit.loop.plus(change), orbit, units, fixed)
     if made is None:
-        return np.full(len(here), np.nan)
-    there, found = list(made.multipliers), []
+        raise _no_derivative(place)
+    there, found = list(made[0].multipliers), []
     for each in here:
         found.append(there.pop(int(np.argmin(np.abs(np.array(there) - each)))))
     return np.array(found)
+
+
+def _no_derivative(place: Place) -> ArgumentError:
+    names = ", ".join(place.family.names)
+    return ArgumentError(f"orbit is not isolated, or not smooth in {names}: it has no derivative.")

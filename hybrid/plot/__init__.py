@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from hybrid import arguments
-from hybrid.continuation.branch import Branch
+from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid import arguments
-from hybrid.continuation.branch import Branch
+from hybrid.orbits.continuation.branch import Branch
 from hybrid.plot.style import COLOURS, as_component, axes_for, small_legend
 from hybrid.simulation.labelled import Names
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -16,10 +15,8 @@ from hybrid.simulation.trajectory import start
 from hybrid.solvers import Solver
 from hybrid.status import apart_status
 from hybrid.system.functions import guard_function
-from hybrid.system.graph import HybridSystem
 from hybrid.transform.extended import extended
-
-_ALONE: WeakKeyDictionary[HybridSystem, dict[int, HybridSystem]] = WeakKeyDictionary()
+from hybrid.transform.restricted import restricted
 
 
 @attrs.frozen(eq=False)
@@ -98,7 +95,7 @@ class Sensitivities:
     def _time_of(self, jump: Jump, t: float, x: np.ndarray, tangents: np.ndarray) -> np.ndarray:
         """Derivatives ``(n + m,)`` of the time of a jump, from a state before it in its mode."""
         system = self.arc.system
-        alone = _alone(system, system.mode_index(jump.source))
+        alone = restricted(system, jump.source)
         run = self.simulate(
             alone, x, (t, jump.t), parameters=self.arc.parameters, solver=self.solver, tangent=tangents
         )
@@ -152,11 +149,3 @@ def with_sensitivities(
         status = again.status
     jumps = None if own is None else attrs.evolve(own, sensitivities=known)
     return attrs.evolve(arc, jumps=jumps, sensitivities=known, status=status)
-
-
-def _alone(system: HybridSystem, mode: int) -> HybridSystem:
-    """A mode without its guards, whose flow reaches up to a jump and no farther than that."""
-    made = _ALONE.setdefault(system, {})
-    if mode not in made:
-        made[mode] = attrs.evolve(system, modes=[system.modes[mode]], transitions=(), start=None)
-    return made[mode]

@@ -6,11 +6,13 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.continuation.branch import Bifurcation, Branch
-from hybrid.continuation.walk import Event, Place, Walk
+from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
-from hybrid.orbits.orbit import PeriodicOrbit, family_of
-from hybrid.orbits.shots import Family, Point, Shot
+from hybrid.orbits.continuation.branch import Bifurcation, Branch
+from hybrid.orbits.continuation.place import Place, share_of
+from hybrid.orbits.continuation.result import Points, orbit_of
+from hybrid.orbits.continuation.walk import Event, walk
+from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
@@ -19,7 +21,6 @@ from hybrid.status import SUCCESS, Status, StatusCode
 ENDS = {
     "range": "the end of the range",
     "closed": "the branch closes",
-    "grazing": "a grazing",
     "infinity": "an orbit that grows without bound",
     "most": "the limit of steps",
     "lost": "Newton's method finds no orbit farther on",
@@ -33,6 +34,7 @@ def continue_orbit(
     *,
     solver: Solver | None = None,
     max_steps: int = 2000,
+    progress: bool | None = None,
 ) -> Branch:
     """The branch of a periodic orbit over a parameter, both ways from the orbit, and the bifurcations on it.
 
@@ -92,103 +94,108 @@ def continue_orbit(
         got = arguments.shown(span)
         raise ArgumentError(f"span must be (low, high) around {parameter} = {value}; got {got}.")
     most = arguments.count("max_steps", max_steps, 1)
+    progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-    walk = Walk(family_of(orbit, parameter, method), high - low)
-    point = Point(np.array(orbit.x0), orbit.t0, orbit.mode, orbit.period, value)
-    with CTRL_C:
-        found, why = _both_ways(walk, point, orbit, low, high, most)
+    with CTRL_C, progress_bar(None, "Branch", progress, "orbit") as bar:
+        found, why = _branch(orbit, parameter, low, high, method, most, bar)
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
     return attrs.evolve(found, status=_status(why))
 
 
-def _both_ways(
-    walk: Walk, point: Point, orbit: PeriodicOrbit, low: float, high: float, most: int
+def _branch(
+    orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
 ) -> tuple[Branch, list[str]]:
-    places: list[Place] = []
-    events: list[Event] = []
+    """The branch both ways, and why it ends at either end."""
+    begin = orbit.place((name,), np.array([high - low]), solver)
+    points = points_of(orbit, begin)
+    items: list[Place | Event] = [begin]
     why: list[str] = []
-    begin = walk.begin(quiet_shot(walk.family, point))
-    if begin is None:
-        raise ArgumentError("orbit is not found again: solve it with tighter tolerances.")
     for sign in (-1.0, 1.0):
-        found: list[Place] = []
-        met: list[Event] = []
-        for item in walk.walk(attrs.evolve(begin, tangent=sign * begin.tangent), low, high, most):
-            if isinstance(item, Place):
-                found.append(item)
-            elif isinstance(item, Event):
-                met.append(item)
-            else:
+        items = items[::-1]
+        for item in walk(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most):
+            if isinstance(item, str):
                 why.append(item)
+            else:
+                items.append(item)
+                bar.update(isinstance(item, Place))
             if CTRL_C.is_set():
                 why.append("interrupted")
                 break
-        if sign < 0.0:
-            places, events = [*found[::-1], begin], met[::-1]
-        else:
-            places, events = [*places, *found], [*events, *met]
-        if why[-1] == "closed":
+        if why[-1] in ("closed", "interrupted"):
             break
-    orbits = tuple(orbit_of(walk.family, place.shot, orbit.t0) for place in places)
-    stable = np.array([bool(np.all(np.abs(walk.multipliers(place)) < 1.0)) for place in places])
-    bifurcations = tuple(
-        Bifurcation(
-            each.kind,
-            walk.family.name,
-            each.place.value,
-            orbit_of(walk.family, each.place.shot, orbit.t0),
-            each.message,
-        )
-        for each in events
+    places = [item for item in items if isinstance(item, Place)]
+    # The first place of all is in the middle: the points of an autonomous system are named from there.
+    orbits = {id(place): orbit_of(place.orbit, points) for place in [begin, *places]}
+    stable = {id(place): is_stable(place) for place in places}
+    found = Branch(
+        orbit.system,
+        name,
+        tuple(orbits[id(place)] for place in places),
+        np.array([stable[id(place)] for place in places]),
+        tuple(
+            bifurcation_of(item, _sides(items, i, stable), points)
+            for i, item in enumerate(items)
+            if isinstance(item, Event)
+        ),
+        SUCCESS,
     )
-    return Branch(walk.family.system, walk.family.name, orbits, stable, bifurcations, SUCCESS), why
+    return found, why
 
 
-def quiet_shot(family: Family, point: Point) -> Shot:
-    """One pass around the orbit of a point, from a place away from its jumps."""
-    shot = family.shoot(point)
-    if not family.is_near_section(shot):
-        return shot
-    return family.shoot(family.moved(shot, np.zeros(len(point.x) + 2))[0])
+def _sides(items: list[Place | Event], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
+    """Whether the orbits before and after an item are stable; None at an end of the branch."""
+    sides = []
+    for part in (items[:i][::-1], items[i + 1 :]):
+        near = next((each for each in part if isinstance(each, Place)), None)
+        sides.append(None if near is None else stable[id(near)])
+    return sides[0], sides[1]
+
+
+def points_of(orbit: PeriodicOrbit, place: Place) -> Points:
+    """The points that stand for the orbits of a branch from this orbit: on it, its own."""
+    points = Points(orbit.t0)
+    if not place.family.forced:
+        points.shares[place.family.route] = share_of(place.orbit, orbit.t0)
+    return points
+
+
+def is_stable(place: Place) -> bool:
+    """Whether all multipliers, but for the one along an autonomous orbit, are inside the unit circle."""
+    return bool(np.all(np.abs(place.orbit.free_multipliers) < 1.0))
+
+
+def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points: Points) -> Bifurcation:
+    """An event as a result."""
+    place = event.place
+    orbit = orbit_of(place.orbit, points)
+    if event.change is not None and not np.all(np.isfinite(orbit.fundamental)):
+        # Where a guard loses its speed the derivatives have no bound: they are those of an orbit nearby.
+        near = orbit_of(event.change.before.orbit, points)
+        orbit = attrs.evolve(
+            orbit,
+            multipliers=near.multipliers,
+            log_moduli=near.log_moduli,
+            fundamental=near.fundamental,
+        )
+    return Bifurcation(
+        event.kind,
+        place.family.names[0],
+        place.value,
+        orbit,
+        event.message,
+        stable,
+        event.place,
+        event.change,
+    )
 
 
 def _status(why: list[str]) -> Status:
-    told = " and at ".join(ENDS.get(each, each) for each in dict.fromkeys(why))
-    if all(each in ("range", "closed", "grazing", "infinity") for each in why):
+    told = " and at ".join(ENDS.get(each, f"a {each}") for each in dict.fromkeys(why))
+    if not {"lost", "most"} & set(why):
         return attrs.evolve(SUCCESS, message=f"The branch ends at {told}.")
     return Status(
         StatusCode.NOT_CONVERGED,
         f"The branch ends at {told}.",
         "Tighten the tolerances of solver=, raise max_steps, or continue from the last orbit.",
-    )
-
-
-def orbit_of(family: Family, shot: Shot, t0: float) -> PeriodicOrbit:
-    """The orbit of a shot as a result; of a forced system at the phase of the time ``t0``."""
-    point, arc = shot.point, shot.arc
-    x, mode, t = point.x, point.mode, point.t
-    if family.forced:
-        ahead = (t0 - point.t) % point.period
-        i = int(np.searchsorted(arc.t, point.t + ahead, side="right")) - 1
-        x, mode, t = arc(point.t + ahead)[:-1], str(arc.mode[max(i, 0)]), t0
-    multipliers = shot.multipliers
-    with np.errstate(divide="ignore"):
-        moduli = np.log(np.abs(multipliers))
-    targets = [jump.target for jump in arc.jumps if jump.target is not None]
-    return PeriodicOrbit(
-        system=family.system,
-        parameters={**family.system.parameters, **family.parameters, family.name: float(point.value)},
-        x0=np.array(x),
-        mode=mode,
-        t0=t,
-        period=point.period,
-        multipliers=multipliers,
-        log_moduli=moduli,
-        fundamental=shot.fundamental,
-        residual=float(np.linalg.norm(shot.gap)),
-        iterations=0,
-        signature=(point.mode, *targets),
-        transitions=shot.transitions,
-        status=SUCCESS,
     )

@@ -9,6 +9,8 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.tables import counted
+from hybrid.orbits.continuation.change import Change
+from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
@@ -25,14 +27,20 @@ class Bifurcation:
     Attributes
     ----------
     kind
-        ``"fold"``, ``"flip"`` (period doubling), ``"torus"`` (Neimark-Sacker), ``"branch point"``, or
-        ``"grazing"``: a guard is touched without speed, and the sequence of transitions ends.
+        Smooth ones: ``"fold"``, ``"flip"`` (period doubling), ``"torus"`` (Neimark-Sacker),
+        ``"branch point"``.
+        Where the sequence of transitions changes: ``"grazing"`` (a guard is touched without speed),
+        ``"corner"`` (two guards are met at one point), ``"border"`` (an orbit that does not switch
+        begins to), ``"crossing-sliding"``, ``"grazing-sliding"``, ``"switching-sliding"``,
+        ``"adding-sliding"``.
     parameter, value
         Name of the parameter, and its value there.
     orbit
         The orbit there.
     message
         What happens, in words.
+    stable
+        Whether the orbits before and after it along the branch are stable; None where the branch ends.
     """
 
     kind: str
@@ -40,6 +48,9 @@ class Bifurcation:
     value: float
     orbit: PeriodicOrbit
     message: str
+    stable: tuple[bool | None, bool | None]
+    _place: Place | None = attrs.field(default=None, repr=False)
+    _change: Change | None = attrs.field(default=None, repr=False)
 
     def __str__(self) -> str:
         return f"{self.kind} at {self.parameter} = {self.value:.10g}: {self.message}"
@@ -47,7 +58,7 @@ class Bifurcation:
 
 @attrs.frozen(eq=False, repr=False)
 class Branch:
-    """Periodic orbits with one sequence of transitions, in order along the branch.
+    """Periodic orbits in order along a branch; the sequence of transitions may change at its bifurcations.
 
     Attributes
     ----------

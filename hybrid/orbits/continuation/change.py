@@ -1,0 +1,272 @@
+"""Where the route of an orbit changes: which change it is, exactly where, and which orbit goes on beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.family import Family, Pass
+from hybrid.orbits.continuation.measures import Key, changed, measure_of
+from hybrid.orbits.continuation.place import (
+    Place,
+    distance,
+    interpolated_zero,
+    is_real,
+    moment,
+    place_of,
+    start_of,
+)
+from hybrid.orbits.continuation.route import instants
+from hybrid.simulation.simulate import simulate
+
+# The change is enclosed by so many halvings of a step before it is asked what changes.
+HALVINGS = 5
+MOST_HALVINGS = 24
+# Distances from the orbit at a change at which the system itself is asked for its way, in their units.
+FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
+# A field is along a surface if its rate through it is this share of its terms.
+ALONG = 1e-10
+
+TANGENT = ("top", "speed")
+AT_A_CORNER = ("when", "end", "begin")
+
+
+@attrs.frozen(eq=False)
+class Onward:
+    """What the system does just beyond a change.
+
+    Attributes
+    ----------
+    place
+        An orbit of the new route, with the tangent away from the change; None if there is none.
+    jumps
+        Names of what fires around the change, at instants, before and beyond it.
+    passing
+        A real orbit, or one near it, with more jumps there than the other; and the stretch of it that takes
+        no time at the change, None if each does.
+    same_way
+        Whether the parameter goes on as before.
+    """
+
+    place: Place | None
+    jumps: tuple[list[tuple[str, ...]], list[tuple[str, ...]]]
+    passing: Pass | None
+    stretch: int | None
+    same_way: bool
+
+
+@attrs.frozen(eq=False)
+class Change:
+    """Where the route changes.
+
+    Attributes
+    ----------
+    place
+        The orbit there, on the route before.
+    key
+        The measure that is zero there.
+    before
+        A real place before it.
+    onward
+        What comes beyond.
+    """
+
+    place: Place
+    key: Key
+    before: Place
+    onward: Onward
+
+    @property
+    def kind(self) -> str:
+        """Kind of the bifurcation."""
+        onward, route = self.onward, self.place.family.route
+        routes = [route] if onward.place is None else [route, onward.place.family.route]
+        stays = any(len({mode for each in way for mode in (each.mode, each.end_mode)}) == 1 for way in routes)
+        if self.key.kind in AT_A_CORNER and stays and len(self.place.family.system.modes) > 1:
+            return "border"
+        tangent = self.key.kind in TANGENT
+        passing, i = onward.passing, onward.stretch
+        if passing is None or i is None:
+            if tangent and slides(self.place.orbit, self.key.stretch):
+                return "adding-sliding"
+            return "grazing" if tangent else "corner"
+        count = len(passing.family.route)
+        if slides(passing, i):
+            return "grazing-sliding" if tangent else "crossing-sliding"
+        if slides(passing, (i - 1) % count):
+            return "adding-sliding"
+        if slides(passing, (i + 1) % count):
+            return "switching-sliding"
+        return "grazing" if tangent else "corner"
+
+    @property
+    def told(self) -> str:
+        """What happens, in words."""
+        key, names = self.key, self.place.family.route[self.key.stretch].fired
+        told = {
+            "top": f"the orbit touches the guard of {key.name!r}, which does not fire",
+            "speed": f"{key.name!r} loses its speed through its guard",
+            "rate": f"where {_listed(names)} fires, the field of {key.name!r} is along the surface",
+            "when": f"the condition of {key.name!r} changes where {_listed(names)} fires",
+            "end": f"the guard of {key.name!r} is reached where {_listed(names)} fires",
+            "begin": f"a stretch begins on the guard of {key.name!r}",
+            "stay": f"the time in {key.name!r} becomes zero",
+        }[key.kind]
+        if self.onward.place is None:
+            return f"{told}, and no orbit is found beyond"
+        goes = "goes on" if self.onward.same_way else "turns back in the parameter"
+        before, after = (
+            "+".join(_listed(each) for each in jumps) or "no jump" for jumps in self.onward.jumps
+        )
+        return f"{told}; the orbit {goes} with {after} in place of {before}"
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return " and ".join(repr(name) for name in names)
+
+
+def slides(orbit: Pass, i: int) -> bool:
+    """Whether the motion in a stretch stays on the guard through which it began."""
+    family, count = orbit.family, len(orbit.flows)
+    if not family.route[(i - 1) % count].fired:
+        return slides(orbit, (i - 1) % count) if count > 1 else False
+    t, x = moment(orbit, i, 0.5)
+    name = family.route[(i - 1) % count].fired[0]
+    *slope, own = family.gradient(name, t, x, orbit.loop.values)
+    terms = np.append(np.array(slope) * family.rate(family.route[i].mode, t, x, orbit.loop.values), own)
+    return bool(abs(terms.sum()) <= ALONG * np.abs(terms).sum())
+
+
+def located(place: Place, after: Place) -> Change | None:
+    """The first change between a real place and one that is not; None if no measure explains it."""
+    low, high, far = 0.0, distance(place, after), after
+    near = place
+    for number in range(MOST_HALVINGS):
+        s = 0.5 * (low + high)
+        made = place.step(np.array([s]))
+        if made is not None and is_real(made[0].orbit):
+            low, near = s, made[0]
+        elif made is not None:
+            high, far = s, made[0]
+        else:
+            high = s
+            continue
+        if number < HALVINGS:
+            continue
+        for key in changed(near.orbit, far.orbit):
+            found = interpolated_zero(place, measure_of(key), (low, high))
+            if found is not None:
+                return Change(found, key, near, _onward(near, found, key))
+    return None
+
+
+def _onward(near: Place, at: Place, key: Key) -> Onward:
+    """What comes beyond: the system is asked which other ways it goes from states around the orbit there."""
+    slope = np.sign(near.tangents[0, -1])
+    known = Onward(None, ([], []), None, None, True)
+    tried = {at.family.route}
+    for farther in FARTHER:
+        for asked in _asked(near, at, key, farther):
+            family, first, jumps, stretch = asked
+            if family.route in tried:
+                continue
+            more = len(jumps[1]) >= len(jumps[0])
+            known = Onward(None, jumps, first if more else near.orbit, stretch, True)
+            corrected = family.corrected(first.loop, first, first.units(near.sizes))
+            if corrected is None:
+                continue
+            onward = np.eye(len(first.loop.flat))[-len(near.sizes) :]
+            place = place_of(corrected[0], onward, near.sizes)
+            found = None if place is None else _away(place, at, farther)
+            if found is not None:
+                same_way = bool(np.sign(found.tangents[0, -1]) == slope)
+                return attrs.evolve(known, place=found, same_way=same_way)
+            tried.add(family.route)
+    return known
+
+
+def _away(place: Place, at: Place, length: float) -> Place | None:
+    """A real place at a distance from one near a change, with the tangent away from the change."""
+    found = []
+    for sign in (1.0, -1.0):
+        made = place.step(np.array([sign * length]))
+        if made is not None and is_real(made[0].orbit):
+            found.append(attrs.evolve(made[0], tangents=sign * made[0].tangents))
+    return max(found, key=lambda each: abs(each.value - at.value), default=None)
+
+
+Asked = tuple[Family, Pass, tuple[list[tuple[str, ...]], list[tuple[str, ...]]], int | None]
+
+
+def _asked(near: Place, place: Place, key: Key, farther: float) -> Iterator[Asked]:
+    """Other ways around from states at a distance from the orbit; only those that come around.
+
+    With each: a pass along it, what fires around the change here and there, and the stretch between two of
+    these that takes the least time.
+    """
+    orbit, family, loop = place.orbit, place.family, place.orbit.loop
+    j, share = _quiet(orbit, key)
+    mode = family.route[j].mode
+    ends = [i for i, stretch in enumerate(family.route) if stretch.fired]
+    turned = [i for i in ends if i >= j] + [i for i in ends if i < j]
+    old = [family.route[i].fired for i in turned]
+    starting = {each.name for each in family.system.transitions if each.guard.at_start}
+    for t, x, values, period in _around(near, place, j, share, farther):
+        arc = simulate(
+            family.system,
+            x,
+            (t, t + period),
+            mode=mode,
+            parameters=family.all_parameters(values),
+            solver=family.solver,
+        )
+        if not arc.status.ok or str(arc.mode[-1]) != mode:
+            continue
+        new = [tuple(jump.transition for jump in group) for group in instants(list(arc.jumps))]
+        same, last = _common(old, new)
+        local = old[same : len(old) - last], new[same : len(new) - last]
+        if local[0] == local[1] or any(name in starting for names in new for name in names):
+            continue
+        started = start_of(family, arc, period, values)
+        first = None if started is None else started[0].around(started[1])
+        if first is None:
+            continue
+        if len(local[1]) >= len(local[0]):
+            between, times = [same + k for k in range(len(local[1]) - 1)], first.loop.times
+        else:
+            stretches = [(i + 1) % len(loop.x) for i in turned]
+            between, times = stretches[same : same + len(local[0]) - 1], loop.times
+        yield first.family, first, local, min(between, key=lambda i: np.diff(times)[i], default=None)
+
+
+def _around(
+    near: Place, place: Place, j: int, share: float, farther: float
+) -> Iterator[tuple[float, np.ndarray, np.ndarray, float]]:
+    """Time, state, parameters and period around a change: farther along the equations, then to all sides."""
+    made = near.step(np.array([distance(near, place) + farther]))
+    if made is not None:
+        beyond = made[0].orbit
+        yield *moment(beyond, j, share), beyond.loop.values, beyond.loop.period
+    t, x = moment(place.orbit, j, share)
+    for shift in farther * np.vstack([np.eye(len(x)), -np.eye(len(x))]) * place.orbit.scale:
+        yield t, x + shift, place.orbit.loop.values, place.orbit.loop.period
+
+
+def _quiet(orbit: Pass, key: Key) -> tuple[int, float]:
+    """A long stretch whose states may be moved to all sides, and a share of its time far from the change."""
+    stays = np.diff(orbit.loop.times)
+    free = [i for i in range(len(stays)) if not slides(orbit, i)] or list(range(len(stays)))
+    j = max(free, key=lambda i: stays[i])
+    if j == key.stretch and key.kind == "top":
+        return j, key.share / 2 if key.share > 0.5 else (1.0 + key.share) / 2
+    return j, 0.5
+
+
+def _common(one: list[tuple[str, ...]], other: list[tuple[str, ...]]) -> tuple[int, int]:
+    """How many items two lists have in common at their begins, and of the others at their ends."""
+    least = min(len(one), len(other))
+    same = next((k for k in range(least) if one[k] != other[k]), least)
+    rest = least - same
+    return same, next((k for k in range(rest) if one[-1 - k] != other[-1 - k]), rest)

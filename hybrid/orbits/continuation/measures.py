@@ -1,0 +1,173 @@
+"""How far an orbit is from a change of its route: smooth functions of the unknowns, zero where it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.family import Pass
+from hybrid.system.derivatives import evaluate
+from hybrid.system.elements import Transition
+
+# Places of a stretch at which a guard is looked at.
+PLACES = 129
+# The same local extremum of two orbits is at shares of the stretch that differ by less than this.
+SAME = 0.1
+# A guard that is zero at an end of a stretch by its nature has this share of its size there.
+NOTHING = 1e-9
+
+
+@attrs.frozen
+class Key:
+    """What a measure belongs to.
+
+    ``kind`` is ``"speed"`` of the guard that fires at the end of a stretch; ``"top"``, an extremum of a guard
+    within the stretch; ``"rate"`` of the guard that fires, along the field of another mode; ``"when"``, the
+    condition of a transition at the end; ``"end"`` and ``"begin"``, the guard of another transition there;
+    ``"stay"``, the time in the stretch. ``name`` is that of a transition or a mode, and ``share`` the place
+    of an extremum.
+    """
+
+    kind: str
+    stretch: int
+    name: str
+    share: float = 0.0
+
+
+def measures(orbit: Pass) -> dict[Key, float]:
+    """All measures of an orbit."""
+    found: dict[Key, float] = {}
+    system, route = orbit.family.system, orbit.family.route
+    for i, stretch in enumerate(route):
+        found[Key("stay", i, stretch.mode)] = float(np.diff(orbit.loop.times)[i])
+        outgoing = [
+            each for each in system.transitions if each.source == stretch.mode and not each.guard.at_start
+        ]
+        if not stretch.within:
+            for transition in outgoing:
+                found |= dict(_of_guard(orbit, i, transition))
+        if stretch.fired:
+            found |= dict(_of_landing(orbit, i))
+    return found
+
+
+def _of_guard(orbit: Pass, i: int, transition: Transition) -> Iterable[tuple[Key, float]]:
+    heights, shares = heights_of(orbit, i, transition), np.linspace(0.0, 1.0, PLACES)
+    if heights is None:
+        return
+    size = float(np.abs(heights).max())
+    name = transition.name
+    if transition.name not in orbit.family.route[i].fired[:1] and abs(heights[-1]) > NOTHING * size:
+        yield Key("end", i, name), float(heights[-1])
+    if abs(heights[0]) > NOTHING * size:
+        yield Key("begin", i, name), float(heights[0])
+    if not np.ptp(heights) > NOTHING * size:
+        return
+    steps = np.diff(heights)
+    for j in np.flatnonzero(steps[:-1] * steps[1:] < 0.0) + 1:
+        key = Key("top", i, name, float(shares[j]))
+        yield key, top(orbit, key)
+
+
+def _of_landing(orbit: Pass, i: int) -> Iterable[tuple[Key, float]]:
+    family, stretch = orbit.family, orbit.family.route[i]
+    system, values = family.system, orbit.loop.values
+    t, x = float(orbit.loop.times[i + 1]), orbit.flows[i].end
+    speed = orbit.speed(i)
+    yield Key("speed", i, stretch.fired[0]), speed
+    outgoing = [each for each in system.transitions if each.source == stretch.end_mode]
+    for mode in dict.fromkeys(each.target for each in outgoing):
+        if mode is not None and mode != stretch.end_mode:
+            rate = orbit.speed(i, family.rate(mode, t, x, values))
+            if abs(rate) > NOTHING * abs(speed):
+                yield Key("rate", i, mode), rate
+    for transition in outgoing:
+        value = _condition(orbit, transition, t, x)
+        if value is not None:
+            yield Key("when", i, transition.name), value
+
+
+def _condition(orbit: Pass, transition: Transition, t: float, x: np.ndarray) -> float | None:
+    """The value of a transition's condition, if it is a number that may be zero."""
+    if transition.guard.when is None:
+        return None
+    family = orbit.family
+    variables = family.system.variables
+    p = variables.parameter_view(family.vector(orbit.loop.values))
+    value = transition.guard.when(np.float64(t), variables.state_view(x), p)
+    return None if isinstance(value, (bool, np.bool_)) else float(value)
+
+
+def heights_of(
+    orbit: Pass, i: int, transition: Transition, shares: np.ndarray | None = None
+) -> np.ndarray | None:
+    """A guard at shares ``(N,)`` of a stretch; None if it is not finite, or the stretch takes no time."""
+    flow, loop, family = orbit.flows[i], orbit.loop, orbit.family
+    if flow.arc is None:
+        return None
+    if shares is None:
+        shares = np.linspace(0.0, 1.0, PLACES)
+    begin, end = loop.times[i : i + 2]
+    states, times = flow.at(shares), begin + shares * (end - begin)
+    variables, values = family.system.variables, family.vector(loop.values)
+    try:
+        with np.errstate(all="ignore"):
+            p = variables.parameter_view(values)
+            found = transition.guard.function(times, variables.state_view(states.T), p)
+        found = np.broadcast_to(np.asarray(found, dtype=float), times.shape)
+    except Exception:  # a function that takes no arrays is called at each place
+        pairs = zip(times, states, strict=True)
+        each = [evaluate(variables, transition.guard.function, t, x, values) for t, x in pairs]
+        found = np.array([np.nan if value is None else value[0] for value in each])
+    return found if np.all(np.isfinite(found)) else None
+
+
+def top(orbit: Pass, key: Key) -> float:
+    """The extremum of a guard near a share of a stretch; nan if there is none."""
+    from scipy.optimize import minimize_scalar
+
+    system = orbit.family.system
+    transition = system.transitions[system.transition_index(key.name)]
+    near = np.linspace(max(0.0, key.share - SAME), min(1.0, key.share + SAME), 33)
+    heights = heights_of(orbit, key.stretch, transition, near)
+    if heights is None:
+        return np.nan
+    steps = np.diff(heights)
+    turns = np.flatnonzero(steps[:-1] * steps[1:] < 0.0) + 1
+    if len(turns) == 0:
+        return np.nan
+    j = int(turns[np.argmin(np.abs(near[turns] - key.share))])
+    sign = -1.0 if heights[j] > heights[j - 1] else 1.0
+
+    def height(share: float) -> float:
+        found = heights_of(orbit, key.stretch, transition, np.array([share]))
+        return np.nan if found is None else sign * float(found[0])
+
+    # Brent's method finds the place to the square root of rounding, and the height to rounding.
+    best = minimize_scalar(height, bracket=(near[j - 1], near[j], near[j + 1]), tol=1e-9)
+    return sign * float(best.fun)
+
+
+def measure_of(key: Key) -> Callable[[Pass], float]:
+    """One measure as a function of the orbit; nan where it has none."""
+    if key.kind == "top":
+        return lambda orbit: top(orbit, key)
+    return lambda orbit: measures(orbit).get(key, np.nan)
+
+
+def changed(before: Pass, after: Pass) -> list[Key]:
+    """The measures that have another sign at another orbit, those of touches first."""
+    there, here = measures(after), measures(before)
+    found = []
+    for key, value in here.items():
+        if key.kind == "top":
+            other = top(after, key)
+        else:
+            other = there.get(key, np.nan)
+        if value * other < 0.0:
+            found.append(key)
+    # An extremum that the orbit before has no part of: it came in at an end of the stretch.
+    order = ("top", "speed", "rate", "when", "end", "begin", "stay")
+    return sorted(found, key=lambda key: order.index(key.kind))

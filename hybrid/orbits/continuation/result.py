@@ -1,0 +1,77 @@
+"""A place on a branch as a periodic orbit."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.place import moment, share_of
+from hybrid.orbits.continuation.route import Route
+from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.status import SUCCESS
+
+
+@attrs.define(eq=False)
+class Points:
+    """Which point of each orbit of a branch stands for it.
+
+    Of a forced system it is the one at the phase of the time ``t0``. Of an autonomous one it keeps its share
+    of the time of its stretch: on the ``route`` of the first orbit where that has its point, on others in the
+    middle of the stretch that is the longest on the first orbit with that route.
+    """
+
+    t0: float
+    shares: dict[Route, tuple[int, float]] = attrs.field(factory=dict)
+
+    def at(self, orbit: Pass) -> tuple[int, float]:
+        """The stretch, and the share of its time before the point."""
+        loop = orbit.loop
+        if orbit.family.forced:
+            return share_of(orbit, self.t0)
+        route = orbit.family.route
+        if route not in self.shares:
+            self.shares[route] = (int(np.argmax(np.diff(loop.times))), 0.5)
+        return self.shares[route]
+
+
+def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
+    """The orbit as a result, from the point that stands for it."""
+    family, loop = orbit.family, orbit.loop
+    i, share = points.at(orbit)
+    t, x = moment(orbit, i, share)
+    multipliers = orbit.multipliers
+    with np.errstate(divide="ignore"):
+        moduli = np.log(np.abs(multipliers))
+    stretches = [*family.route[i:], *family.route[:i]]
+    targets = [stretch.mode for stretch in [*stretches[1:], stretches[0]]]
+    fired = [name for stretch in stretches for name in stretch.fired]
+    _, residuals = orbit.equations(orbit, orbit.units(np.ones(len(loop.values))))
+    return PeriodicOrbit(
+        system=family.system,
+        parameters=family.all_parameters(loop.values),
+        x0=x,
+        mode=family.route[i].mode,
+        t0=points.t0 if family.forced else t,
+        period=loop.period,
+        multipliers=multipliers,
+        log_moduli=moduli,
+        fundamental=fundamental_at(orbit, i, t, x),
+        residual=float(np.abs(residuals).max()),
+        iterations=0,
+        signature=(family.route[i].mode, *(m for m, s in zip(targets, stretches, strict=True) if s.fired)),
+        transitions=tuple(fired),
+        status=SUCCESS,
+    )
+
+
+def fundamental_at(orbit: Pass, i: int, t: float, x: np.ndarray) -> np.ndarray:
+    """The saltated fundamental matrix ``(n, n)`` over the period from a point within a stretch."""
+    family, loop, n = orbit.family, orbit.loop, len(x)
+    stretch, (begin, end) = family.route[i], loop.times[i : i + 2]
+    first = family.flow(stretch, loop.x[i], float(begin), t, loop.values).slopes[:, :n]
+    last = family.flow(stretch, x, t, float(end), loop.values).slopes[:, :n]
+    matrix = orbit.saltations[i] @ last
+    for each in [*orbit.maps[i + 1 :], *orbit.maps[:i]]:
+        matrix = each @ matrix
+    return np.asarray(first @ matrix)

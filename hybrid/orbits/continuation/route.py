@@ -1,0 +1,164 @@
+"""What stays along a branch: the stretches of an orbit, the modes they are in, and the jumps between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.jumps import Jump
+from hybrid.system.graph import HybridSystem
+
+# A stretch is divided if an error at its start grows by more than this up to its end.
+LARGEST_GROWTH = 1e3
+
+
+@attrs.frozen
+class Stretch:
+    """The motion from one point of an orbit to the next, in one mode.
+
+    Attributes
+    ----------
+    mode, end_mode
+        Names of the modes at its two ends. They differ only if jumps accumulate within the stretch.
+    within
+        Names of the transitions whose jumps accumulate within the stretch; empty for a smooth motion.
+    fired
+        Names of the transitions that fire at its end, at one instant, in order; empty if the next stretch
+        goes on smoothly.
+    """
+
+    mode: str
+    end_mode: str
+    within: tuple[str, ...]
+    fired: tuple[str, ...]
+
+
+Route = tuple[Stretch, ...]
+
+
+@attrs.frozen(eq=False)
+class Loop:
+    """Unknowns of an orbit of ``S`` stretches.
+
+    Attributes
+    ----------
+    x
+        States ``(S, n)`` at the starts of the stretches, after the jumps.
+    times
+        Times ``(S + 1,)`` of the ends of the stretches, the first start included.
+    values
+        The parameters ``(k,)`` that are free.
+    """
+
+    x: np.ndarray
+    times: np.ndarray
+    values: np.ndarray
+
+    @property
+    def period(self) -> float:
+        """Time until the orbit closes."""
+        return float(self.times[-1] - self.times[0])
+
+    @property
+    def flat(self) -> np.ndarray:
+        """All unknowns as one vector ``(S n + S + 1 + k,)``."""
+        return np.concatenate([self.x.ravel(), self.times, self.values])
+
+    def plus(self, change: np.ndarray) -> Loop:
+        """The unknowns after a change ``(S n + S + 1 + k,)``."""
+        flat = self.flat + change
+        first, last = self.x.size, self.x.size + len(self.times)
+        return Loop(flat[:first].reshape(self.x.shape), flat[first:last], flat[last:])
+
+
+def route_of(system: HybridSystem, arc: HybridArc, period: float) -> tuple[Route, np.ndarray, np.ndarray]:
+    """The stretches of an orbit, with the states and times of a :class:`Loop`, from a run over one period.
+
+    The first stretch begins after the first jump; without jumps it is the whole run.
+    """
+    groups = instants(list(arc.jumps))
+    if not groups:
+        mode = str(arc.mode[0])
+        return (Stretch(mode, mode, (), ()),), arc.x[:1].copy(), np.array([arc.t[0], arc.t[0] + period])
+    if any(group[0].kind == "limit" for group in groups):
+        groups, within = _without_chatter(groups)
+    else:
+        within = [()] * len(groups)
+    stretches = []
+    for group, after, passed in zip(groups, [*groups[1:], groups[0]], [*within[1:], within[0]], strict=True):
+        names = tuple(jump.transition for jump in after)
+        stretches.append(Stretch(str(group[-1].target), after[0].source, passed, names))
+    x = np.array([group[-1].x_plus for group in groups])
+    times = np.array([group[0].t for group in groups] + [groups[0][0].t + period])
+    return tuple(stretches), x, times
+
+
+def instants(jumps: Sequence[Jump]) -> list[list[Jump]]:
+    """The jumps by instants. The last jump that ends the run belongs to no orbit."""
+    groups: list[list[Jump]] = []
+    for jump in jumps:
+        if groups and jump.t - groups[-1][0].t <= 4 * math.ulp(jump.t) and jump.kind != "limit":
+            groups[-1].append(jump)
+        else:
+            groups.append([jump])
+    return groups
+
+
+def _without_chatter(groups: list[list[Jump]]) -> tuple[list[list[Jump]], list[tuple[str, ...]]]:
+    """The groups but those that accumulate, and the names of what accumulates before each of them.
+
+    The order is turned so that the first group is not one that accumulates.
+    """
+    last = max(i for i, group in enumerate(groups) if group[0].kind == "limit")
+    turned = [*groups[last + 1 :], *groups[: last + 1]]
+    kept: list[list[Jump]] = []
+    within: list[tuple[str, ...]] = []
+    passed: tuple[str, ...] = ()
+    names = _accumulating(turned)
+    for group in turned:
+        if group[0].kind == "limit" or (group[0].transition in names and kept):
+            passed = names
+        else:
+            kept.append(group)
+            within.append(passed)
+            passed = ()
+    # What accumulates after the last group comes before the first one of the next period.
+    within[0] = passed
+    return kept, within
+
+
+def _accumulating(groups: list[list[Jump]]) -> tuple[str, ...]:
+    """Names of the transitions that fire in turn before the last limit."""
+    (limit,) = groups[-1]
+    names: list[str] = []
+    for group in groups[-2::-1]:
+        for jump in group[::-1]:
+            if names and jump.transition == names[0]:
+                return tuple(names)
+            names.append(jump.transition)
+    return tuple(dict.fromkeys([limit.transition, *names]))
+
+
+def divided(
+    route: Route, x: np.ndarray, times: np.ndarray, arcs: Sequence[HybridArc], growths: Sequence[float]
+) -> tuple[Route, np.ndarray, np.ndarray]:
+    """The same orbit with more stretches, where errors grow too much along one of them."""
+    stretches: list[Stretch] = []
+    states: list[np.ndarray] = []
+    instants: list[float] = []
+    for i, stretch in enumerate(route):
+        parts = max(1, math.ceil(math.log(max(growths[i], 1.0)) / math.log(LARGEST_GROWTH)))
+        if stretch.within:
+            parts = 1
+        begin, end = times[i], times[i + 1]
+        for k in range(parts):
+            t = float(begin + k * (end - begin) / parts)
+            instants.append(t)
+            states.append(x[i] if k == 0 else arcs[i](t)[: x.shape[1]])
+            last = k == parts - 1
+            stretches.append(stretch if last else attrs.evolve(stretch, fired=()))
+    return tuple(stretches), np.array(states), np.array([*instants, times[-1]])

@@ -1,0 +1,78 @@
+"""Where an orbit changes smoothly: functions of places that are zero at folds, flips, tori, branch points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.place import Place
+
+Test = Callable[[Place], float]
+
+
+def fold(place: Place) -> float:
+    """The part of the tangent in the parameter."""
+    return float(place.tangents[0, -1])
+
+
+def flip(place: Place) -> float:
+    """The product of all ``mu + 1``."""
+    return float(np.prod(place.orbit.free_multipliers + 1.0).real)
+
+
+def torus(place: Place) -> float:
+    """The product of all ``mu_i mu_j - 1``, i < j (Kuznetsov 2023, section 10.2)."""
+    values = place.orbit.free_multipliers
+    pairs = [values[i] * values[j] - 1.0 for i in range(len(values)) for j in range(i)]
+    return float(np.prod(pairs).real) if pairs else 1.0
+
+
+def branch_point(place: Place) -> float:
+    """The determinant of the equations with the tangents below them, without its size."""
+    matrix, _ = place.orbit.equations(place.orbit, place.units)
+    return _root_of_determinant(np.vstack([matrix, place.tangents]))
+
+
+def singular(place: Place) -> float:
+    """The determinant of the equations at fixed parameters, without its size: zero at folds."""
+    matrix, _ = place.orbit.equations(place.orbit, place.units)
+    return _root_of_determinant(matrix[:, : -len(place.sizes)])
+
+
+def _root_of_determinant(matrix: np.ndarray) -> float:
+    """The smallest singular value, with the sign of the determinant."""
+    return float(np.linalg.slogdet(matrix)[0] * np.linalg.svd(matrix, compute_uv=False)[-1])
+
+
+TESTS: dict[str, Test] = {"fold": fold, "flip": flip, "torus": torus, "branch point": branch_point}
+
+
+def told(kind: str, place: Place) -> str:
+    """What happens at a bifurcation, in words; empty if the multipliers say that it is none."""
+    if kind == "torus":
+        multipliers = place.orbit.free_multipliers
+        on_circle = [m for m in multipliers if abs(m.imag) > 1e-6 and abs(abs(m) - 1.0) < 1e-4]
+        if not on_circle:
+            return ""
+        angle = max(abs(math.atan2(m.imag, m.real)) for m in on_circle)
+        return f"a pair of multipliers crosses the unit circle at the angle {angle:.6g}"
+    if kind == "flip":
+        # Where a guard loses its speed a multiplier changes its sign through infinity.
+        if not np.abs(place.orbit.free_multipliers + 1.0).min() < 1e-3:
+            return ""
+        return "a multiplier is -1: an orbit of twice the period begins"
+    if kind == "fold":
+        return "the branch turns back in the parameter: a multiplier is 1"
+    return "a multiplier is 1, and another branch crosses"
+
+
+def halves(orbit: Pass) -> np.ndarray | None:
+    """How far the second half of an orbit is from the first ``(S n / 2,)``; None for a route of one half."""
+    route, x = orbit.family.route, orbit.loop.x
+    half = len(route) // 2
+    if len(route) % 2 or route[:half] != route[half:]:
+        return None
+    return np.asarray((x[half:] - x[:half]).ravel() / np.tile(orbit.scale, half))

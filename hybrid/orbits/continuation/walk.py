@@ -1,0 +1,137 @@
+"""Pseudo-arclength steps along a branch of orbits, and what happens between two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.change import Change, located
+from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.place import Place, distance, interpolated_zero, is_real, zero_between
+from hybrid.orbits.continuation.smooth import TESTS, halves, told
+
+# Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
+FIRST_STEP = 0.01
+LONGEST_STEP = 0.05
+SHORTEST_STEP = 1e-7
+# A step is lengthened after few corrections.
+FEW_CORRECTIONS = 3
+LONGER = 1.5
+# An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
+UNBOUNDED = 2.0**26
+# A change of the route this near to the one before, in the range of the parameter, is the same one.
+SAME_CHANGE = 1e-7
+
+
+@attrs.frozen(eq=False)
+class Event:
+    """A bifurcation: its kind, the place itself, what is known of it, and the change of the route, if any."""
+
+    kind: str
+    place: Place
+    message: str
+    change: Change | None = None
+
+
+def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
+    """Places along a branch with the events between them; the last item is why it ends."""
+    length, start, passed = FIRST_STEP, place, np.nan
+    for _ in range(most):
+        made = place.step(np.array([length]))
+        if made is None:
+            length /= 2.0
+            if length < SHORTEST_STEP:
+                yield "lost"
+                return
+            continue
+        after, corrections = made
+        if not is_real(after.orbit):
+            change = located(place, after)
+            if change is None:
+                yield "lost"
+                return
+            last = change.place
+            if not low <= last.value <= high:
+                yield from _to_the_edge(place, last, low, high)
+                yield "range"
+                return
+            yield from _between(place, last)
+            beyond = change.onward.place
+            again = abs(last.value - passed) < SAME_CHANGE * float(place.sizes[0])
+            if not again:
+                yield Event(change.kind, last, change.told, change)
+            if beyond is None or again:
+                yield change.kind
+                return
+            place, passed, length = beyond, last.value, min(length, FIRST_STEP)
+            yield place
+            continue
+        if not low <= after.value <= high:
+            yield from _to_the_edge(place, after, low, high)
+            yield "range"
+            return
+        half = _halved(place, after)
+        if half is not None:
+            yield from _between(place, half)
+            yield Event("flip", half, "the orbit has half the period: this branch begins here")
+            yield "flip"
+            return
+        yield from _between(place, after)
+        yield after
+        if np.any(after.orbit.scale > UNBOUNDED * start.orbit.scale):
+            yield "infinity"
+            return
+        if place is not start and _closes(start, place, after):
+            yield "closed"
+            return
+        if corrections <= FEW_CORRECTIONS:
+            length = min(LONGEST_STEP, LONGER * length)
+        place = after
+    yield "most"
+
+
+def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterator[Place | Event]:
+    edge = low if after.value < low else high
+    last = zero_between(place, after, lambda each: each.value - edge)
+    if last is not None:
+        yield from _between(place, last)
+        yield last
+
+
+def _between(place: Place, after: Place) -> Iterator[Event]:
+    """The smooth bifurcations between two places."""
+    for kind, function in TESTS.items():
+        if not function(place) * function(after) < 0.0:
+            continue
+        found = zero_between(place, after, function)
+        message = "" if found is None else told(kind, found)
+        if found is not None and message:
+            yield Event(kind, found, message)
+
+
+def _halved(place: Place, after: Place) -> Place | None:
+    """The place between two where the orbit becomes one of half the period."""
+    here, there = halves(place.orbit), halves(after.orbit)
+    if here is None or there is None or not here @ there < 0.0:
+        return None
+
+    def along(orbit: Pass) -> float:
+        found = halves(orbit)
+        return 0.0 if found is None else float(here @ found)
+
+    return interpolated_zero(place, along, (0.0, distance(place, after)))
+
+
+def _closes(start: Place, before: Place, after: Place) -> bool:
+    """Whether the step has passed the start of the walk."""
+    if after.family.route != start.family.route or before.family.route != start.family.route:
+        return False
+    units = start.units
+    first = start.orbit.loop.flat
+    one, other = (before.orbit.loop.flat - first) / units, (after.orbit.loop.flat - first) / units
+    chord = other - one
+    length = float(np.linalg.norm(chord))
+    share = -one @ chord / length**2 if length > 0.0 else -1.0
+    return bool(0.0 <= share <= 1.0 and np.linalg.norm(one + share * chord) < 0.1 * length)
