@@ -13,7 +13,13 @@ from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
+from hybrid.orbits.continuation.continue_bifurcation import (
+    BifurcationCurve,
+    CodimensionTwo,
+    continue_bifurcation,
+)
 from hybrid.orbits.continuation.continue_orbit import continue_orbit
+from hybrid.orbits.continuation.saved import open_branch
 from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
@@ -40,7 +46,9 @@ __all__ = [
     "Answer",
     "ArgumentError",
     "Bifurcation",
+    "BifurcationCurve",
     "Branch",
+    "CodimensionTwo",
     "CompiledSystem",
     "GlobalError",
     "Grazing",
@@ -64,10 +72,12 @@ __all__ = [
     "Tsit5",
     "WorkPrecision",
     "compile_system",
+    "continue_bifurcation",
     "continue_orbit",
     "filippov",
     "from_equations",
     "global_error",
+    "open_branch",
     "open_store",
     "periodic_orbit",
     "poincare_section",

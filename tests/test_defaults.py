@@ -42,7 +42,9 @@ DEFAULTS = {
         **{"steps": None, "seconds": None},
     },
     hybrid.switch_branch: {"solver": None},
-    hybrid.continue_orbit: {"solver": None, "max_steps": 2000},
+    hybrid.continue_orbit: {"solver": None, "max_steps": 2000, "progress": None},
+    hybrid.continue_bifurcation: {"solver": None, "max_steps": 500, "progress": None},
+    hybrid.open_branch: {},
     hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "laws": None},
     hybrid.from_equations: PLAIN,
     hybrid.Laws: {
@@ -86,7 +88,8 @@ DEFAULTS = {
     hybrid.plot.plot_global_error: FIGURE,
     hybrid.plot.plot_graph: FIGURE,
     hybrid.plot.plot_jumps: FIGURE,
-    hybrid.plot.plot_branch: {"y": 0, **FIGURE},
+    hybrid.plot.plot_branch: {"y": 0, "over": None, **FIGURE},
+    hybrid.plot.plot_curve: FIGURE,
     hybrid.plot.plot_orbit: {"x": 0, "y": None, **FIGURE},
     hybrid.plot.plot_phase: FIGURE,
     hybrid.plot.plot_section: {"x": 0, "y": None, "size": None, **FIGURE},
@@ -134,7 +137,8 @@ def test_defaults_of_work_precision():
 def test_every_public_call_is_listed():
     listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
     # Bases, errors and results are made by the library.
-    made = {"Bifurcation", "Branch", "HybridArc", "Solver", "Status", "StatusCode", "TwoOrbitExponents"}
+    made = {"Bifurcation", "BifurcationCurve", "Branch", "CodimensionTwo", "HybridArc", "Solver"}
+    made |= {"Status", "StatusCode", "TwoOrbitExponents"}
     for package in (hybrid, lyapunov):
         for name in package.__all__:
             each = getattr(package, name)

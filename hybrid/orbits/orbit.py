@@ -12,8 +12,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import ROUNDING_OF_TIME
-from hybrid.orbits.continuation.family import Family
-from hybrid.orbits.continuation.place import Place, begun, start_of
+from hybrid.orbits.continuation.place import place_on
 from hybrid.orbits.labelled import described_orbit, labelled_orbit
 from hybrid.orbits.sensitivity import OrbitSensitivity, sensitivity_of
 from hybrid.simulation.arc import HybridArc
@@ -115,27 +114,8 @@ class PeriodicOrbit:
         for name in given:
             arguments.known("names: Parameter", name, self.system.parameters, "Parameters")
         method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-        place = self.place(tuple(given), np.ones(len(given)), method)
+        place = place_on(self, tuple(given), np.ones(len(given)), method)
         return sensitivity_of(place, self.t0)
-
-    def place(self, names: tuple[str, ...], sizes: np.ndarray, solver: Solver) -> Place:
-        """The orbit among those over some parameters, whose units are ``sizes (k,)``.
-
-        Raises
-        ------
-        ArgumentError
-            If the orbit is not found again.
-        """
-        family = Family(self.system, names, dict(self.parameters), self.forcing_periods, solver, ())
-        arc, values = self.arc(solver), np.array([self.parameters[name] for name in names])
-        started = start_of(family, arc, self.period, values) if arc.status.ok else None
-        place = None if started is None else begun(*started, sizes)
-        if place is None:
-            raise ArgumentError(
-                "orbit is not found again, stretch by stretch: solve it with tighter tolerances, and see "
-                "that the fields have values a little beyond their guards."
-            )
-        return place
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""

@@ -49,8 +49,7 @@ def sensitivity_of(place: Place, t: float) -> OrbitSensitivity:
     ArgumentError
         If the orbit is not isolated.
     """
-    orbit, units, k = place.orbit, place.units, len(place.sizes)
-    matrix, _ = orbit.equations(orbit, units)
+    orbit, units, matrix, k = place.orbit, place.units, place.matrix, len(place.sizes)
     sizes = np.linalg.svd(matrix[:, :-k], compute_uv=False)
     if not sizes[-1] > SINGULAR * sizes[0]:
         raise _no_derivative(place)

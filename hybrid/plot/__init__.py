@@ -11,10 +11,11 @@ from typing import Any
 
 from hybrid import arguments
 from hybrid.orbits.continuation.branch import Branch
+from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
-from hybrid.plot.branches import plot_branch
+from hybrid.plot.branches import plot_branch, plot_curve
 from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
 from hybrid.plot.jumps import plot_global_error, plot_jumps
@@ -32,6 +33,7 @@ __all__ = [
     "plot",
     "plot_arc",
     "plot_branch",
+    "plot_curve",
     "plot_ends",
     "plot_global_error",
     "plot_graph",
@@ -69,6 +71,7 @@ def drawn(result: Any, **options: Any) -> Any:
 
 drawn.register(HybridArc, plot_arc)
 drawn.register(Branch, plot_branch)
+drawn.register(BifurcationCurve, plot_curve)
 drawn.register(HybridSystem, plot_graph)
 drawn.register(Jumps, plot_jumps)
 drawn.register(Section, plot_section)

@@ -1,32 +1,50 @@
-"""Branches of orbits over a parameter: stable parts full, unstable ones dashed, bifurcations marked."""
+"""Branches of orbits over a parameter, and curves of bifurcations over two."""
 
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybrid import arguments
 from hybrid.orbits.continuation.branch import Branch
-from hybrid.plot.style import COLOURS, as_component, axes_for, small_legend
+from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
+from hybrid.plot.style import COLOURS, as_component, axes_for, dot_area, small_legend
 from hybrid.simulation.labelled import Names
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.axes import Axes
 
-# Markers by kind of bifurcation.
-MARKERS = {"fold": "o", "flip": "s", "torus": "D", "branch point": "P", "grazing": "v"}
+# Markers by kind of bifurcation. The sliding ones and others that have none here share one.
+MARKERS = {
+    "fold": "o",
+    "flip": "s",
+    "torus": "D",
+    "branch point": "P",
+    "grazing": "v",
+    "corner": "<",
+    "border": ">",
+    "crossing-sliding": "^",
+    "grazing-sliding": "p",
+    "switching-sliding": "h",
+    "adding-sliding": "d",
+}
+OTHER = "X"
 
 
 def plot_branch(
     branch: Branch,
     y: str | int = 0,
     *,
+    over: xarray.Dataset | Axes | None = None,
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Axes:
     """Draw a component of the orbits' points over the parameter, with the bifurcations.
+
+    Stable parts are full, unstable ones dashed.
 
     Parameters
     ----------
@@ -34,8 +52,11 @@ def plot_branch(
         From :func:`hybrid.continue_orbit`.
     y
         Name or index of the component; by default the first.
+    over
+        A chart over the same parameter with points of the section, from ``lyapunov.chart(section=...)``,
+        which is drawn below the branch; or the axes of a picture of one.
     ax
-        Axes to draw into, such as those of a chart over the same parameter; by default those of a new figure.
+        Axes to draw into; by default those of a new figure.
     figsize
         Width and height of a new figure in inches.
 
@@ -46,25 +67,83 @@ def plot_branch(
     Raises
     ------
     ArgumentError
-        If a component does not exist.
+        If a component does not exist, or the chart has no points over the parameter.
     """
     arguments.instance("branch", branch, Branch, "Make one with hybrid.continue_orbit.")
     system = branch.system
     i = as_component("y", system.state_names, y)
+    cloud = None
+    if over is not None:
+        if hasattr(over, "data_vars"):
+            cloud = _points_of(over, branch.name, system.state_names[i])
+        elif ax is None and hasattr(over, "plot"):
+            ax = over
+        else:
+            wanted = "be a chart with points of its section, or axes in place of ax"
+            raise arguments.refusal("over", wanted, over)
     (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
-    over, values = branch.parameter, branch.x0[:, i]
+    if cloud is not None:
+        ax.scatter(*cloud, s=dot_area(len(cloud[0])), color="0.6", linewidths=0, rasterized=True, zorder=0)
+    across, values = branch.parameter, branch.x0[:, i]
     for stable, part in groupby(range(len(branch)), key=lambda k: bool(branch.stable[k])):
         inside = list(part)
         # The line reaches to the next part.
         shown = [*inside, *([inside[-1] + 1] if inside[-1] + 1 < len(branch) else [])]
-        ax.plot(over[shown], values[shown], "-" if stable else "--", color=COLOURS[0], lw=1.4)
-    for kind in dict.fromkeys(each.kind for each in branch.bifurcations):
-        found = [each for each in branch.bifurcations if each.kind == kind]
-        at = np.array([(each.value, each.orbit.x0[i]) for each in found])
-        ax.plot(at[:, 0], at[:, 1], MARKERS.get(kind, "x"), color=COLOURS[1], ms=6, label=kind, zorder=3)
+        ax.plot(across[shown], values[shown], "-" if stable else "--", color=COLOURS[0], lw=1.4)
+    _mark(ax, [(each.kind, each.value, each.orbit.x0[i]) for each in branch.bifurcations])
     names = Names(system.state_names, system.units)
     ax.set_xlabel(names.label(branch.name))
     ax.set_ylabel(names.label(system.state_names[i]))
-    if branch.bifurcations:
-        small_legend(ax)
     return ax
+
+
+def plot_curve(
+    curve: BifurcationCurve,
+    *,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Axes:
+    """Draw a curve of bifurcations in the plane of its two parameters, with its points of codimension two.
+
+    Parameters
+    ----------
+    curve
+        From :func:`hybrid.continue_bifurcation`.
+    ax
+        Axes to draw into, such as those of other curves; by default those of a new figure.
+    figsize
+        Width and height of a new figure in inches.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    arguments.instance("curve", curve, BifurcationCurve, "Make one with hybrid.continue_bifurcation.")
+    (ax,) = axes_for(ax, 1, (5.4, 4.2), figsize)
+    first, second = curve.names
+    ax.plot(curve[first], curve[second], lw=1.4, label=curve.kind)
+    _mark(ax, [(each.kind, each.values[first], each.values[second]) for each in curve.points])
+    names = Names(curve.system.state_names, curve.system.units)
+    ax.set_xlabel(names.label(first))
+    ax.set_ylabel(names.label(second))
+    small_legend(ax)
+    return ax
+
+
+def _mark(ax: Axes, found: list[tuple[str, float, float]]) -> None:
+    """Signs for what has a kind and a place, with a legend."""
+    for kind in dict.fromkeys(each[0] for each in found):
+        at = np.array([each[1:] for each in found if each[0] == kind])
+        marker = MARKERS.get(kind, OTHER)
+        ax.plot(at[:, 0], at[:, 1], marker, color=COLOURS[1], ms=6, label=kind, zorder=3)
+    if found:
+        small_legend(ax)
+
+
+def _points_of(chart: Any, name: str, component: str) -> tuple[np.ndarray, np.ndarray]:
+    """Parameter and component ``(N,)`` of the points of a chart's section."""
+    points = chart.get("section")
+    if points is None or name not in points.dims or points.sizes.get("sample", 0) == 0:
+        raise arguments.refusal("over", f"be a chart over {name!r} alone, computed with section=100", chart)
+    values = points.sel(state=component).transpose(name, "sample").values
+    return np.repeat(np.asarray(points[name], dtype=float), values.shape[1]), values.ravel()

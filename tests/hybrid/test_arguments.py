@@ -46,7 +46,8 @@ def made():
     return {
         "arc": hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.0)),
         "orbit": (orbit := hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0))),
-        "flip": flip_of_the_converter(),
+        "flip": (flip := flip_of_the_converter()),
+        "curve": hybrid.continue_bifurcation(flip, {"E": (24.5, 24.6), "V_ref": (11.2, 11.4)}),
         "branch": hybrid.continue_orbit(orbit, "w", (0.99, 1.01)),
         "comparison": lyapunov.compare_models({"a": OSCILLATOR}, (0.0, 0.0), reference="a", intervals=5),
         "chart": lyapunov.chart(OSCILLATOR, {"c": [0.1, 0.2]}, (0.0, 0.0), intervals=5, section=3),
@@ -71,7 +72,9 @@ def table(made):
 NOT_CALLED = {
     "PiecewiseAffineField",
     "Bifurcation",
+    "BifurcationCurve",
     "Branch",
+    "CodimensionTwo",
     "run_settings",
     "Status",
     "StatusCode",

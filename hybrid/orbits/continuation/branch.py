@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import attrs
@@ -10,9 +12,9 @@ import numpy as np
 from hybrid import arguments
 from hybrid.display.tables import counted
 from hybrid.orbits.continuation.change import Change
+from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -64,8 +66,15 @@ class Branch:
     ----------
     system, name
         The model, and the name of the parameter.
-    orbits
-        The orbits, in order. The points of a forced system are all at the same phase.
+    parameter
+        Values of the parameter, ``(N,)``.
+    x0, mode
+        Points of the orbits ``(N, n)``, and the modes there ``(N,)``. The points of a forced system are all
+        at the same phase.
+    period
+        Periods, ``(N,)``.
+    multipliers
+        Floquet multipliers, ``(N, n)``, largest first.
     stable
         Whether all multipliers, without that along an autonomous orbit, are inside the unit circle, ``(N,)``.
     bifurcations
@@ -76,55 +85,46 @@ class Branch:
 
     system: HybridSystem
     name: str
-    orbits: tuple[PeriodicOrbit, ...]
+    parameter: np.ndarray
+    x0: np.ndarray
+    mode: np.ndarray
+    period: np.ndarray
+    multipliers: np.ndarray
     stable: np.ndarray
     bifurcations: tuple[Bifurcation, ...]
     status: Status
+    _orbit: Callable[[int], PeriodicOrbit]
 
-    @property
-    def parameter(self) -> np.ndarray:
-        """Values of the parameter, ``(N,)``."""
-        return np.array([orbit.parameters[self.name] for orbit in self.orbits])
-
-    @property
-    def x0(self) -> np.ndarray:
-        """Points of the orbits, ``(N, n)``."""
-        return np.array([orbit.x0 for orbit in self.orbits])
-
-    @property
-    def mode(self) -> np.ndarray:
-        """Modes at these points, ``(N,)``."""
-        return np.array([orbit.mode for orbit in self.orbits])
-
-    @property
-    def period(self) -> np.ndarray:
-        """Periods, ``(N,)``."""
-        return np.array([orbit.period for orbit in self.orbits])
-
-    @property
-    def multipliers(self) -> np.ndarray:
-        """Floquet multipliers, ``(N, n)``, largest first."""
-        return np.array([orbit.multipliers for orbit in self.orbits])
+    @cached_property
+    def orbits(self) -> tuple[PeriodicOrbit, ...]:
+        """All orbits, in order."""
+        return tuple(self.orbit(i) for i in range(len(self)))
 
     @property
     def signature(self) -> tuple[str, ...]:
         """Names of the modes of the first orbit, in order."""
-        return self.orbits[0].signature
+        return self.orbit(0).signature
 
     @property
     def transitions(self) -> tuple[str, ...]:
         """Names of the transitions of the first orbit, in order."""
-        return self.orbits[0].transitions
+        return self.orbit(0).transitions
 
     def orbit(self, i: int) -> PeriodicOrbit:
-        """The orbit of a point of the branch."""
+        """The orbit of a point of the branch.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such point.
+        """
         whole = arguments.whole_number(i)
         if whole is None or not -len(self) <= whole < len(self):
             raise arguments.refusal("i", f"be a whole number from {-len(self)} to {len(self) - 1}", i)
-        return self.orbits[whole]
+        return self._orbit(whole % len(self))
 
     def __len__(self) -> int:
-        return len(self.orbits)
+        return len(self.parameter)
 
     def __repr__(self) -> str:
         values = self.parameter
@@ -133,20 +133,9 @@ class Branch:
         return f"<Branch {span}, {counted(len(self), 'orbit')}, {kinds}, {self.status.brief}>"
 
     def to_xarray(self) -> xarray.Dataset:
-        """The branch over the axis ``point``, with the parameter as a coordinate.
+        """The branch over the axis ``point``, with the parameter as a coordinate, and its bifurcations.
 
-        Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot.
+        Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot. :func:`hybrid.open_branch` makes a
+        branch of it again.
         """
-        import xarray
-
-        names = Names(self.system.state_names, self.system.units)
-        variables = {
-            "x0": (("point", "state"), self.x0, names.states),
-            "mode": ("point", self.mode),
-            "period": ("point", self.period, names.of("t")),
-            "multipliers": (("point", "multiplier"), self.multipliers),
-            "stable": ("point", self.stable),
-        }
-        coords = {self.name: ("point", self.parameter, names.of(self.name)), **names.coords()}
-        made_by = attributes("branch", self.status, self.system, self.orbits[0].parameters)
-        return xarray.Dataset(variables, coords, made_by)
+        return dataset_of(self)

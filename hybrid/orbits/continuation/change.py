@@ -16,6 +16,7 @@ from hybrid.orbits.continuation.place import (
     is_real,
     moment,
     place_of,
+    slides,
     start_of,
 )
 from hybrid.orbits.continuation.route import instants
@@ -26,8 +27,6 @@ HALVINGS = 5
 MOST_HALVINGS = 24
 # Distances from the orbit at a change at which the system itself is asked for its way, in their units.
 FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
-# A field is along a surface if its rate through it is this share of its terms.
-ALONG = 1e-10
 
 TANGENT = ("top", "speed")
 AT_A_CORNER = ("when", "end", "begin")
@@ -125,18 +124,6 @@ class Change:
 
 def _listed(names: tuple[str, ...]) -> str:
     return " and ".join(repr(name) for name in names)
-
-
-def slides(orbit: Pass, i: int) -> bool:
-    """Whether the motion in a stretch stays on the guard through which it began."""
-    family, count = orbit.family, len(orbit.flows)
-    if not family.route[(i - 1) % count].fired:
-        return slides(orbit, (i - 1) % count) if count > 1 else False
-    t, x = moment(orbit, i, 0.5)
-    name = family.route[(i - 1) % count].fired[0]
-    *slope, own = family.gradient(name, t, x, orbit.loop.values)
-    terms = np.append(np.array(slope) * family.rate(family.route[i].mode, t, x, orbit.loop.values), own)
-    return bool(abs(terms.sum()) <= ALONG * np.abs(terms).sum())
 
 
 def located(place: Place, after: Place) -> Change | None:

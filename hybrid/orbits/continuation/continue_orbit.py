@@ -9,7 +9,7 @@ from hybrid import arguments
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.place import Place, share_of
+from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
 from hybrid.orbits.orbit import PeriodicOrbit
@@ -17,6 +17,8 @@ from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
+
+Item = Place | Event
 
 ENDS = {
     "range": "the end of the range",
@@ -107,43 +109,57 @@ def _branch(
     orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
 ) -> tuple[Branch, list[str]]:
     """The branch both ways, and why it ends at either end."""
-    begin = orbit.place((name,), np.array([high - low]), solver)
+    begin = place_on(orbit, (name,), np.array([high - low]), solver)
     points = points_of(orbit, begin)
-    items: list[Place | Event] = [begin]
+    items: list[Item] = [begin]
     why: list[str] = []
     for sign in (-1.0, 1.0):
         items = items[::-1]
-        for item in walk(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most):
-            if isinstance(item, str):
-                why.append(item)
-            else:
-                items.append(item)
-                bar.update(isinstance(item, Place))
-            if CTRL_C.is_set():
-                why.append("interrupted")
-                break
+        why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
         if why[-1] in ("closed", "interrupted"):
             break
+    return branch_of(items, points), why
+
+
+def _walked(begin: Place, low: float, high: float, most: int, items: list[Item], bar: Progress) -> str:
+    """Walk from a place; what is met goes to the items. Returns why the walk ends."""
+    for item in walk(begin, low, high, most):
+        if isinstance(item, str):
+            return item
+        items.append(item)
+        bar.update(isinstance(item, Place))
+        if CTRL_C.is_set():
+            break
+    return "interrupted"
+
+
+def branch_of(items: list[Item], points: Points) -> Branch:
+    """The branch through places and events, in order."""
     places = [item for item in items if isinstance(item, Place)]
-    # The first place of all is in the middle: the points of an autonomous system are named from there.
-    orbits = {id(place): orbit_of(place.orbit, points) for place in [begin, *places]}
+    passes = [place.orbit for place in places]
+    family = passes[0].family
+    where = [points.at(each) for each in passes]
     stable = {id(place): is_stable(place) for place in places}
-    found = Branch(
-        orbit.system,
-        name,
-        tuple(orbits[id(place)] for place in places),
-        np.array([stable[id(place)] for place in places]),
-        tuple(
+    return Branch(
+        system=family.system,
+        name=family.names[0],
+        parameter=np.array([place.value for place in places]),
+        x0=np.array([moment(each, *at)[1] for each, at in zip(passes, where, strict=True)]),
+        mode=np.array([each.family.route[i].mode for each, (i, _) in zip(passes, where, strict=True)]),
+        period=np.array([each.loop.period for each in passes]),
+        multipliers=np.array([each.multipliers for each in passes]),
+        stable=np.array([stable[id(place)] for place in places]),
+        bifurcations=tuple(
             bifurcation_of(item, _sides(items, i, stable), points)
             for i, item in enumerate(items)
             if isinstance(item, Event)
         ),
-        SUCCESS,
+        status=SUCCESS,
+        orbit=lambda i: orbit_of(passes[i], points),
     )
-    return found, why
 
 
-def _sides(items: list[Place | Event], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
+def _sides(items: list[Item], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
     """Whether the orbits before and after an item are stable; None at an end of the branch."""
     sides = []
     for part in (items[:i][::-1], items[i + 1 :]):

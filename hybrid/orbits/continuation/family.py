@@ -28,6 +28,8 @@ CONVERGED = 1e-12
 MOST_CORRECTIONS = 8
 # Relative step of the difference that gives the slope of a period that cannot be traced.
 STEP = 1e-5
+# A singular value of the scaled equations is zero if it is this share of the largest.
+ROUNDING = 1e-14
 # Places of a stretch at which the size of the states is taken.
 LOOKED_AT = 17
 # Eigenvalues of one matrix are wrong by its norm times rounding; above this they come from its factors.
@@ -93,13 +95,14 @@ class Pass:
     loop: Loop
     flows: tuple[Flow, ...]
     landings: tuple[Landing | None, ...]
+    _derivatives: dict[tuple[float, ...], np.ndarray] = attrs.field(factory=dict, init=False)
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Largest absolute values ``(n,)`` of the components along the orbit."""
+        """Sizes ``(n,)`` of the components along the orbit, or along the first one if these are larger."""
         shares = np.linspace(0.0, 1.0, LOOKED_AT)
         states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
-        sizes = np.abs(np.concatenate([self.loop.x, *states])).max(axis=0)
+        sizes = np.maximum(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0), self.family.least)
         return np.where(sizes > 0.0, sizes, 1.0)
 
     def units(self, sizes: np.ndarray) -> np.ndarray:
@@ -112,6 +115,13 @@ class Pass:
         return np.concatenate(
             [np.tile(share * self.scale, count), np.full(count + 1, share * self._span), sizes]
         )
+
+    def derivatives(self, sizes: np.ndarray) -> np.ndarray:
+        """Derivatives ``(m, m + k)`` of the scaled equations here, made once for these sizes."""
+        key = tuple(sizes)
+        if key not in self._derivatives:
+            self._derivatives[key] = self.equations(self, self.units(sizes))[0]
+        return self._derivatives[key]
 
     @property
     def _span(self) -> float:
@@ -254,7 +264,8 @@ class Pass:
 class Family:
     """The orbits of a system over some of its parameters, along one route.
 
-    ``periods`` is the number of forcing periods, 0 for an autonomous system.
+    ``periods`` is the number of forcing periods, 0 for an autonomous system. ``least`` are sizes ``(n,)`` of
+    the states, below which none is measured: an orbit may pass zero.
     """
 
     system: HybridSystem
@@ -263,6 +274,7 @@ class Family:
     periods: int
     solver: Solver
     route: Route
+    least: np.ndarray | float = 0.0
 
     @property
     def forced(self) -> bool:
@@ -293,6 +305,9 @@ class Family:
 
     def period(self, values: np.ndarray) -> float:
         """The period of a forced orbit."""
+        if not callable(self.system.period):
+            assert self.system.period is not None
+            return self.periods * float(self.system.period)
         forcing = self.system.forcing_period(self.all_parameters(values))
         assert forcing is not None
         return self.periods * forcing
@@ -460,10 +475,8 @@ class Family:
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray | None:
-    """The shortest solution of as many equations as unknowns, or fewer."""
+    """The shortest solution; equations that say the same as others, to rounding, count once."""
     try:
-        if matrix.shape[0] == matrix.shape[1]:
-            return np.linalg.solve(matrix, right)
-        return np.linalg.lstsq(matrix, right, rcond=1e-14)[0]
+        return np.linalg.lstsq(matrix, right, rcond=ROUNDING)[0]
     except np.linalg.LinAlgError:
         return None

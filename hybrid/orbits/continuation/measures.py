@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import attrs
 import numpy as np
@@ -68,25 +69,25 @@ def _of_guard(orbit: Pass, i: int, transition: Transition) -> Iterable[tuple[Key
     steps = np.diff(heights)
     for j in np.flatnonzero(steps[:-1] * steps[1:] < 0.0) + 1:
         key = Key("top", i, name, float(shares[j]))
-        yield key, top(orbit, key)
+        yield key, top(key, orbit)
 
 
 def _of_landing(orbit: Pass, i: int) -> Iterable[tuple[Key, float]]:
-    family, stretch = orbit.family, orbit.family.route[i]
-    system, values = family.system, orbit.loop.values
-    t, x = float(orbit.loop.times[i + 1]), orbit.flows[i].end
+    system, stretch = orbit.family.system, orbit.family.route[i]
     speed = orbit.speed(i)
     yield Key("speed", i, stretch.fired[0]), speed
     outgoing = [each for each in system.transitions if each.source == stretch.end_mode]
     for mode in dict.fromkeys(each.target for each in outgoing):
         if mode is not None and mode != stretch.end_mode:
-            rate = orbit.speed(i, family.rate(mode, t, x, values))
+            key = Key("rate", i, mode)
+            rate = _rate(key, orbit)
             if abs(rate) > NOTHING * abs(speed):
-                yield Key("rate", i, mode), rate
+                yield key, rate
     for transition in outgoing:
-        value = _condition(orbit, transition, t, x)
-        if value is not None:
-            yield Key("when", i, transition.name), value
+        key = Key("when", i, transition.name)
+        value = _when(key, orbit)
+        if np.isfinite(value):
+            yield key, value
 
 
 def _condition(orbit: Pass, transition: Transition, t: float, x: np.ndarray) -> float | None:
@@ -124,12 +125,11 @@ def heights_of(
     return found if np.all(np.isfinite(found)) else None
 
 
-def top(orbit: Pass, key: Key) -> float:
+def top(key: Key, orbit: Pass) -> float:
     """The extremum of a guard near a share of a stretch; nan if there is none."""
     from scipy.optimize import minimize_scalar
 
-    system = orbit.family.system
-    transition = system.transitions[system.transition_index(key.name)]
+    transition = _transition(orbit, key)
     near = np.linspace(max(0.0, key.share - SAME), min(1.0, key.share + SAME), 33)
     heights = heights_of(orbit, key.stretch, transition, near)
     if heights is None:
@@ -152,9 +152,49 @@ def top(orbit: Pass, key: Key) -> float:
 
 def measure_of(key: Key) -> Callable[[Pass], float]:
     """One measure as a function of the orbit; nan where it has none."""
-    if key.kind == "top":
-        return lambda orbit: top(orbit, key)
-    return lambda orbit: measures(orbit).get(key, np.nan)
+    return partial(_MEASURES[key.kind], key)
+
+
+def _speed(key: Key, orbit: Pass) -> float:
+    return orbit.speed(key.stretch)
+
+
+def _rate(key: Key, orbit: Pass) -> float:
+    loop, i = orbit.loop, key.stretch
+    rate = orbit.family.rate(key.name, float(loop.times[i + 1]), orbit.flows[i].end, loop.values)
+    return orbit.speed(i, rate)
+
+
+def _when(key: Key, orbit: Pass) -> float:
+    t, x = float(orbit.loop.times[key.stretch + 1]), orbit.flows[key.stretch].end
+    found = _condition(orbit, _transition(orbit, key), t, x)
+    return np.nan if found is None else found
+
+
+def _at_an_end(key: Key, orbit: Pass) -> float:
+    share = np.array([1.0 if key.kind == "end" else 0.0])
+    found = heights_of(orbit, key.stretch, _transition(orbit, key), share)
+    return np.nan if found is None else float(found[0])
+
+
+def _stay(key: Key, orbit: Pass) -> float:
+    return float(np.diff(orbit.loop.times)[key.stretch])
+
+
+def _transition(orbit: Pass, key: Key) -> Transition:
+    system = orbit.family.system
+    return system.transitions[system.transition_index(key.name)]
+
+
+_MEASURES: dict[str, Callable[[Key, Pass], float]] = {
+    "top": top,
+    "speed": _speed,
+    "rate": _rate,
+    "when": _when,
+    "end": _at_an_end,
+    "begin": _at_an_end,
+    "stay": _stay,
+}
 
 
 def changed(before: Pass, after: Pass) -> list[Key]:
@@ -163,7 +203,7 @@ def changed(before: Pass, after: Pass) -> list[Key]:
     found = []
     for key, value in here.items():
         if key.kind == "top":
-            other = top(after, key)
+            other = top(key, after)
         else:
             other = there.get(key, np.nan)
         if value * other < 0.0:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.family import Family, Pass
+from hybrid.orbits.continuation.family import ROUNDING, Family, Pass
 from hybrid.orbits.continuation.route import Loop, divided, route_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
+from hybrid.solvers import Solver
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
+# A field is along a surface if its rate through it is this share of its terms.
+ALONG = 1e-10
 # A run jumps where the equations say so if the times agree to this share of the period.
 SAME_TIME = 1e-6
 # The unknowns are polynomials of a measure through places at these shares of the bracket around its zero.
@@ -37,21 +43,29 @@ class Place:
         Orthonormal directions ``(k, m + k)`` of the solutions there, in scaled unknowns.
     sizes
         Units ``(k,)`` of the parameters.
+    bend
+        Derivative ``(m + k,)`` of the first tangent along the branch, as far as it is known.
     """
 
     orbit: Pass
     tangents: np.ndarray
     sizes: np.ndarray
+    bend: np.ndarray | float = 0.0
 
     @property
     def family(self) -> Family:
         """The family of the orbit."""
         return self.orbit.family
 
-    @property
+    @cached_property
     def units(self) -> np.ndarray:
         """Units of the unknowns."""
         return self.orbit.units(self.sizes)
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Derivatives ``(m, m + k)`` of the scaled equations in the scaled unknowns."""
+        return self.orbit.derivatives(self.sizes)
 
     @property
     def values(self) -> np.ndarray:
@@ -66,7 +80,7 @@ class Place:
     def step(self, lengths: np.ndarray) -> tuple[Place, int] | None:
         """The place at distances ``(k,)`` along the tangents, and how many corrections it took; or None."""
         units = self.units
-        guess = self.orbit.loop.plus(units * (lengths @ self.tangents))
+        guess = self.orbit.loop.plus(units * (lengths @ self.tangents + 0.5 * lengths[0] ** 2 * self.bend))
         try:
             made = self.family.corrected(guess, self.orbit, units, self.tangents)
         except ArgumentError:
@@ -76,12 +90,27 @@ class Place:
         found = place_of(made[0], self.tangents, self.sizes)
         if found is None or np.any(np.sum(found.tangents * self.tangents, axis=1) < LEAST_COSINE):
             return None
+        if len(lengths) == 1 and lengths[0] != 0.0:
+            bend = (found.tangents[0] - self.tangents[0]) / lengths[0]
+            found = attrs.evolve(found, bend=bend)
         return found, made[1]
 
 
 def distance(place: Place, other: Place) -> float:
     """How far another place of the same route is along the first tangent."""
     return float(place.tangents[0] @ ((other.orbit.loop.flat - place.orbit.loop.flat) / place.units))
+
+
+def passes_by(start: Place, before: Place, after: Place) -> bool:
+    """Whether a step passes the start of a walk."""
+    if after.family.route != start.family.route or before.family.route != start.family.route:
+        return False
+    units, first = start.units, start.orbit.loop.flat
+    one, other = ((each.orbit.loop.flat - first) / units for each in (before, after))
+    chord = other - one
+    length = float(np.linalg.norm(chord))
+    share = -one @ chord / length**2 if length > 0.0 else -1.0
+    return bool(0.0 <= share <= 1.0 and np.linalg.norm(one + share * chord) < 0.1 * length)
 
 
 def zero_between(place: Place, after: Place, function: Callable[[Place], float]) -> Place | None:
@@ -100,7 +129,7 @@ def zero_between(place: Place, after: Place, function: Callable[[Place], float])
         return function(known[s])
 
     try:
-        root = brentq(value, 0.0, length, xtol=1e-14, rtol=4e-16 * 4, maxiter=60)
+        root = brentq(value, 0.0, length, xtol=1e-14, rtol=4e-16 * 4, maxiter=60, disp=False)
     except (ArithmeticError, ValueError):
         return None
     return known.get(root) or min(known.items(), key=lambda each: abs(each[0] - root))[1]
@@ -157,13 +186,13 @@ def _at_zero(heights: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
 
 def place_of(orbit: Pass, onward: np.ndarray, sizes: np.ndarray) -> Place | None:
     """The place of an orbit, with the tangents that are nearest to given directions ``(k, m + k)``."""
-    matrix, _ = orbit.equations(orbit, orbit.units(sizes))
+    matrix = orbit.derivatives(sizes)
     if not np.all(np.isfinite(matrix)):
         return None
-    k = len(sizes)
-    null = np.linalg.svd(matrix)[2][-k:]
-    # The rotation of the basis that brings it nearest to the directions.
-    left, _, right = np.linalg.svd(onward @ null.T)
+    _, values, vectors = np.linalg.svd(matrix)
+    # There are more directions than parameters where orbits come in families of their own.
+    null = vectors[min(int(np.sum(values > ROUNDING * values[0])), len(matrix.T) - len(sizes)) :]
+    left, _, right = np.linalg.svd(onward @ null.T, full_matrices=False)
     return Place(orbit, left @ right @ null, sizes)
 
 
@@ -181,6 +210,26 @@ def begun(family: Family, loop: Loop, sizes: np.ndarray) -> Place | None:
     return None if made is None else place_of(made[0], fixed, sizes)
 
 
+def place_on(orbit: Any, names: tuple[str, ...], sizes: np.ndarray, solver: Solver) -> Place:
+    """A :class:`hybrid.PeriodicOrbit` among those over some parameters, whose units are ``sizes (k,)``.
+
+    Raises
+    ------
+    ArgumentError
+        If the orbit is not found again.
+    """
+    family = Family(orbit.system, names, dict(orbit.parameters), orbit.forcing_periods, solver, ())
+    arc, values = orbit.arc(solver), np.array([orbit.parameters[name] for name in names])
+    started = start_of(family, arc, orbit.period, values) if arc.status.ok else None
+    place = None if started is None else begun(*started, sizes)
+    if place is None:
+        raise ArgumentError(
+            "orbit is not found again, stretch by stretch: solve it with tighter tolerances, and see that "
+            "the fields have values a little beyond their guards."
+        )
+    return place
+
+
 def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) -> tuple[Family, Loop] | None:
     """The family and the unknowns of the orbit that a run over one period shows; None if it has no value."""
     route, x, times = route_of(family.system, arc, period)
@@ -195,7 +244,7 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
         for flow in first.flows
     ]
     route, x, times = divided(route, x, times, arcs, growths)
-    return attrs.evolve(family, route=route), Loop(x, times, values)
+    return attrs.evolve(family, route=route, least=first.scale), Loop(x, times, values)
 
 
 def share_of(orbit: Pass, t: float) -> tuple[int, float]:
@@ -213,58 +262,55 @@ def moment(orbit: Pass, i: int, share: float) -> tuple[float, np.ndarray]:
     return float(begin + share * (end - begin)), orbit.flows[i].at(np.array([share]))[0]
 
 
+def slides(orbit: Pass, i: int) -> bool:
+    """Whether the motion in a stretch stays on the guard through which it began."""
+    family, count = orbit.family, len(orbit.flows)
+    if not family.route[(i - 1) % count].fired:
+        return slides(orbit, (i - 1) % count) if count > 1 else False
+    t, x = moment(orbit, i, 0.5)
+    name = family.route[(i - 1) % count].fired[0]
+    *slope, own = family.gradient(name, t, x, orbit.loop.values)
+    terms = np.append(np.array(slope) * family.rate(family.route[i].mode, t, x, orbit.loop.values), own)
+    return bool(abs(terms.sum()) <= ALONG * np.abs(terms).sum())
+
+
 def is_real(orbit: Pass) -> bool:
     """Whether the system itself goes this way.
 
     Each guard fires in its direction, and runs from the middle of each stretch to that of the next one jump
-    as the equations say.
+    as the equations say. A run does not begin or end on a surface that the motion stays on, nor in a chatter.
     """
-    family, loop, route = orbit.family, orbit.loop, orbit.family.route
+    loop, route = orbit.loop, orbit.family.route
     if np.any(np.diff(loop.times) <= 0.0) or not all(map(orbit.fires_in_direction, range(len(route)))):
         return False
-    middles = [moment(orbit, i, 0.5) for i in range(len(route))]
-    middles.append((middles[0][0] + loop.period, middles[0][1]))
-    parameters = family.all_parameters(loop.values)
-    i = 0
-    while i < len(route):
-        wanted, last = list(route[i].fired), i + 1
-        # Within a chatter there is no middle that a run could start from or end at.
-        while last < len(route) and route[last].within:
-            wanted += route[last].fired
-            last += 1
-        if route[i].within and len(route) > 1:
-            i = last
-            continue
-        if not _goes(orbit, i, last, middles, wanted, parameters):
-            return False
-        i = last
-    return True
+    free = [i for i, stretch in enumerate(route) if not stretch.within and not slides(orbit, i)] or [0]
+    return all(_goes(orbit, i, after) for i, after in pairwise([*free, free[0] + len(route)]))
 
 
-def _goes(
-    orbit: Pass,
-    first: int,
-    last: int,
-    middles: list[tuple[float, np.ndarray]],
-    wanted: list[str],
-    parameters: dict[str, float],
-) -> bool:
-    """Whether a run from the middle of one stretch to that of another takes these transitions."""
-    family, route = orbit.family, orbit.family.route
-    (begin, x), (end, _) = middles[first], middles[last]
-    passed = {name for stretch in route for name in stretch.within}
+def _goes(orbit: Pass, first: int, last: int) -> bool:
+    """Whether a run from the middle of one stretch to that of another takes the transitions in between."""
+    family, loop, route = orbit.family, orbit.loop, orbit.family.route
+    count = len(route)
+    begin, x = moment(orbit, first, 0.5)
+    end, _ = moment(orbit, last % count, 0.5)
+    end += last // count * loop.period
     arc = simulate(
         family.system,
         x,
         (begin, end),
         mode=route[first].mode,
-        parameters=parameters,
+        parameters=family.all_parameters(loop.values),
         solver=family.solver,
     )
+    passed = {name for stretch in route for name in stretch.within}
     jumps = [jump for jump in arc.jumps if jump.transition not in passed]
-    if not arc.status.ok or [jump.transition for jump in jumps] != [
-        name for name in wanted if name not in passed
-    ]:
+    wanted = [
+        (name, loop.times[i % count + 1] + i // count * loop.period)
+        for i in range(first, last)
+        for name in route[i % count].fired
+        if name not in passed
+    ]
+    if not arc.status.ok or [jump.transition for jump in jumps] != [name for name, _ in wanted]:
         return False
-    late = [abs(jump.t - orbit.loop.times[last]) for jump in jumps]
-    return max(late, default=0.0) <= SAME_TIME * orbit.loop.period
+    late = [abs(jump.t - t) for jump, (_, t) in zip(jumps, wanted, strict=True)]
+    return max(late, default=0.0) <= SAME_TIME * loop.period

@@ -32,14 +32,12 @@ def torus(place: Place) -> float:
 
 def branch_point(place: Place) -> float:
     """The determinant of the equations with the tangents below them, without its size."""
-    matrix, _ = place.orbit.equations(place.orbit, place.units)
-    return _root_of_determinant(np.vstack([matrix, place.tangents]))
+    return _root_of_determinant(np.vstack([place.matrix, place.tangents]))
 
 
 def singular(place: Place) -> float:
     """The determinant of the equations at fixed parameters, without its size: zero at folds."""
-    matrix, _ = place.orbit.equations(place.orbit, place.units)
-    return _root_of_determinant(matrix[:, : -len(place.sizes)])
+    return _root_of_determinant(place.matrix[:, : -len(place.sizes)])
 
 
 def _root_of_determinant(matrix: np.ndarray) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation
-from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.continuation.place import Place, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.orbit import PeriodicOrbit
@@ -84,7 +84,7 @@ def _repeated(bifurcation: Bifurcation, solver: Solver, sizes: np.ndarray) -> Pl
     times = TIMES[bifurcation.kind]
     place = bifurcation._place
     if place is None:
-        place = bifurcation.orbit.place((bifurcation.parameter,), sizes, solver)
+        place = place_on(bifurcation.orbit, (bifurcation.parameter,), sizes, solver)
     family, loop = place.family, place.orbit.loop
     again = [loop.times[:1], *(loop.times[1:] + k * loop.period for k in range(times))]
     family = attrs.evolve(family, solver=solver, periods=times * family.periods, route=times * family.route)

@@ -9,7 +9,14 @@ import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
 from hybrid.orbits.continuation.family import Pass
-from hybrid.orbits.continuation.place import Place, distance, interpolated_zero, is_real, zero_between
+from hybrid.orbits.continuation.place import (
+    Place,
+    distance,
+    interpolated_zero,
+    is_real,
+    passes_by,
+    zero_between,
+)
 from hybrid.orbits.continuation.smooth import TESTS, halves, told
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
@@ -21,6 +28,7 @@ FEW_CORRECTIONS = 3
 LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
+NOTHING = 1e-12
 # A change of the route this near to the one before, in the range of the parameter, is the same one.
 SAME_CHANGE = 1e-7
 
@@ -74,7 +82,6 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             return
         half = _halved(place, after)
         if half is not None:
-            yield from _between(place, half)
             yield Event("flip", half, "the orbit has half the period: this branch begins here")
             yield "flip"
             return
@@ -83,7 +90,7 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if np.any(after.orbit.scale > UNBOUNDED * start.orbit.scale):
             yield "infinity"
             return
-        if place is not start and _closes(start, place, after):
+        if place is not start and passes_by(start, place, after):
             yield "closed"
             return
         if corrections <= FEW_CORRECTIONS:
@@ -103,7 +110,9 @@ def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterato
 def _between(place: Place, after: Place) -> Iterator[Event]:
     """The smooth bifurcations between two places."""
     for kind, function in TESTS.items():
-        if not function(place) * function(after) < 0.0:
+        one, other = function(place), function(after)
+        # A function that is zero to rounding all along says nothing.
+        if not one * other < 0.0 or min(abs(one), abs(other)) < NOTHING:
             continue
         found = zero_between(place, after, function)
         message = "" if found is None else told(kind, found)
@@ -122,16 +131,3 @@ def _halved(place: Place, after: Place) -> Place | None:
         return 0.0 if found is None else float(here @ found)
 
     return interpolated_zero(place, along, (0.0, distance(place, after)))
-
-
-def _closes(start: Place, before: Place, after: Place) -> bool:
-    """Whether the step has passed the start of the walk."""
-    if after.family.route != start.family.route or before.family.route != start.family.route:
-        return False
-    units = start.units
-    first = start.orbit.loop.flat
-    one, other = (before.orbit.loop.flat - first) / units, (after.orbit.loop.flat - first) / units
-    chord = other - one
-    length = float(np.linalg.norm(chord))
-    share = -one @ chord / length**2 if length > 0.0 else -1.0
-    return bool(0.0 <= share <= 1.0 and np.linalg.norm(one + share * chord) < 0.1 * length)

@@ -34,6 +34,7 @@ def methods(made):
             {"names": [None, 3, "w", ["nope"], [3], [None], []], "solver": SOLVER},
         ),
         (call(hybrid.Branch.orbit, made["branch"], 0), {"i": [None, "a", 1.5, 10**9, True]}),
+        (call(hybrid.BifurcationCurve.orbit, made["curve"], 0), {"i": [None, "a", 1.5, 10**9, True]}),
         (
             call(hybrid.switch_branch, made["flip"]),
             {"bifurcation": [None, "a", 3, made["orbit"]], "solver": SOLVER},
@@ -46,7 +47,22 @@ def methods(made):
                 "span": [None, 3, (2.0, 3.0), (1.1, 0.9), (0.9,), "ab"],
                 "solver": SOLVER,
                 "max_steps": [0, *COUNT],
+                "progress": [3, "a"],
             },
+        ),
+        (
+            call(hybrid.continue_bifurcation, made["flip"], {"E": (24.0, 25.0), "V_ref": (11.2, 11.4)}),
+            {
+                "bifurcation": [None, "a", 3, made["orbit"]],
+                "over": [None, 3, "ab", {"E": (24, 25)}, {"E": (24, 25), "q": (0, 1)}, {"E": 1, "V_ref": 2}],
+                "solver": SOLVER,
+                "max_steps": [0, *COUNT],
+                "progress": [3, "a"],
+            },
+        ),
+        (
+            call(hybrid.open_branch, made["branch"].system, made["branch"].to_xarray()),
+            {"system": [None, 3, "a"], "saved": [None, 3, "no such folder", made["flip"]]},
         ),
         (call(hybrid.Solver.tightened, hybrid.DOP853(), 10.0), {"factor": POSITIVE}),
         (call(HybridSystem.mode_index, BALL, "flight"), {"name": [None, *NAME]}),

@@ -66,7 +66,11 @@ def plots(made):
         ),
         (
             call(hybrid.plot.plot_branch, made["branch"]),
-            {"branch": [None, "a", 3, arc], "y": COMPONENT, "ax": AXES, "figsize": FIGSIZE},
+            {"branch": [None, "a", 3, arc], "y": COMPONENT, "over": AXES[1:], "ax": AXES, "figsize": FIGSIZE},
+        ),
+        (
+            call(hybrid.plot.plot_curve, made["curve"]),
+            {"curve": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
         ),
         (
             call(hybrid.plot.plot_work_precision, made["work"]),

@@ -1,0 +1,321 @@
+"""Follow a bifurcation over two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.display.progress import Progress, progress_bar
+from hybrid.display.tables import counted
+from hybrid.errors import ArgumentError
+from hybrid.orbits.continuation.branch import Bifurcation
+from hybrid.orbits.continuation.curve import SMOOTH, Curve, Special, Spot, along_curve
+from hybrid.orbits.continuation.measures import measure_of
+from hybrid.orbits.continuation.place import Place, place_of, place_on
+from hybrid.orbits.continuation.result import Points, orbit_of
+from hybrid.orbits.continuation.route import Loop
+from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.plan import check_solver
+from hybrid.solvers import Solver, Taylor
+from hybrid.status import SUCCESS, Status, StatusCode
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
+
+ENDS = {
+    "range": "the end of a range",
+    "closed": "its start: it is closed",
+    "change": "a place where the orbit has other transitions",
+    "strong resonance": "a strong resonance, where the pair of multipliers becomes real",
+    "most": "the limit of steps",
+    "lost": "a place beyond which Newton's method finds no point",
+}
+
+
+@attrs.frozen(eq=False)
+class CodimensionTwo:
+    """Where two things happen at once on a curve of bifurcations.
+
+    Attributes
+    ----------
+    kind
+        ``"cusp"``, ``"fold-flip"``, ``"1:3 resonance"``, ``"1:4 resonance"``, a kind and what meets it there
+        such as ``"grazing-fold"``, or a kind ``"... at a change"``: the transitions of the orbit change.
+    values
+        The two parameters by name.
+    orbit, message
+        The orbit there, and what happens, in words.
+    """
+
+    kind: str
+    values: Mapping[str, float]
+    orbit: PeriodicOrbit
+    message: str
+
+    def __str__(self) -> str:
+        where = ", ".join(f"{name} = {value:.10g}" for name, value in self.values.items())
+        return f"{self.kind} at {where}: {self.message}"
+
+
+@attrs.frozen(eq=False, repr=False)
+class BifurcationCurve:
+    """A bifurcation over two parameters; ``curve["omega"]`` are the values of one.
+
+    Attributes
+    ----------
+    system, kind, names
+        The model, the kind of the bifurcation, and the names of the two parameters.
+    values
+        Their values ``(N, 2)``, in order along the curve.
+    x0, mode, period, multipliers
+        As in :class:`hybrid.Branch`.
+    points
+        Each :class:`hybrid.CodimensionTwo` on the curve, in order.
+    status
+        Why the curve ends where it does.
+    """
+
+    system: HybridSystem
+    kind: str
+    names: tuple[str, str]
+    values: np.ndarray
+    x0: np.ndarray
+    mode: np.ndarray
+    period: np.ndarray
+    multipliers: np.ndarray
+    points: tuple[CodimensionTwo, ...]
+    status: Status
+    _orbits: tuple[PeriodicOrbit, ...]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        arguments.known("curve: Parameter", name, self.names, "Parameters")
+        return self.values[:, self.names.index(name)]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __repr__(self) -> str:
+        spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
+        special = ", ".join(each.kind for each in self.points) or "nothing special"
+        return (
+            f"<Curve of {self.kind}s, {spans}, {counted(len(self), 'point')}, {special}, {self.status.brief}>"
+        )
+
+    def orbit(self, i: int) -> PeriodicOrbit:
+        """The orbit of a point of the curve.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such point.
+        """
+        whole = arguments.whole_number(i)
+        if whole is None or not -len(self) <= whole < len(self):
+            raise arguments.refusal("i", f"be a whole number from {-len(self)} to {len(self) - 1}", i)
+        return self._orbits[whole]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The curve over the axis ``point``, with both parameters as coordinates."""
+        import xarray
+
+        names = Names(self.system.state_names, self.system.units)
+        variables = {
+            "x0": (("point", "state"), self.x0, names.states),
+            "mode": ("point", self.mode.astype(str)),
+            "period": ("point", self.period, names.of("t")),
+            "multipliers": (("point", "multiplier"), self.multipliers.astype(complex)),
+        }
+        coords = {name: ("point", self[name], names.of(name)) for name in self.names}
+        made_by = attributes(f"curve of {self.kind}s", self.status, self.system)
+        return xarray.Dataset(variables, {**coords, **names.coords()}, made_by)
+
+
+def continue_bifurcation(
+    bifurcation: Bifurcation,
+    over: Mapping[str, tuple[float, float]],
+    *,
+    solver: Solver | None = None,
+    max_steps: int = 500,
+    progress: bool | None = None,
+) -> BifurcationCurve:
+    """The curve of a bifurcation over two parameters, both ways from where it was found.
+
+    The orbits of two parameters form a surface. The curve is where the test function of the bifurcation is
+    zero on it: of a fold, a flip or a torus the same as in :func:`hybrid.continue_orbit`, and where the
+    transitions change the height, speed or time that vanishes there.
+
+    Parameters
+    ----------
+    bifurcation
+        Of a `Branch`: any kind but a branch point, which two parameters do not keep.
+    over
+        Names of two parameters with their ranges: ``{"omega": (6.5, 8.5), "P": (300.0, 700.0)}``.
+    solver
+        Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
+    max_steps
+        Largest number of steps in either direction.
+    progress
+        Whether to show a progress bar; by default in a terminal or a notebook, after two seconds.
+
+    Returns
+    -------
+    BifurcationCurve
+        With a status; if it is interrupted or lost it keeps what there is.
+
+    Raises
+    ------
+    ArgumentError
+        If the bifurcation is a branch point, a parameter does not exist, or a range does not contain its
+        value.
+
+    References
+    ----------
+    Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 4th ed., Springer 2023, sections 10.3 and 9.1.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import continue_orbit, periodic_orbit
+    >>> orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> (fold,) = continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations
+    >>> curve = continue_bifurcation(fold, {"w": (1.7, 1.8), "r": (0.75, 0.85)})
+    >>> curve.status.ok
+    True
+    """
+    arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
+    names, lows, highs = _ranges(bifurcation, over)
+    most = arguments.count("max_steps", max_steps, 1)
+    progress = None if progress is None else arguments.flag("progress", progress)
+    method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+    place = _start(bifurcation, names, highs - lows, method)
+    curve = _curve_of(bifurcation, place)
+    begin = curve.begin(place)
+    if begin is None:
+        raise ArgumentError(f"the {bifurcation.kind} is not found again over {names[0]} and {names[1]}.")
+    with CTRL_C, progress_bar(None, "Curve", progress, "point") as bar:
+        items, why = _both_ways(curve, begin, lows, highs, most, bar)
+        interrupted = CTRL_C.is_set()
+    status = interrupted_status("the points so far") if interrupted else _status(why)
+    return _result(items, bifurcation, names, status)
+
+
+def _ranges(bifurcation: Bifurcation, over: object) -> tuple[tuple[str, str], np.ndarray, np.ndarray]:
+    """Names of the parameters, and the ends of their ranges."""
+    wanted = "map the names of two parameters to their ranges, as in {'omega': (6.5, 8.5), 'P': (300, 700)}"
+    if not isinstance(over, Mapping) or len(over) != 2:
+        raise arguments.refusal("over", wanted, over)
+    lows, highs = np.empty(2), np.empty(2)
+    parameters = bifurcation.orbit.parameters
+    for j, (name, span) in enumerate(over.items()):
+        arguments.known("over: Parameter", name, parameters, "Parameters")
+        ends = arguments.numbers(f"over[{name!r}]", span, "be (low, high)")
+        if ends.shape != (2,) or not ends[0] < ends[1] or not ends[0] <= parameters[name] <= ends[1]:
+            raise arguments.refusal(f"over[{name!r}]", f"be (low, high) around {parameters[name]}", span)
+        lows[j], highs[j] = ends
+    first, second = over
+    return (first, second), lows, highs
+
+
+def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, solver: Solver) -> Place:
+    """The orbit at the bifurcation on the surface over both parameters."""
+    if bifurcation.kind == "branch point":
+        raise ArgumentError(
+            "bifurcation is a branch point, which goes away when another parameter changes; allowed are the "
+            "other kinds."
+        )
+    known = bifurcation._place
+    if known is None:
+        if bifurcation.kind not in SMOOTH:
+            raise ArgumentError(
+                f"bifurcation is a {bifurcation.kind} of a branch that was opened again: take it from one "
+                "that continue_orbit makes."
+            )
+        return place_on(bifurcation.orbit, names, sizes, solver)
+    orbit = known.orbit
+    values = np.array([bifurcation.orbit.parameters[name] for name in names])
+    family = attrs.evolve(
+        orbit.family, names=names, parameters=dict(bifurcation.orbit.parameters), solver=solver
+    )
+    made = family.around(Loop(orbit.loop.x, orbit.loop.times, values))
+    place = None if made is None else place_of(made, np.eye(len(made.loop.flat))[-2:], sizes)
+    if place is None:
+        raise ArgumentError("the orbit at the bifurcation is not found again: tighten solver=.")
+    return place
+
+
+def _curve_of(bifurcation: Bifurcation, place: Place) -> Curve:
+    if bifurcation.kind in SMOOTH:
+        return Curve(bifurcation.kind, SMOOTH[bifurcation.kind], 0.0)
+    assert bifurcation._change is not None
+    measure = measure_of(bifurcation._change.key)
+    side = float(np.sign(measure(bifurcation._change.before.orbit)))
+    return Curve(bifurcation.kind, lambda each: measure(each.orbit), side)
+
+
+def _both_ways(
+    curve: Curve, begin: Spot, lows: np.ndarray, highs: np.ndarray, most: int, bar: Progress
+) -> tuple[list[Spot | Special], list[str]]:
+    items: list[Spot | Special] = [begin]
+    why: list[str] = []
+    for sign in (-1.0, 1.0):
+        items = items[::-1]
+        for item in along_curve(curve, attrs.evolve(begin, way=sign * begin.way), lows, highs, most):
+            if isinstance(item, str):
+                why.append(item)
+                break
+            items.append(item)
+            bar.update(isinstance(item, Spot))
+            if CTRL_C.is_set():
+                return items, why
+        if why[-1] == "closed":
+            break
+    return items, why
+
+
+def _result(
+    items: list[Spot | Special], bifurcation: Bifurcation, names: tuple[str, str], status: Status
+) -> BifurcationCurve:
+    points = Points(bifurcation.orbit.t0)
+    spots = [item for item in items if isinstance(item, Spot)]
+    orbits = tuple(orbit_of(each.place.orbit, points) for each in spots)
+    special = tuple(
+        CodimensionTwo(
+            item.kind,
+            dict(zip(names, item.spot.place.values.tolist(), strict=True)),
+            orbit_of(item.spot.place.orbit, points),
+            item.message,
+        )
+        for item in items
+        if isinstance(item, Special)
+    )
+    return BifurcationCurve(
+        system=bifurcation.orbit.system,
+        kind=bifurcation.kind,
+        names=names,
+        values=np.array([each.place.values for each in spots]),
+        x0=np.array([orbit.x0 for orbit in orbits]),
+        mode=np.array([orbit.mode for orbit in orbits]),
+        period=np.array([orbit.period for orbit in orbits]),
+        multipliers=np.array([orbit.multipliers for orbit in orbits]),
+        points=special,
+        status=status,
+        orbits=orbits,
+    )
+
+
+def _status(why: list[str]) -> Status:
+    told = " and at ".join(ENDS[each] for each in dict.fromkeys(why))
+    if not {"lost", "most"} & set(why):
+        return attrs.evolve(SUCCESS, message=f"The curve ends at {told}.")
+    return Status(
+        StatusCode.NOT_CONVERGED,
+        f"The curve ends at {told}.",
+        "Tighten the tolerances of solver=, or raise max_steps.",
+    )

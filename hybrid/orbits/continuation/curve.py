@@ -1,0 +1,272 @@
+"""Curves of bifurcations in two parameters: where a test function is zero on the surface of orbits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.place import Place, is_real, passes_by
+from hybrid.orbits.continuation.smooth import flip, singular, torus
+
+Test = Callable[[Place], float]
+
+# Lengths of steps along a curve, in units of the sizes of the orbit and of the ranges of the parameters.
+FIRST_STEP = 0.01
+LONGEST_STEP = 0.05
+SHORTEST_STEP = 1e-6
+LONGER = 1.5
+# A step may turn by this angle (its cosine).
+LEAST_COSINE = 0.9
+# The slope of the test function is a difference over this distance.
+APART = 1e-4
+# The corrections stop when they are this small.
+CONVERGED = 1e-11
+MOST_CORRECTIONS = 8
+# What is beside a touch is asked for at this distance from it.
+BESIDE = 1e-3
+# The parameters stand still at a cusp, to this share of their speed nearby.
+STANDS = 1e-3
+# A pair of multipliers has an angle on the unit circle if it is this far from the real axis.
+REAL = 1e-9
+
+SMOOTH: dict[str, Test] = {"fold": singular, "flip": flip, "torus": torus}
+# Angles on the unit circle where a torus is resonant, as shares of a turn.
+RESONANCES = {"1:4 resonance": 1 / 4, "1:3 resonance": 1 / 3}
+
+
+@attrs.frozen(eq=False)
+class Spot:
+    """A place on the curve.
+
+    Attributes
+    ----------
+    place
+        The orbit, with two tangents to the surface of orbits.
+    slope
+        Derivatives ``(2,)`` of the test function along them.
+    way
+        Unit direction ``(2,)`` of the curve, along them.
+    """
+
+    place: Place
+    slope: np.ndarray
+    way: np.ndarray
+
+    @property
+    def along(self) -> np.ndarray:
+        """Unit tangent ``(m + 2,)`` of the curve, in scaled unknowns."""
+        return np.asarray(self.way @ self.place.tangents)
+
+
+@attrs.frozen(eq=False)
+class Special:
+    """A point of codimension two: its kind, the place, and what happens there."""
+
+    kind: str
+    spot: Spot
+    message: str
+
+
+@attrs.frozen(eq=False)
+class Curve:
+    """The equation of a curve: the test function that is zero on it.
+
+    ``side`` is the sign of the function where the orbits are real; 0 if they are on both sides.
+    """
+
+    kind: str
+    test: Test
+    side: float
+
+    def begin(self, place: Place) -> Spot | None:
+        """The spot nearest to a place, with the way to larger values of the first parameter."""
+        found = self._corrected(place, np.zeros(2), None)
+        return None if found is None else self._spot(found, np.eye(len(found.units))[-2])
+
+    def step(self, spot: Spot, length: float) -> Spot | None:
+        """The spot at a distance along the curve."""
+        found = self._corrected(spot.place, length * spot.way, spot.slope)
+        if found is None:
+            return None
+        made = self._spot(found, np.sign(length) * spot.along)
+        if made is None or np.sign(length) * (made.along @ spot.along) < LEAST_COSINE:
+            return None
+        return attrs.evolve(made, way=-made.way) if length < 0.0 else made
+
+    def is_real(self, spot: Spot) -> bool:
+        """Whether the system goes this way, on the side of a touch where there is an orbit."""
+        if self.side == 0.0:
+            return is_real(spot.place.orbit)
+        inwards = self.side * spot.slope / np.linalg.norm(spot.slope)
+        made = spot.place.step(BESIDE * inwards)
+        return made is not None and is_real(made[0].orbit)
+
+    def _corrected(self, place: Place, lengths: np.ndarray, slope: np.ndarray | None) -> Place | None:
+        """The place near one at these distances along its tangents where the test function is zero."""
+        if slope is None:
+            slope = self._slope(place)
+            if slope is None:
+                return None
+        across = slope / np.linalg.norm(slope)
+        rate, shift, before = float(np.linalg.norm(slope)), 0.0, None
+        for _ in range(MOST_CORRECTIONS):
+            made = place.step(lengths + shift * across)
+            if made is None:
+                return None
+            height = self.test(made[0])
+            if before is not None and shift != before[0] and height != before[1]:
+                rate = (height - before[1]) / (shift - before[0])
+            change = -height / rate
+            if not np.isfinite(change) or abs(change) > LONGEST_STEP:
+                return None
+            if abs(change) < CONVERGED or (before is not None and height == before[1]):
+                return made[0]
+            before, shift = (shift, height), shift + change
+        return None
+
+    def _slope(self, place: Place) -> np.ndarray | None:
+        here, found = self.test(place), np.empty(2)
+        for j, direction in enumerate(np.eye(2)):
+            made = place.step(APART * direction)
+            if made is None:
+                return None
+            found[j] = (self.test(made[0]) - here) / APART
+        return found if np.all(np.isfinite(found)) and np.any(found) else None
+
+    def _spot(self, place: Place, onward: np.ndarray) -> Spot | None:
+        slope = self._slope(place)
+        if slope is None:
+            return None
+        way = np.array([-slope[1], slope[0]]) / np.linalg.norm(slope)
+        return Spot(place, slope, -way if way @ place.tangents @ onward < 0.0 else way)
+
+
+def along_curve(
+    curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray, most: int
+) -> Iterator[Spot | Special | str]:
+    """Spots along a curve with the special points between them; the last item is why it ends."""
+    length, start = FIRST_STEP, spot
+    for number in range(most):
+        after = curve.step(spot, length)
+        if after is None:
+            length /= 2.0
+            if length < SHORTEST_STEP:
+                yield "lost"
+                return
+            continue
+        ended = _ended(curve, after, lows, highs)
+        if ended:
+            if ended == "range":
+                last = _zero(curve, spot, after, lambda each: _outside(each, lows, highs)) or spot
+            else:
+                last = _last(curve, spot, length, lambda each: _ended(curve, each, lows, highs) == "")
+            yield from _between(curve, spot, last)
+            if last is not spot:
+                yield last
+            if ended == "change":
+                yield Special(f"{curve.kind} at a change", last, "beyond it the orbit has other transitions")
+            yield ended
+            return
+        yield from _between(curve, spot, after)
+        yield after
+        if number > 1 and passes_by(start.place, spot.place, after.place):
+            yield "closed"
+            return
+        spot, length = after, min(LONGEST_STEP, LONGER * length)
+    yield "most"
+
+
+def _ended(curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray) -> str:
+    """Why the curve has ended at a spot; empty if it has not."""
+    if _outside(spot, lows, highs) > 0.0:
+        return "range"
+    if curve.kind == "torus" and not angle(spot.place.orbit) > 0.0:
+        return "strong resonance"
+    return "" if curve.is_real(spot) else "change"
+
+
+def _outside(spot: Spot, lows: np.ndarray, highs: np.ndarray) -> float:
+    """How far a spot is out of the ranges, as a share of them; negative within."""
+    values = spot.place.values
+    return float((np.maximum(lows - values, values - highs) / (highs - lows)).max())
+
+
+def _zero(curve: Curve, spot: Spot, after: Spot, function: Callable[[Spot], float]) -> Spot | None:
+    """The spot between two where a function of spots changes its sign."""
+    from scipy.optimize import brentq
+
+    step = float(spot.along @ ((after.place.orbit.loop.flat - spot.place.orbit.loop.flat) / spot.place.units))
+    known = {0.0: spot, step: after}
+
+    def value(s: float) -> float:
+        if s not in known:
+            made = curve.step(spot, s)
+            if made is None:
+                raise ArithmeticError
+            known[s] = made
+        return function(known[s])
+
+    try:
+        root = brentq(value, 0.0, step, xtol=1e-12, maxiter=40, disp=False)
+    except (ArithmeticError, ValueError):
+        return None
+    return known[min(known, key=lambda s: abs(s - root))]
+
+
+def _last(curve: Curve, spot: Spot, length: float, inside: Callable[[Spot], bool]) -> Spot:
+    """The last spot of a step that is inside, to rounding of the step."""
+    low, high, found = 0.0, length, spot
+    while high - low > 1e-9 * length:
+        middle = 0.5 * (low + high)
+        made = curve.step(spot, middle)
+        if made is not None and inside(made):
+            low, found = middle, made
+        else:
+            high = middle
+    return found
+
+
+def angle(orbit: Pass) -> float:
+    """The angle of the pair of multipliers nearest to the unit circle; 0 without a pair."""
+    pairs = [m for m in orbit.free_multipliers if m.imag > REAL]
+    return float(np.angle(min(pairs, key=lambda m: abs(abs(m) - 1.0)))) if pairs else 0.0
+
+
+def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
+    """The points of codimension two between two spots."""
+    for kind, function, message in _tests(curve.kind, spot):
+        if not function(spot) * function(after) < 0.0:
+            continue
+        found = _zero(curve, spot, after, function)
+        if found is None:
+            continue
+        if kind != "cusp" or np.linalg.norm(found.along[-2:]) < STANDS * np.linalg.norm(spot.along[-2:]):
+            yield Special(kind, found, message)
+
+
+def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float], str]]:
+    """Functions that are zero at points of codimension two, with their kinds and what happens."""
+    if kind == "torus":
+        for name, turn in RESONANCES.items():
+            away = partial(_from_resonance, 2 * np.pi * turn)
+            yield name, away, "the multipliers of the torus are roots of 1"
+        return
+    if kind == "fold":
+        # Along the curve both parameters stop and turn back.
+        yield "cusp", lambda other: float(spot.along[-2:] @ other.along[-2:]), "two curves of folds meet"
+    for other in ("fold", "flip"):
+        if other != kind:
+            name = "fold-flip" if {other, kind} == {"fold", "flip"} else f"{kind}-{other}"
+            yield name, partial(_at_spot, SMOOTH[other]), f"there is a {other} too"
+
+
+def _from_resonance(turn: float, spot: Spot) -> float:
+    return angle(spot.place.orbit) - turn
+
+
+def _at_spot(test: Test, spot: Spot) -> float:
+    return test(spot.place)

@@ -1,0 +1,56 @@
+"""A branch as a dataset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.simulation.labelled import Names, attributes
+
+if TYPE_CHECKING:
+    import xarray
+
+KIND = "branch"
+# Whether orbits beside a bifurcation are stable, as numbers.
+SIDES = {None: -1, False: 0, True: 1}
+
+
+def dataset_of(branch: Any) -> xarray.Dataset:
+    """The numbers of a :class:`hybrid.Branch` and of its bifurcations, with names and units."""
+    import xarray
+
+    names = Names(branch.system.state_names, branch.system.units)
+    found = branch.bifurcations
+    orbits = [each.orbit for each in found]
+    n = branch.system.dimension
+    variables: dict[str, Any] = {
+        "x0": (("point", "state"), branch.x0, names.states),
+        "mode": ("point", branch.mode.astype(str)),
+        "t0": ("point", np.array([branch.orbit(i).t0 for i in range(len(branch))]), names.of("t")),
+        "period": ("point", branch.period, names.of("t")),
+        "multipliers": (("point", "multiplier"), branch.multipliers.astype(complex)),
+        "stable": ("point", branch.stable),
+        "kind": ("bifurcation", np.array([each.kind for each in found], dtype=str)),
+        "value": (
+            "bifurcation",
+            np.array([each.value for each in found], dtype=float),
+            names.of(branch.name),
+        ),
+        "message": ("bifurcation", np.array([each.message for each in found], dtype=str)),
+        "stable_beside": (
+            ("bifurcation", "side"),
+            np.array([[SIDES[side] for side in each.stable] for each in found], dtype=int).reshape(-1, 2),
+        ),
+        "x0_there": (("bifurcation", "state"), np.array([each.x0 for each in orbits]).reshape(-1, n)),
+        "mode_there": ("bifurcation", np.array([each.mode for each in orbits], dtype=str)),
+        "t0_there": ("bifurcation", np.array([each.t0 for each in orbits], dtype=float)),
+        "period_there": ("bifurcation", np.array([each.period for each in orbits], dtype=float)),
+        "multipliers_there": (
+            ("bifurcation", "multiplier"),
+            np.array([each.multipliers for each in orbits], dtype=complex).reshape(-1, n),
+        ),
+    }
+    coords = {branch.name: ("point", branch.parameter, names.of(branch.name)), **names.coords()}
+    made_by = attributes(KIND, branch.status, branch.system, branch.orbit(0).parameters)
+    return xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name})

@@ -1,0 +1,135 @@
+"""A branch from its dataset."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.errors import ArgumentError
+from hybrid.orbits.continuation.branch import Bifurcation, Branch
+from hybrid.orbits.continuation.labelled import KIND, SIDES
+from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.simulation.simulate import simulate
+from hybrid.solvers import Taylor
+from hybrid.status import SUCCESS, Status, StatusCode
+from hybrid.system.graph import HybridSystem, as_system
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Branch:
+    """A branch from what its `to_xarray` gave, to look at it, to draw it and to take it further.
+
+    Parameters
+    ----------
+    system
+        The model, which is not saved.
+    saved
+        The dataset, or the folder of zarr where it is.
+
+    Returns
+    -------
+    Branch
+        Each of its orbits is run once when it is asked for.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no branch, or one of another system.
+    """
+    import xarray
+
+    as_system("system", system)
+    if isinstance(saved, (str, Path)):
+        # What is no folder is refused below.
+        with suppress(OSError, ValueError):
+            saved = xarray.open_zarr(saved).load()
+    if not isinstance(saved, xarray.Dataset) or saved.attrs.get("kind") != KIND:
+        raise arguments.refusal("saved", "be the dataset of a branch, or a folder where it is", saved)
+    if tuple(map(str, saved.state.values)) != system.state_names:
+        raise ArgumentError(
+            f"saved is a branch of a system with the states {', '.join(map(str, saved.state.values))}; got a "
+            f"system with {', '.join(system.state_names)}."
+        )
+    name = str(saved.attrs["parameter"])
+    known = json.loads(saved.attrs["model_parameters"])
+    values = np.asarray(saved[name], dtype=float)
+
+    def orbit(i: int) -> PeriodicOrbit:
+        return _orbit(system, {**known, name: float(values[i])}, saved.isel(point=i), "")
+
+    return Branch(
+        system=system,
+        name=name,
+        parameter=values,
+        x0=saved.x0.values,
+        mode=saved["mode"].values.astype(str),
+        period=saved.period.values,
+        multipliers=saved.multipliers.values,
+        stable=saved.stable.values,
+        bifurcations=tuple(
+            _bifurcation(system, known, name, saved.isel(bifurcation=i))
+            for i in range(saved.sizes["bifurcation"])
+        ),
+        status=Status(StatusCode[saved.attrs["status"]], saved.attrs["message"]),
+        orbit=orbit,
+    )
+
+
+def _bifurcation(
+    system: HybridSystem, known: Mapping[str, float], name: str, row: xarray.Dataset
+) -> Bifurcation:
+    value = float(row["value"])
+    stable = [next(key for key, number in SIDES.items() if number == int(side)) for side in row.stable_beside]
+    return Bifurcation(
+        kind=str(row["kind"].values),
+        parameter=name,
+        value=value,
+        orbit=_orbit(system, {**known, name: value}, row, "_there"),
+        message=str(row["message"].values),
+        stable=(stable[0], stable[1]),
+    )
+
+
+def _orbit(
+    system: HybridSystem, parameters: dict[str, float], row: xarray.Dataset, suffix: str
+) -> PeriodicOrbit:
+    """One orbit: its numbers are known, and a run shows its way and its fundamental matrix."""
+    x0, mode = row[f"x0{suffix}"].values, str(row[f"mode{suffix}"].values)
+    t0, period = float(row[f"t0{suffix}"]), float(row[f"period{suffix}"])
+    multipliers = row[f"multipliers{suffix}"].values
+    arc = simulate(
+        system,
+        x0,
+        (t0, t0 + period),
+        mode=mode,
+        parameters=parameters,
+        solver=Taylor(rtol=1e-12, atol=1e-14),
+        tangent=True,
+    )
+    assert arc.fundamental is not None
+    with np.errstate(divide="ignore"):
+        moduli = np.log(np.abs(multipliers))
+    return PeriodicOrbit(
+        system=system,
+        parameters=parameters,
+        x0=x0,
+        mode=mode,
+        t0=t0,
+        period=period,
+        multipliers=multipliers.real if np.all(multipliers.imag == 0.0) else multipliers,
+        log_moduli=moduli,
+        fundamental=arc.fundamental,
+        residual=float(np.linalg.norm(arc.x[-1] - x0)),
+        iterations=0,
+        signature=(mode, *(str(jump.target) for jump in arc.jumps)),
+        transitions=tuple(map(str, arc.jumps.transition)),
+        status=SUCCESS,
+    )

@@ -1,0 +1,189 @@
+"""Where the sequence of transitions changes, against closed forms; and the orbit beyond."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import models
+from hybrid import (
+    Guard,
+    HybridSystem,
+    Mode,
+    Reset,
+    Transition,
+    continue_orbit,
+    filippov,
+    periodic_orbit,
+    simulate,
+    switch_branch,
+)
+
+
+def settled(system, x0, periods, mode=None, **parameters):
+    """The orbit that a forced system settles to."""
+    period = system.forcing_period(parameters)
+    arc = simulate(system, x0, (0.0, periods * period), mode=mode, parameters=parameters)
+    return periodic_orbit(system, arc.x[-1], mode=str(arc.mode[-1]), parameters=parameters)
+
+
+def change(orbit, name, span):
+    """The only bifurcation of a branch, which goes on beyond it to both ends of the span."""
+    branch = continue_orbit(orbit, name, span)
+    assert branch.status.ok
+    (found,) = branch.bifurcations
+    assert np.sort(branch.parameter[[0, -1]]) == pytest.approx(span, abs=1e-10)
+    ends = [branch.orbit(i).transitions for i in (0, -1)]
+    assert ends[0] != ends[1]
+    for i in range(0, len(branch), 5):
+        orbit = branch.orbit(i)
+        arc = orbit.arc()
+        assert sorted(arc.jumps.transition) == sorted(orbit.transitions)
+        np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-9)
+    return found, ends
+
+
+def pushed(below):
+    """A state that is pushed down above zero, beside another one."""
+    return filippov(
+        state=("z", "y"),
+        parameters={"A": 1.0},
+        below=lambda t, x, p: (below(t, x, p), np.sin(t) - x.y),
+        above=lambda t, x, p: (-3.0, np.sin(t) - x.y),
+        switching=lambda t, x, p: x.z,
+        period=2 * np.pi,
+    )
+
+
+def test_grazing_sliding():
+    """``z' = -(z + 1) + A cos t`` swings by ``A / sqrt 2`` about -1."""
+    system = pushed(lambda t, x, p: -(x.z + 1.0) + p.A * np.cos(t))
+    orbit = settled(system, (-1.0, 0.0), 10, mode="below")
+    found, ends = change(orbit, "A", (0.5, 2.0))
+    assert found.kind == "grazing-sliding"
+    assert found.value == pytest.approx(np.sqrt(2.0), abs=1e-10)
+    assert ends == [(), ("below->sliding", "sliding->below")]
+    assert "goes on" in found.message
+
+
+def test_adding_sliding():
+    """At rest on the surface while the field below, ``1 + A cos t``, pushes up."""
+    system = pushed(lambda t, x, p: 1.0 + p.A * np.cos(t))
+    orbit = settled(system, (0.0, 0.0), 10, mode="sliding", A=0.5)
+    found, ends = change(orbit, "A", (0.2, 1.5))
+    assert found.kind == "adding-sliding"
+    assert found.value == pytest.approx(1.0, abs=1e-10)
+    assert set(ends[1]) == {"sliding->below", "below->sliding"}
+
+
+def test_switching_sliding():
+    """It comes back to the surface at ``t``, when the field above, ``cos t - p``, begins to push down."""
+    system = filippov(
+        state=("z",),
+        parameters={"p": 0.9, "c": 0.3},
+        below=lambda t, x, p: (p.c + np.sin(t),),
+        above=lambda t, x, p: (np.cos(t) - p.p,),
+        switching=lambda t, x, p: x.z,
+        period=2 * np.pi,
+    )
+    left = np.pi + np.arcsin(0.3)
+    back = brentq(lambda t: 0.3 * (t - left) - np.cos(t) + np.cos(left), 2 * np.pi - 0.2, 3 * np.pi)
+    orbit = settled(system, (-0.5,), 3, mode="below")
+    found, ends = change(orbit, "p", (np.cos(back) - 0.1, 0.95))
+    assert found.kind == "switching-sliding"
+    assert found.value == pytest.approx(np.cos(back), abs=1e-10)
+    assert len(ends[0]) == 3
+    assert len(ends[1]) == 2
+
+
+def test_crossing_sliding():
+    """Den Hartog: the mass stops where its acceleration after the turn, ``X w^2 - f``, vanishes."""
+    orbit = settled(models.dry_friction_oscillator(), (1.0, 0.0), 200, mode="above")
+    found, _ = change(orbit, "w", (0.5, 0.9))
+    assert found.kind == "crossing-sliding"
+
+    def excess(w):
+        forced, friction = 1 / (1 - w**2), 0.5 * np.tan(np.pi / (2 * w)) / w
+        return np.sqrt(forced**2 - friction**2) * w**2 - 0.5
+
+    assert found.value == pytest.approx(brentq(excess, 0.57, 0.6, xtol=1e-14), abs=1e-10)
+
+
+def test_the_border_of_the_converter():
+    """Below ``E = V_ref + V_L / a`` the switch stays closed."""
+    converter = models.buck_converter()
+    arc = simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters={"E": 14.0})
+    orbit = periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, parameters={"E": 14.0})
+    found, ends = change(orbit, "E", (11.0, 15.0))
+    assert found.kind == "border"
+    assert found.value == pytest.approx(11.3 + 3.8 / 8.4, abs=1e-10)
+    assert ends[0] == ("saturate",)
+
+
+def test_a_corner():
+    """``u`` rises towards 2 and is halved once per unit of time; its cap is reached just then."""
+    system = HybridSystem(
+        state=("s", "u"),
+        parameters={"cap": 1.9},
+        modes=[Mode("on", lambda t, x, p: (1.0, 2.0 - x.u))],
+        transitions=[
+            Transition(
+                "on",
+                "on",
+                Guard(lambda t, x, p: x.s - 1.0, +1),
+                Reset(lambda t, x, p: (0.0, 0.5 * x.u)),
+                name="tick",
+            ),
+            Transition(
+                "on",
+                "on",
+                Guard(lambda t, x, p: x.u - p.cap, +1),
+                Reset(lambda t, x, p: (x.s, x.u - 0.1)),
+                name="cap",
+            ),
+        ],
+    )
+    orbit = periodic_orbit(system, (0.5, 1.2), period=1.0)
+    branch = continue_orbit(orbit, "cap", (1.4, 2.0))
+    corner = branch.bifurcations[0]
+    assert corner.kind == "corner"
+    assert corner.value == pytest.approx((2 - 2 / np.e) / (1 - 0.5 / np.e), abs=1e-10)
+
+
+def test_an_isola_closes():
+    """``u -> u + 0.3 (1 - a^2 - u^2)``: its orbits are a circle."""
+    system = HybridSystem(
+        state=("s", "u"),
+        parameters={"a": 0.0},
+        modes=[Mode("on", lambda t, x, p: (1.0, 0.0))],
+        transitions=[
+            Transition(
+                "on",
+                "on",
+                Guard(lambda t, x, p: x.s - 1.0, +1),
+                Reset(lambda t, x, p: (0.0, x.u + 0.3 * (1.0 - p.a**2 - x.u**2))),
+            )
+        ],
+    )
+    branch = continue_orbit(periodic_orbit(system, (0.4, 0.9), period=1.0), "a", (-2.0, 2.0))
+    assert "closes" in branch.status.message
+    assert sorted(each.value for each in branch.bifurcations) == pytest.approx([-1.0, 1.0], abs=1e-10)
+    np.testing.assert_allclose(branch.parameter**2 + branch.x0[:, 1] ** 2, 1.0, rtol=1e-10)
+
+
+class TestBeyond:
+    def test_switch_branch_goes_to_the_new_transitions(self):
+        orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+        branch = continue_orbit(orbit, "w", (0.9, 2.0))
+        grazing = max(branch.bifurcations, key=lambda each: (each.kind == "grazing", each.value))
+        free = switch_branch(grazing)
+        assert free.transitions == ()
+        assert free.parameters["w"] > np.sqrt(1.99)
+
+    def test_the_same_branch_from_beyond(self):
+        """From the orbit without impacts down to the grazing, and up again with impacts."""
+        orbit = periodic_orbit(models.impact_oscillator(), (0.3, 0.0), parameters={"w": 1.9})
+        assert orbit.transitions == ()
+        branch = continue_orbit(orbit, "w", (1.2, 2.0))
+        found = [(each.kind, each.value) for each in branch.bifurcations]
+        assert ("grazing", pytest.approx(np.sqrt(1.99), abs=1e-10)) in found
+        assert ("fold", pytest.approx(1.750142624, abs=1e-8)) in found
