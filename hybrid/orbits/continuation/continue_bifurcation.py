@@ -252,11 +252,12 @@ def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, 
 
 def _curve_of(bifurcation: Bifurcation, place: Place) -> Curve:
     if bifurcation.kind in SMOOTH:
-        return Curve(bifurcation.kind, SMOOTH[bifurcation.kind], 0.0)
+        return Curve(bifurcation.kind, SMOOTH[bifurcation.kind])
     assert bifurcation._change is not None
     measure = measure_of(bifurcation._change.key)
     side = float(np.sign(measure(bifurcation._change.before.orbit)))
-    return Curve(bifurcation.kind, lambda each: measure(each.orbit), side)
+    bounded = bifurcation._change.key.kind != "speed"
+    return Curve(bifurcation.kind, lambda each: measure(each.orbit), side, bounded)
 
 
 def _both_ways(

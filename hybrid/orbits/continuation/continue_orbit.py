@@ -10,7 +10,7 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
-from hybrid.orbits.continuation.result import Points, orbit_of
+from hybrid.orbits.continuation.result import Points, mode_at, orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
@@ -145,7 +145,7 @@ def branch_of(items: list[Item], points: Points) -> Branch:
         name=family.names[0],
         parameter=np.array([place.value for place in places]),
         x0=np.array([moment(each, *at)[1] for each, at in zip(passes, where, strict=True)]),
-        mode=np.array([each.family.route[i].mode for each, (i, _) in zip(passes, where, strict=True)]),
+        mode=np.array([mode_at(each, *at) for each, at in zip(passes, where, strict=True)]),
         period=np.array([each.loop.period for each in passes]),
         multipliers=np.array([each.multipliers for each in passes]),
         stable=np.array([stable[id(place)] for place in places]),

@@ -76,11 +76,13 @@ class Curve:
     """The equation of a curve: the test function that is zero on it.
 
     ``side`` is the sign of the function where the orbits are real; 0 if they are on both sides.
+    ``has_multipliers`` is False where a guard has no speed, so that the tangent map has no bound.
     """
 
     kind: str
     test: Test
-    side: float
+    side: float = 0.0
+    has_multipliers: bool = True
 
     def begin(self, place: Place) -> Spot | None:
         """The spot nearest to a place, with the way to larger values of the first parameter."""
@@ -238,6 +240,8 @@ def angle(orbit: Pass) -> float:
 
 def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
     """The points of codimension two between two spots."""
+    if not curve.has_multipliers:
+        return
     for kind, function, message in _tests(curve.kind, spot):
         if not function(spot) * function(after) < 0.0:
             continue

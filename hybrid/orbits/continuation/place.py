@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
@@ -12,17 +13,20 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.family import ROUNDING, Family, Pass
-from hybrid.orbits.continuation.route import Loop, divided, route_of
+from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, route_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
-# A field is along a surface if its rate through it is this share of its terms.
+# A field is along a surface if its rate through it is this share of its terms. Nearer to the end of a period
+# than this share of it is at the end.
 ALONG = 1e-10
 # A run jumps where the equations say so if the times agree to this share of the period.
 SAME_TIME = 1e-6
+# Stretches are divided anew if errors grow by this much more along one of them than they may.
+TOO_LARGE = 10.0
 # The unknowns are polynomials of a measure through places at these shares of the bracket around its zero.
 SHARES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 # Two of these polynomials agree to this, in units of the unknowns.
@@ -237,20 +241,57 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
     first = family.around(Loop(x, times, values))
     if first is None:
         return None
-    n = x.shape[1]
-    arcs = [arc if flow.arc is None else flow.arc for flow in first.flows]
-    growths = [
-        float(np.linalg.norm(flow.slopes[:, :n] / first.scale[:, None] * first.scale, 2))
-        for flow in first.flows
-    ]
-    route, x, times = divided(route, x, times, arcs, growths)
-    return attrs.evolve(family, route=route, least=first.scale), Loop(x, times, values)
+    family = attrs.evolve(family, least=first.scale)
+    return _divided(attrs.evolve(first, family=family))
+
+
+def _divided(orbit: Pass) -> tuple[Family, Loop]:
+    """The same orbit with stretches along which no error grows too much."""
+    loop, n = orbit.loop, orbit.loop.x.shape[1]
+    stretches: list[Stretch] = []
+    states, times = [], []
+    for i, (stretch, flow) in enumerate(zip(orbit.family.route, orbit.flows, strict=True)):
+        parts = 1 if stretch.within else max(1, math.ceil(math.log(growth(orbit, i), LARGEST_GROWTH)))
+        shares = np.arange(parts) / parts
+        states.append(np.vstack([loop.x[i], flow.at(shares[1:])]) if parts > 1 else loop.x[i : i + 1])
+        times.append(loop.times[i] + shares * (loop.times[i + 1] - loop.times[i]))
+        stretches += [attrs.evolve(stretch, fired=())] * (parts - 1) + [stretch]
+    family = attrs.evolve(orbit.family, route=tuple(stretches))
+    return family, Loop(
+        np.concatenate(states).reshape(-1, n), np.append(np.concatenate(times), loop.times[-1]), loop.values
+    )
+
+
+def growth(orbit: Pass, i: int) -> float:
+    """By how much an error at the start of a stretch grows up to its end, at least 1."""
+    n, scale = orbit.loop.x.shape[1], orbit.scale
+    return max(1.0, float(np.linalg.norm(orbit.flows[i].slopes[:, :n] / scale[:, None] * scale, 2)))
+
+
+def refined(place: Place) -> Place:
+    """The same orbit, with more stretches where errors have come to grow too much along one of them."""
+    orbit, route = place.orbit, place.family.route
+    if all(
+        growth(orbit, i) < TOO_LARGE * LARGEST_GROWTH for i, stretch in enumerate(route) if not stretch.within
+    ):
+        return place
+    family, loop = _divided(orbit)
+    divided = family.around(loop)
+    if divided is None:
+        return place
+    # The tangent at the points that both have in common says where the way goes on.
+    n, k = loop.x.shape[1], len(place.sizes)
+    onward = np.zeros((k, len(loop.flat)))
+    onward[:, :n], onward[:, -k:] = place.tangents[:, :n], place.tangents[:, -k:]
+    return place_of(divided, onward, place.sizes) or place
 
 
 def share_of(orbit: Pass, t: float) -> tuple[int, float]:
     """The stretch at a time, whole periods aside, and the share of the stretch before it."""
     times = orbit.loop.times
-    t = times[0] + (t - times[0]) % orbit.loop.period
+    after = (t - times[0]) % orbit.loop.period
+    # The end of the last stretch is the begin of the first one.
+    t = times[0] + (after if after < (1.0 - ALONG) * orbit.loop.period else 0.0)
     i = min(max(int(np.searchsorted(times, t, side="right")) - 1, 0), len(times) - 2)
     length = times[i + 1] - times[i]
     return i, float((t - times[i]) / length) if length > 0.0 else 0.0
@@ -259,16 +300,19 @@ def share_of(orbit: Pass, t: float) -> tuple[int, float]:
 def moment(orbit: Pass, i: int, share: float) -> tuple[float, np.ndarray]:
     """Time and state ``(n,)`` at a share of a stretch."""
     begin, end = orbit.loop.times[i : i + 2]
+    if share == 0.0:
+        return float(begin), orbit.loop.x[i]
     return float(begin + share * (end - begin)), orbit.flows[i].at(np.array([share]))[0]
 
 
 def slides(orbit: Pass, i: int) -> bool:
-    """Whether the motion in a stretch stays on the guard through which it began."""
+    """Whether the motion in a stretch stays on the guard through which it came into its mode."""
     family, count = orbit.family, len(orbit.flows)
-    if not family.route[(i - 1) % count].fired:
-        return slides(orbit, (i - 1) % count) if count > 1 else False
+    before = [family.route[(i - k) % count].fired for k in range(1, count + 1)]
+    name = next((fired[0] for fired in before if fired), None)
+    if name is None:
+        return False
     t, x = moment(orbit, i, 0.5)
-    name = family.route[(i - 1) % count].fired[0]
     *slope, own = family.gradient(name, t, x, orbit.loop.values)
     terms = np.append(np.array(slope) * family.rate(family.route[i].mode, t, x, orbit.loop.values), own)
     return bool(abs(terms.sum()) <= ALONG * np.abs(terms).sum())
@@ -291,8 +335,10 @@ def _goes(orbit: Pass, first: int, last: int) -> bool:
     """Whether a run from the middle of one stretch to that of another takes the transitions in between."""
     family, loop, route = orbit.family, orbit.loop, orbit.family.route
     count = len(route)
-    begin, x = moment(orbit, first, 0.5)
-    end, _ = moment(orbit, last % count, 0.5)
+    # Where all stretches chatter or stay on a surface, from the begin of one.
+    share = 0.0 if route[first].within else 0.5
+    begin, x = moment(orbit, first, share)
+    end, _ = moment(orbit, last % count, share)
     end += last // count * loop.period
     arc = simulate(
         family.system,

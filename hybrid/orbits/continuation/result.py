@@ -39,7 +39,7 @@ def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
     """The orbit as a result, from the point that stands for it."""
     family, loop = orbit.family, orbit.loop
     i, share = points.at(orbit)
-    t, x = moment(orbit, i, share)
+    (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
     multipliers = orbit.multipliers
     with np.errstate(divide="ignore"):
         moduli = np.log(np.abs(multipliers))
@@ -51,26 +51,41 @@ def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
         system=family.system,
         parameters=family.all_parameters(loop.values),
         x0=x,
-        mode=family.route[i].mode,
+        mode=mode,
         t0=points.t0 if family.forced else t,
         period=loop.period,
         multipliers=multipliers,
         log_moduli=moduli,
-        fundamental=fundamental_at(orbit, i, t, x),
+        fundamental=fundamental_at(orbit, i, share),
         residual=float(np.abs(residuals).max()),
         iterations=0,
-        signature=(family.route[i].mode, *(m for m, s in zip(targets, stretches, strict=True) if s.fired)),
+        signature=(
+            mode_at(orbit, i, share),
+            *(m for m, s in zip(targets, stretches, strict=True) if s.fired),
+        ),
         transitions=tuple(fired),
         status=SUCCESS,
     )
 
 
-def fundamental_at(orbit: Pass, i: int, t: float, x: np.ndarray) -> np.ndarray:
+def mode_at(orbit: Pass, i: int, share: float) -> str:
+    """The mode at a share of the time of a stretch; within a chatter, the one that the run is in."""
+    stretch, arc = orbit.family.route[i], orbit.flows[i].arc
+    if not stretch.within or arc is None:
+        return stretch.mode
+    t = arc.t[0] + share * (arc.t[-1] - arc.t[0])
+    return str(arc.mode[max(int(np.searchsorted(arc.t, t, side="right")) - 1, 0)])
+
+
+def fundamental_at(orbit: Pass, i: int, share: float) -> np.ndarray:
     """The saltated fundamental matrix ``(n, n)`` over the period from a point within a stretch."""
-    family, loop, n = orbit.family, orbit.loop, len(x)
-    stretch, (begin, end) = family.route[i], loop.times[i : i + 2]
-    first = family.flow(stretch, loop.x[i], float(begin), t, loop.values).slopes[:, :n]
-    last = family.flow(stretch, x, t, float(end), loop.values).slopes[:, :n]
+    family, loop = orbit.family, orbit.loop
+    (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
+    n, stretch, (begin, end) = len(x), family.route[i], loop.times[i : i + 2]
+    before = attrs.evolve(stretch, end_mode=mode)
+    after = attrs.evolve(stretch, mode=mode, within=stretch.within if mode == stretch.mode else ())
+    first = family.flow(before, loop.x[i], float(begin), t, loop.values).slopes[:, :n]
+    last = family.flow(after, x, t, float(end), loop.values).slopes[:, :n]
     matrix = orbit.saltations[i] @ last
     for each in [*orbit.maps[i + 1 :], *orbit.maps[:i]]:
         matrix = each @ matrix

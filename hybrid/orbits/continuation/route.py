@@ -111,21 +111,23 @@ def instants(jumps: Sequence[Jump]) -> list[list[Jump]]:
 def _without_chatter(groups: list[list[Jump]]) -> tuple[list[list[Jump]], list[tuple[str, ...]]]:
     """The groups but those that accumulate, and the names of what accumulates before each of them.
 
-    The order is turned so that the first group is not one that accumulates.
+    The order is turned so that what accumulates comes last.
     """
     last = max(i for i, group in enumerate(groups) if group[0].kind == "limit")
     turned = [*groups[last + 1 :], *groups[: last + 1]]
     kept: list[list[Jump]] = []
     within: list[tuple[str, ...]] = []
     passed: tuple[str, ...] = ()
-    names = _accumulating(turned)
+    names, begun = _accumulating(turned), False
     for group in turned:
-        if group[0].kind == "limit" or (group[0].transition in names and kept):
+        accumulates = group[0].transition in names
+        # The first of them is an ordinary jump: what follows it does not begin on a guard without speed.
+        if group[0].kind == "limit" or (accumulates and begun):
             passed = names
         else:
             kept.append(group)
             within.append(passed)
-            passed = ()
+            passed, begun = (), accumulates
     # What accumulates after the last group comes before the first one of the next period.
     within[0] = passed
     return kept, within
@@ -141,24 +143,3 @@ def _accumulating(groups: list[list[Jump]]) -> tuple[str, ...]:
                 return tuple(names)
             names.append(jump.transition)
     return tuple(dict.fromkeys([limit.transition, *names]))
-
-
-def divided(
-    route: Route, x: np.ndarray, times: np.ndarray, arcs: Sequence[HybridArc], growths: Sequence[float]
-) -> tuple[Route, np.ndarray, np.ndarray]:
-    """The same orbit with more stretches, where errors grow too much along one of them."""
-    stretches: list[Stretch] = []
-    states: list[np.ndarray] = []
-    instants: list[float] = []
-    for i, stretch in enumerate(route):
-        parts = max(1, math.ceil(math.log(max(growths[i], 1.0)) / math.log(LARGEST_GROWTH)))
-        if stretch.within:
-            parts = 1
-        begin, end = times[i], times[i + 1]
-        for k in range(parts):
-            t = float(begin + k * (end - begin) / parts)
-            instants.append(t)
-            states.append(x[i] if k == 0 else arcs[i](t)[: x.shape[1]])
-            last = k == parts - 1
-            stretches.append(stretch if last else attrs.evolve(stretch, fired=()))
-    return tuple(stretches), np.array(states), np.array([*instants, times[-1]])

@@ -15,6 +15,7 @@ from hybrid.orbits.continuation.place import (
     interpolated_zero,
     is_real,
     passes_by,
+    refined,
     zero_between,
 )
 from hybrid.orbits.continuation.smooth import TESTS, halves, told
@@ -95,7 +96,7 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             return
         if corrections <= FEW_CORRECTIONS:
             length = min(LONGEST_STEP, LONGER * length)
-        place = after
+        place = refined(after)
     yield "most"
 
 

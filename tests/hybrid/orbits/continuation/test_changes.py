@@ -187,3 +187,21 @@ class TestBeyond:
         found = [(each.kind, each.value) for each in branch.bifurcations]
         assert ("grazing", pytest.approx(np.sqrt(1.99), abs=1e-10)) in found
         assert ("fold", pytest.approx(1.750142624, abs=1e-8)) in found
+
+
+def test_the_founding_system_touches_its_contact():
+    """Without contact it is linear: the amplitude of ``x1 - x2`` about ``-D`` is D at the grazing."""
+    system = models.vibroimpact()
+    p = system.parameters
+    chi, w = p["m2"] / p["m1"], p["omega"]
+    c, k = 2 * p["xi2"] * p["omega2"], p["omega2"] ** 2
+    stiffness = np.array([[p["omega1"] ** 2 + chi * k, -chi * k], [-k, k]])
+    damping = np.array([[2 * p["xi1"] * p["omega1"] + chi * c, -chi * c], [-c, c]])
+    response = np.linalg.solve(stiffness - w**2 * np.eye(2) + 1j * w * damping, [1 / p["m1"], 0.0])
+    exact = p["D"] / abs(response[0] - response[1])
+    orbit = settled(system, (0.0, 0.05, 0.0, 0.0), 300, P=100.0)
+    branch = continue_orbit(orbit, "P", (90.0, 250.0))
+    assert branch.status.ok
+    grazing = next(each for each in branch.bifurcations if each.kind == "grazing")
+    assert grazing.value == pytest.approx(exact, rel=1e-10)
+    assert {orbit.transitions for orbit in branch.orbits} == {(), ("impact", "release")}

@@ -92,12 +92,13 @@ def branch():
     return continue_orbit(orbit, "w", (0.9, 2.0))
 
 
-class TestGrazings:
-    @pytest.fixture
-    def curve(self, branch):
-        grazing = max((each for each in branch.bifurcations if each.kind == "grazing"), key=lambda b: b.value)
-        return continue_bifurcation(grazing, {"w": (1.2, 2.0), "A": (0.5, 2.0)})
+@pytest.fixture(scope="module")
+def curve(branch):
+    grazing = max((each for each in branch.bifurcations if each.kind == "grazing"), key=lambda b: b.value)
+    return continue_bifurcation(grazing, {"w": (1.2, 2.0), "A": (0.5, 2.0)})
 
+
+class TestGrazings:
     def test_the_free_motion_is_as_wide_as_the_gap(self, curve):
         """``(k - w^2)^2 + (c w)^2 = (A / d)^2``."""
         assert curve.status.ok

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+import hybrid
 import hybrid.plot
 import models
 from hybrid import (
@@ -297,3 +298,70 @@ class TestSwitching:
         fold = of_kind(impacts, "fold")[0]
         with pytest.raises(ArgumentError, match="bifurcation is a fold, where no other branch"):
             switch_branch(fold)
+
+
+class TestMultipleShooting:
+    def test_errors_may_grow_beyond_all_digits(self):
+        """``x' = k (x - cos t)`` has one orbit, whose multiplier is ``exp(2 pi k)``."""
+        system = HybridSystem(
+            state=("x",),
+            parameters={"k": 1.0},
+            modes=[Mode("m", lambda t, x, p: (p.k * (x.x - np.cos(t)),))],
+            period=2 * np.pi,
+        )
+        branch = continue_orbit(periodic_orbit(system, (0.5,)), "k", (0.5, 12.0))
+        assert branch.status.ok
+        k = branch.parameter
+        np.testing.assert_allclose(branch.x0[:, 0], k**2 / (1 + k**2), rtol=1e-11)
+        np.testing.assert_allclose(branch.multipliers[:, 0], np.exp(2 * np.pi * k), rtol=1e-10)
+        assert branch.multipliers[-1, 0] > 1e32
+
+    def test_an_orbit_whose_bounces_accumulate(self):
+        """The number of bounces before the rest is no property of the orbit; the rest forgets all."""
+        table = models.bouncing_table()
+        arc = simulate(table, (0.02, 0.0), (0.0, 100 * table.forcing_period()), mode="flight")
+        orbit = periodic_orbit(table, arc.x[-1], mode=str(arc.mode[-1]))
+        branch = continue_orbit(orbit, "A", (0.008, 0.0115))
+        assert branch.status.ok
+        np.testing.assert_allclose(np.abs(branch.multipliers), 0.0, atol=1e-12)
+        for i in (0, -1):
+            arc = branch.orbit(i).arc()
+            assert "limit" in arc.jumps.kind
+            np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-12)
+
+
+class TestScaling:
+    def test_a_scaled_parameter_scales_the_branch(self, impacts):
+        """The gap and the amplitude in other units: the same frequencies, states ten times as large."""
+        system = models.impact_oscillator()
+        parameters = {"d": 10.0, "A": 10.0}
+        orbit = periodic_orbit(system, (9.0, 10.0), parameters=parameters)
+        branch = continue_orbit(orbit, "w", (0.68, 2.0))
+        assert kinds(branch) == kinds(impacts)
+        values = [[each.value for each in one.bifurcations] for one in (branch, impacts)]
+        assert values[0] == pytest.approx(values[1], abs=1e-9)
+
+    def test_multipliers_of_neighbours_join(self, impacts):
+        """But where a guard is touched, the product of the multipliers changes little from orbit to orbit."""
+        orbits = one_impact(impacts)
+        products = np.array([np.prod(orbit.multipliers).real for orbit in orbits])
+        # Damping and restitution: ``r^2 exp(-c T)``, whatever the speed.
+        exact = [0.8**2 * np.exp(-0.1 * orbit.period) for orbit in orbits]
+        np.testing.assert_allclose(products, exact, rtol=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore")  # of zarr, about texts
+def test_a_branch_is_saved_and_opened_again(impacts, tmp_path):
+    pytest.importorskip("zarr")
+    impacts.to_xarray().to_zarr(tmp_path / "branch")
+    again = hybrid.open_branch(impacts.system, tmp_path / "branch")
+    np.testing.assert_array_equal(again.parameter, impacts.parameter)
+    np.testing.assert_array_equal(again.multipliers, impacts.multipliers)
+    assert [str(each) for each in again.bifurcations] == [str(each) for each in impacts.bifurcations]
+    i = len(again) // 2
+    assert again.orbit(i).transitions == impacts.orbit(i).transitions
+    np.testing.assert_allclose(again.orbit(i).fundamental, impacts.orbit(i).fundamental, rtol=1e-6)
+    further = continue_orbit(again.orbit(i), "w", (1.5, 1.9))
+    assert further.status.ok
+    with pytest.raises(ArgumentError, match="saved must be the dataset of a branch"):
+        hybrid.open_branch(impacts.system, impacts.to_xarray().drop_attrs())
