@@ -43,6 +43,10 @@ class Bifurcation:
         What happens, in words.
     stable
         Whether the orbits before and after it along the branch are stable; None where the branch ends.
+    coefficient
+        Of a grazing with a jump of finite size, the vector ``C (n,)`` of the zero-time discontinuity map: an
+        orbit that would go beyond the guard by ``H`` is moved by ``C sqrt(H)`` where it would be farthest
+        (Nordmark 1991). None for other kinds.
     """
 
     kind: str
@@ -51,6 +55,7 @@ class Bifurcation:
     orbit: PeriodicOrbit
     message: str
     stable: tuple[bool | None, bool | None]
+    coefficient: np.ndarray | None = None
     _place: Place | None = attrs.field(default=None, repr=False)
     _change: Change | None = attrs.field(default=None, repr=False)
 

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.family import Family, Pass
+from hybrid.orbits.continuation.grazing import square_root_coefficient, what_follows
 from hybrid.orbits.continuation.measures import Key, changed, measure_of
 from hybrid.orbits.continuation.place import (
     Place,
@@ -101,6 +102,13 @@ class Change:
         return "grazing" if tangent else "corner"
 
     @property
+    def coefficient(self) -> np.ndarray | None:
+        """The square-root coefficient ``(n,)`` of a grazing; None where there is none."""
+        if self.kind != "grazing":
+            return None
+        return square_root_coefficient(self.place.orbit, self.key)
+
+    @property
     def told(self) -> str:
         """What happens, in words."""
         key, names = self.key, self.place.family.route[self.key.stretch].fired
@@ -119,7 +127,12 @@ class Change:
         before, after = (
             "+".join(_listed(each) for each in jumps) or "no jump" for jumps in self.onward.jumps
         )
-        return f"{told}; the orbit {goes} with {after} in place of {before}"
+        beyond = f"{told}; the orbit {goes} with {after} in place of {before}"
+        stays = self.onward.same_way and bool(np.all(np.abs(self.onward.place.orbit.free_multipliers) < 1.0))
+        if key.kind != "top" or stays or self.coefficient is None:
+            return beyond
+        follows = what_follows(self.place.orbit.free_multipliers)
+        return f"{beyond}; Nordmark's map leaves {follows}" if follows else beyond
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -201,6 +201,7 @@ def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points
         orbit,
         event.message,
         stable,
+        None if event.change is None else event.change.coefficient,
         event.place,
         event.change,
     )

@@ -127,17 +127,22 @@ def heights_of(
 
 def top(key: Key, orbit: Pass) -> float:
     """The extremum of a guard near a share of a stretch; nan if there is none."""
+    return extremum(key, orbit)[1]
+
+
+def extremum(key: Key, orbit: Pass) -> tuple[float, float]:
+    """Where in its stretch a guard has an extremum near a share, and its height; nan if there is none."""
     from scipy.optimize import minimize_scalar
 
     transition = _transition(orbit, key)
     near = np.linspace(max(0.0, key.share - SAME), min(1.0, key.share + SAME), 33)
     heights = heights_of(orbit, key.stretch, transition, near)
     if heights is None:
-        return np.nan
+        return np.nan, np.nan
     steps = np.diff(heights)
     turns = np.flatnonzero(steps[:-1] * steps[1:] < 0.0) + 1
     if len(turns) == 0:
-        return np.nan
+        return np.nan, np.nan
     j = int(turns[np.argmin(np.abs(near[turns] - key.share))])
     sign = -1.0 if heights[j] > heights[j - 1] else 1.0
 
@@ -147,7 +152,7 @@ def top(key: Key, orbit: Pass) -> float:
 
     # Brent's method finds the place to the square root of rounding, and the height to rounding.
     best = minimize_scalar(height, bracket=(near[j - 1], near[j], near[j + 1]), tol=1e-9)
-    return sign * float(best.fun)
+    return float(best.x), sign * float(best.fun)
 
 
 def measure_of(key: Key) -> Callable[[Pass], float]:

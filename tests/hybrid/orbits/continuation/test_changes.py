@@ -205,3 +205,45 @@ def test_the_founding_system_touches_its_contact():
     grazing = next(each for each in branch.bifurcations if each.kind == "grazing")
     assert grazing.value == pytest.approx(exact, rel=1e-10)
     assert {orbit.transitions for orbit in branch.orbits} == {(), ("impact", "release")}
+
+
+class TestDiscontinuityMap:
+    """``x -> x + C sqrt(H)`` at a grazing, against the flow."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def grazing(cls):
+        orbit = periodic_orbit(models.impact_oscillator(), (0.3, 0.0), parameters={"w": 1.9})
+        branch = continue_orbit(orbit, "w", (1.2, 2.0))
+        return next(each for each in branch.bifurcations if each.kind == "grazing")
+
+    def test_in_closed_form(self, grazing):
+        """The speed ``sqrt(2 a H)`` is turned and multiplied by ``r``; ``a`` is ``w^2 d``."""
+        C = grazing.coefficient
+        assert pytest.approx([0.0, -1.8 * np.sqrt(2 * 1.99)], abs=1e-6) == C
+
+    def test_against_the_flow(self, grazing):
+        """Half a period later, the orbit that jumps is ``Phi C sqrt(H)`` away from the one that does not."""
+        orbit, system = grazing.orbit, models.impact_oscillator()
+        w, half = grazing.value, np.pi / grazing.value
+        arc = orbit.arc()
+        t = arc.t[0] + orbit.period * np.linspace(0, 1, 4001)
+        top = t[np.argmax(arc(np.clip(t, arc.t[0], arc.t[-1]))[:, 0])]
+        beyond = []
+        for H in (1e-5, 1e-6):
+            start = simulate(
+                system, (1.0 + H, 0.0), (top, top + half), parameters={"w": w, "d": 9.0}, tangent=True
+            )
+            back = simulate_back(system, (1.0 + H, 0.0), top, half / 2, w)
+            real = simulate(system, back, (top - half / 2, top + half), parameters={"w": w})
+            assert len(real.jumps) == 1
+            expected = start.fundamental @ grazing.coefficient * np.sqrt(H)
+            beyond.append(np.abs(real.x[-1] - start.x[-1] - expected).max() / np.abs(expected).max())
+        assert beyond[0] < 0.02
+        assert beyond[1] < 0.4 * beyond[0]
+
+
+def simulate_back(system, x, t, length, w):
+    """The state of the free oscillator a while before."""
+    forward = simulate(system, (0.0, 0.0), (t - length, t), parameters={"w": w, "d": 9.0}, tangent=True)
+    return np.linalg.solve(forward.fundamental, np.asarray(x) - forward.x[-1])
