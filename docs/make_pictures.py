@@ -19,6 +19,7 @@ from hybrid import DOP853, HybridSystem, continue_orbit, periodic_orbit, simulat
 from hybrid.plot import COLOURS, plot_arc, plot_branch, plot_graph, plot_phase
 from lyapunov import chart
 from lyapunov.plot import plot_chart, style
+from lyapunov.study.diagram import diagram, draw
 
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
@@ -112,10 +113,11 @@ def chart_picture(system: HybridSystem, folder: Path) -> None:
 
 
 def branch_picture(folder: Path) -> None:
-    """The branch of one impact per period, with its fold and its grazings."""
-    branch = continue_orbit(periodic_orbit(models.impact_oscillator(), (0.9, 1.0)), "w", (0.6, 2.0))
+    """The branch of one impact per period, with its folds and its grazings."""
+    branch = continue_orbit(periodic_orbit(models.impact_oscillator(), (0.9, 1.0)), "w", (0.68, 2.0))
     axes = plot_branch(branch, "x", figsize=(6.4, 3.2))
     save(axes.figure, folder / "branch.png")
+    save(draw(diagram(models.vibroimpact(), points=201, intervals=400)), folder / "regimes_diagram.png")
 
 
 def save(figure: Any, path: Path) -> None:

@@ -12,6 +12,7 @@ import models
 from hybrid import DOP853, HybridError, Taylor, Tsit5
 from lyapunov.study import figures, report
 from lyapunov.study.column import paper_columns_by_its_method
+from lyapunov.study.diagram import diagram, diagram_text, write_diagram
 from lyapunov.study.paper import PAPER, ROWS
 from lyapunov.study.runs import STARTS, Settings, study_regime
 from lyapunov.study.tangents import explanations, tolerance_study
@@ -24,13 +25,14 @@ the two-orbit formulas (7), (8) and (9) of the paper and Benettin's method (10) 
 M = {", ".join(map(str, ROWS))} periods, beside the figures of the paper;
 the renormalised two-orbit estimate and the tapered mean, which converge;
 the whole spectrum with its standard error and the sum rule; and the Floquet exponents of the orbit of one
-period. It then shows the error of tangent vectors outside the error control, and tests candidate
-explanations of the paper's figures, the paper's own method (ode23s straight through the impacts) among them.
+period. It then follows this orbit over the frequency to its bifurcations, shows the error of tangent
+vectors outside the error control, and tests candidate explanations of the paper's figures, the paper's
+own method (ode23s straight through the impacts) among them.
 
 Starts: {"; ".join(f"{start.label}, {start.text}" for start in STARTS)}.
 
 The folder receives exponents_*.csv, portrait_*.png and convergence_*.png for each frequency, and
-regimes.png, tolerances.csv, tolerances.png and explanations.csv. Exponents are in 1/s.
+regimes.png, diagram.png, tolerances.csv, tolerances.png and explanations.csv. Exponents are in 1/s.
 """
 
 
@@ -111,6 +113,10 @@ def _run(omegas: Sequence[float], settings: Settings, folder: Path) -> None:
         print(report.regime_text(regimes[-1]), end="\n\n", flush=True)
         report.write_histories(folder, regimes[-1])
     figures.write_figures(folder, regimes)
+
+    found_on = diagram(system, progress=settings.progress)
+    print(diagram_text(found_on), end="\n\n", flush=True)
+    write_diagram(folder, found_on)
 
     trap = tolerance_study(system, settings)
     print(report.tolerance_text(trap), end="\n\n", flush=True)

@@ -18,7 +18,7 @@ def short(tmp_path_factory):
 
 
 def test_it_writes_what_it_says(short):
-    expected = {"regimes.png", "tolerances.png", "tolerances.csv", "explanations.csv"}
+    expected = {"regimes.png", "diagram.png", "tolerances.png", "tolerances.csv", "explanations.csv"}
     for omega in ("7.40", "7.46", "7.92"):
         expected |= {f"exponents_{omega}.csv", f"portrait_{omega}.png", f"convergence_{omega}.png"}
     assert {path.name for path in short.iterdir()} == expected

@@ -184,7 +184,9 @@ def continue_bifurcation(
     >>> import models
     >>> from hybrid import continue_orbit, periodic_orbit
     >>> orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
-    >>> (fold,) = continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations
+    >>> fold = continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[0]
+    >>> fold.kind
+    'fold'
     >>> curve = continue_bifurcation(fold, {"w": (1.7, 1.8), "r": (0.75, 0.85)})
     >>> curve.status.ok
     True
