@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.family import Family, Pass
-from hybrid.orbits.continuation.grazing import square_root_coefficient, what_follows
+from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.measures import Key, changed, measure_of
 from hybrid.orbits.continuation.place import (
     Place,
@@ -87,6 +87,8 @@ class Change:
         if self.key.kind in AT_A_CORNER and stays and len(self.place.family.system.modes) > 1:
             return "border"
         tangent = self.key.kind in TANGENT
+        if tangent and kick(self.place.orbit, self.key) is not None:
+            return "grazing"
         passing, i = onward.passing, onward.stretch
         if passing is None or i is None:
             if tangent and slides(self.place.orbit, self.key.stretch):

@@ -28,24 +28,45 @@ def square_root_coefficient(orbit: Pass, key: Key) -> np.ndarray | None:
     Sound and Vibration 145 (1991) 279; M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth
     Dynamical Systems, Springer 2008, section 6.2.
     """
-    family, i = orbit.family, key.stretch
+    system, share = orbit.family.system, share_of_touch(orbit, key)
+    transition = system.transitions[system.transition_index(key.name)]
+    t, x = moment(orbit, key.stretch, share)
+    found = kick(orbit, key)
+    if transition.target != transition.source or found is None or _jumps(orbit, key, t, x):
+        return None
+    return -found * np.sqrt(2.0 / abs(_acceleration(orbit, key, share)))
+
+
+def share_of_touch(orbit: Pass, key: Key) -> float:
+    """Where in its stretch a guard is touched: at an extremum, or at the end."""
+    return extremum(key, orbit)[0] if key.kind == "top" else 1.0
+
+
+def kick(orbit: Pass, key: Key) -> np.ndarray | None:
+    """``D_x R f + D_t R - f (n,)`` at a touch, what a jump does to a slow passage; None without a reset."""
+    family, n = orbit.family, orbit.loop.x.shape[1]
     system = family.extended
     index = system.transition_index(key.name)
-    transition = system.transitions[index]
-    reset = reset_function(transition, system.state)
-    if transition.target != transition.source or reset is None:
+    reset = reset_function(system.transitions[index], system.state)
+    if reset is None:
         return None
-    share = extremum(key, orbit)[0] if key.kind == "top" else 1.0
-    t, x = moment(orbit, i, share)
-    n, state = len(x), np.append(x, orbit.loop.values)
-    compiled, fixed = family.compiled, system.parameter_values(family.fixed)
-    after = compiled.value(reset, index, t, state, fixed)[:n]
-    if np.any(np.abs(after - x) > CONTINUOUS * orbit.scale):
-        return None
-    rate = family.rate(transition.source, t, x, orbit.loop.values)
-    slopes = compiled.derivative(reset, index, t, state, fixed)[:n]
-    acceleration = abs(_acceleration(orbit, key, share))
-    return -(slopes[:, :n] @ rate + slopes[:, -1] - rate) * np.sqrt(2.0 / acceleration)
+    t, x = moment(orbit, key.stretch, share_of_touch(orbit, key))
+    rate = family.rate(system.transitions[index].source, t, x, orbit.loop.values)
+    fixed = system.parameter_values(family.fixed)
+    slopes = family.compiled.derivative(reset, index, t, np.append(x, orbit.loop.values), fixed)[:n]
+    found = slopes[:, :n] @ rate + slopes[:, -1] - rate
+    return None if np.all(np.abs(found) <= CONTINUOUS * np.abs(rate).max()) else found
+
+
+def _jumps(orbit: Pass, key: Key, t: float, x: np.ndarray) -> bool:
+    """Whether the reset moves the state at a touch."""
+    family, system = orbit.family, orbit.family.extended
+    index = system.transition_index(key.name)
+    reset = reset_function(system.transitions[index], system.state)
+    assert reset is not None
+    fixed = system.parameter_values(family.fixed)
+    after = family.compiled.value(reset, index, t, np.append(x, orbit.loop.values), fixed)
+    return bool(np.any(np.abs(after[: len(x)] - x) > CONTINUOUS * orbit.scale))
 
 
 def _acceleration(orbit: Pass, key: Key, share: float) -> float:
