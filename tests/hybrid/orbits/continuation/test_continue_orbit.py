@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 import hybrid
 import hybrid.plot
+import lyapunov
 import models
 from hybrid import (
     ArgumentError,
@@ -365,3 +366,14 @@ def test_a_branch_is_saved_and_opened_again(impacts, tmp_path):
     assert further.status.ok
     with pytest.raises(ArgumentError, match="saved must be the dataset of a branch"):
         hybrid.open_branch(impacts.system, impacts.to_xarray().drop_attrs())
+
+
+def test_a_picture_over_a_chart(impacts):
+    chart = lyapunov.chart(models.impact_oscillator(), {"w": [0.9, 1.0]}, (0.0, 0.0), intervals=5, section=3)
+    ax = hybrid.plot.plot_branch(impacts, "v", over=chart)
+    assert ax.get_ylabel() == "v"
+    assert len(ax.collections[0].get_offsets()) == 6
+    assert hybrid.plot.plot_branch(impacts, over=ax) is ax
+    other = lyapunov.chart(models.impact_oscillator(), {"c": [0.1, 0.2]}, (0.0, 0.0), intervals=5, section=3)
+    with pytest.raises(ArgumentError, match="over must be a chart over 'w'"):
+        hybrid.plot.plot_branch(impacts, over=other)
