@@ -1,0 +1,83 @@
+"""How long branches of orbits and curves of bifurcations take, and how far they are from closed forms.
+
+Seconds are processor time of one core, the least of three, with the model compiled before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import models
+from benchmarks.common import heading, table
+from hybrid import PeriodicOrbit, continue_bifurcation, continue_orbit, periodic_orbit, simulate
+
+
+def settled(system: Any, x0: tuple[float, ...], periods: int, mode: str | None = None) -> PeriodicOrbit:
+    arc = simulate(system, x0, (0.0, periods * system.forcing_period()), mode=mode)
+    return periodic_orbit(system, arc.x[-1], mode=str(arc.mode[-1]))
+
+
+def converter() -> PeriodicOrbit:
+    system = models.buck_converter()
+    given = {"E": 20.0}
+    arc = simulate(system, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters=given)
+    return periodic_orbit(system, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, parameters=given)
+
+
+def timed(run: Callable[[], Any]) -> tuple[Any, float]:
+    found, times = run(), []
+    for _ in range(3):
+        start = time.process_time()
+        found = run()
+        times.append(time.process_time() - start)
+    return found, min(times)
+
+
+def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    heading(__doc__.splitlines()[0])
+    impacts = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    swing = settled(models.dry_friction_oscillator(), (1.0, 0.0), 200, "above")
+    bilinear = settled(models.bilinear_oscillator(), (0.0, 0.0), 300)
+    founding = settled(models.vibroimpact(), (0.0, 0.02, 0.0, 0.0), 600)
+    branches = [
+        ("one impact per period", impacts, "w", (0.75, 1.9), {"grazing": np.sqrt(1.99)}),
+        (
+            "founding system",
+            settled(models.vibroimpact(), (0.0, 0.02, 0.0, 0.0), 600),
+            "omega",
+            (6.5, 8.5),
+            {},
+        ),
+        ("buck converter", converter(), "E", (10.0, 33.0), {"border": 11.3 + 3.8 / 8.4}),
+        ("dry friction", swing, "w", (0.5, 0.95), {}),
+        ("bilinear oscillator", bilinear, "w", (0.45, 3.0), {}),
+    ]
+    rows = []
+    for what, orbit, name, span, exact in branches:
+        branch, seconds = timed(lambda orbit=orbit, name=name, span=span: continue_orbit(orbit, name, span))
+        kinds = [each.kind for each in branch.bifurcations]
+        counted = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
+        errors = [abs(each.value - exact[each.kind]) for each in branch.bifurcations if each.kind in exact]
+        error = f"{max(errors):.1e}" if errors else ""
+        rows.append(
+            (what, f"{name} {span[0]} to {span[1]}", str(len(branch)), f"{seconds:.2f} s", counted, error)
+        )
+    table(("branch", "over", "orbits", "time", "found", "error of the exact one"), rows)
+
+    found = continue_orbit(impacts, "w", (0.9, 2.0)).bifurcations
+    curves = []
+    for each in found:
+        over = {"w": (1.2, 2.0), "A": (0.5, 2.0)}
+        curve, seconds = timed(lambda each=each, over=over: continue_bifurcation(each, over))
+        curves.append((each.kind, "w, A", str(len(curve)), f"{seconds:.2f} s"))
+    table(("curve", "over", "points", "time"), curves)
+
+
+if __name__ == "__main__":
+    main()
