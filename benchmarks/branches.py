@@ -47,13 +47,7 @@ def main() -> None:
     founding = settled(models.vibroimpact(), (0.0, 0.02, 0.0, 0.0), 600)
     branches = [
         ("one impact per period", impacts, "w", (0.75, 1.9), {"grazing": np.sqrt(1.99)}),
-        (
-            "founding system",
-            settled(models.vibroimpact(), (0.0, 0.02, 0.0, 0.0), 600),
-            "omega",
-            (6.5, 8.5),
-            {},
-        ),
+        ("founding system", founding, "omega", (6.5, 8.5), {}),
         ("buck converter", converter(), "E", (10.0, 33.0), {"border": 11.3 + 3.8 / 8.4}),
         ("dry friction", swing, "w", (0.5, 0.95), {}),
         ("bilinear oscillator", bilinear, "w", (0.45, 3.0), {}),
