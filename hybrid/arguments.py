@@ -86,6 +86,14 @@ def whole_number(value: object) -> int | None:
     return int(value)
 
 
+def index(name: str, value: object, length: int) -> int:
+    """An index of a sequence, which may count from its end, as one that counts from the begin."""
+    whole = whole_number(value)
+    if whole is None or not -length <= whole < length:
+        raise refusal(name, f"be a whole number from {-length} to {length - 1}", value)
+    return whole % length
+
+
 def flag(name: str, value: object) -> bool:
     """True or False."""
     if not isinstance(value, bool | np.bool_):

@@ -123,10 +123,7 @@ class Branch:
         ArgumentError
             If there is no such point.
         """
-        whole = arguments.whole_number(i)
-        if whole is None or not -len(self) <= whole < len(self):
-            raise arguments.refusal("i", f"be a whole number from {-len(self)} to {len(self) - 1}", i)
-        return self._orbit(whole % len(self))
+        return self._orbit(arguments.index("i", i, len(self)))
 
     def __len__(self) -> int:
         return len(self.parameter)

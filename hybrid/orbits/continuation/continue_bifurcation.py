@@ -116,10 +116,7 @@ class BifurcationCurve:
         ArgumentError
             If there is no such point.
         """
-        whole = arguments.whole_number(i)
-        if whole is None or not -len(self) <= whole < len(self):
-            raise arguments.refusal("i", f"be a whole number from {-len(self)} to {len(self) - 1}", i)
-        return self._orbits[whole]
+        return self._orbits[arguments.index("i", i, len(self))]
 
     def to_xarray(self) -> xarray.Dataset:
         """The curve over the axis ``point``, with both parameters as coordinates."""

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.family import Pass
-from hybrid.orbits.continuation.place import Place, is_real, passes_by
+from hybrid.orbits.continuation.place import Place, is_real, passes_by, zero_on_the_way
 from hybrid.orbits.continuation.smooth import flip, singular, torus
 
 Test = Callable[[Place], float]
@@ -199,24 +199,10 @@ def _outside(spot: Spot, lows: np.ndarray, highs: np.ndarray) -> float:
 
 def _zero(curve: Curve, spot: Spot, after: Spot, function: Callable[[Spot], float]) -> Spot | None:
     """The spot between two where a function of spots changes its sign."""
-    from scipy.optimize import brentq
-
-    step = float(spot.along @ ((after.place.orbit.loop.flat - spot.place.orbit.loop.flat) / spot.place.units))
-    known = {0.0: spot, step: after}
-
-    def value(s: float) -> float:
-        if s not in known:
-            made = curve.step(spot, s)
-            if made is None:
-                raise ArithmeticError
-            known[s] = made
-        return function(known[s])
-
-    try:
-        root = brentq(value, 0.0, step, xtol=1e-12, maxiter=40, disp=False)
-    except (ArithmeticError, ValueError):
-        return None
-    return known[min(known, key=lambda s: abs(s - root))]
+    change = after.place.orbit.loop.flat - spot.place.orbit.loop.flat
+    length = float(spot.along @ (change / spot.place.units))
+    found: Spot | None = zero_on_the_way({0.0: spot, length: after}, partial(curve.step, spot), function)
+    return found
 
 
 def _last(curve: Curve, spot: Spot, length: float, inside: Callable[[Spot], bool]) -> Spot:

@@ -119,24 +119,35 @@ def passes_by(start: Place, before: Place, after: Place) -> bool:
 
 def zero_between(place: Place, after: Place, function: Callable[[Place], float]) -> Place | None:
     """The place between two of one branch where a function of places changes its sign."""
-    from scipy.optimize import brentq
 
-    length = distance(place, after)
-    known = {0.0: place, length: after}
+    def step(s: float) -> Place | None:
+        made = place.step(np.array([s]))
+        return None if made is None else made[0]
+
+    return zero_on_the_way({0.0: place, distance(place, after): after}, step, function)
+
+
+def zero_on_the_way(
+    known: dict[float, Any], step: Callable[[float], Any], function: Callable[[Any], float]
+) -> Any:
+    """What a ``step`` of a length gives where a function of that changes its sign, between two ``known`` ends.
+
+    None if it does not change its sign, or a step fails.
+    """
+    from scipy.optimize import brentq
 
     def value(s: float) -> float:
         if s not in known:
-            made = place.step(np.array([s]))
-            if made is None:
-                raise ArithmeticError
-            known[s] = made[0]
+            known[s] = step(s)
+        if known[s] is None:
+            raise ArithmeticError
         return function(known[s])
 
     try:
-        root = brentq(value, 0.0, length, xtol=1e-14, rtol=4e-16 * 4, maxiter=60, disp=False)
+        root = brentq(value, *known, xtol=1e-14, rtol=4e-16 * 4, maxiter=60, disp=False)
     except (ArithmeticError, ValueError):
         return None
-    return known.get(root) or min(known.items(), key=lambda each: abs(each[0] - root))[1]
+    return known[min(known, key=lambda s: abs(s - root))]
 
 
 def interpolated_zero(
