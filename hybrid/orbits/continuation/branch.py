@@ -44,6 +44,8 @@ class Bifurcation:
     stable
         Whether the orbits before and after it along the branch are stable; None where the branch ends.
     coefficient
+        Of a fold, ``c`` of ``p = p0 + c s^2``, ``s`` being the largest change of a state in units of its
+        size; of a flip the same for the orbits of twice the period, whose halves differ by ``2 s``.
         Of a grazing with a jump of finite size, the vector ``C (n,)`` of the zero-time discontinuity map: an
         orbit that would go beyond the guard by ``H`` is moved by ``C sqrt(H)`` where it would be farthest
         (Nordmark 1991). None for other kinds.
@@ -55,7 +57,7 @@ class Bifurcation:
     orbit: PeriodicOrbit
     message: str
     stable: tuple[bool | None, bool | None]
-    coefficient: np.ndarray | None = None
+    coefficient: np.ndarray | float | None = None
     _place: Place | None = attrs.field(default=None, repr=False)
     _change: Change | None = attrs.field(default=None, repr=False)
 

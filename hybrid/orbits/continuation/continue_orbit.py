@@ -9,6 +9,7 @@ from hybrid import arguments
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
+from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, mode_at, orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
@@ -19,6 +20,9 @@ from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
 
 Item = Place | Event
+
+# A multiplier is -1 if it is this near.
+AT_MINUS_ONE = 1e-3
 
 ENDS = {
     "range": "the end of the range",
@@ -194,17 +198,39 @@ def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points
             log_moduli=near.log_moduli,
             fundamental=near.fundamental,
         )
+    coefficient, further = _normal_form(event)
     return Bifurcation(
         event.kind,
         place.family.names[0],
         place.value,
         orbit,
-        event.message,
+        event.message + further,
         stable,
-        None if event.change is None else event.change.coefficient,
+        coefficient,
         event.place,
         event.change,
     )
+
+
+def _normal_form(event: Event) -> tuple[np.ndarray | float | None, str]:
+    """The coefficient of a bifurcation where theory has one, and what it says, in words."""
+    place, name = event.place, event.place.family.names[0]
+    if event.change is not None:
+        return event.change.coefficient, ""
+    if event.kind == "fold":
+        found = fold_coefficient(place)
+        return found, "" if found is None else f"; the orbits are on the side of {_side(found)} {name}"
+    begins = event.kind == "flip" and np.abs(place.orbit.free_multipliers + 1.0).min() < AT_MINUS_ONE
+    doubled = crossing(place, 2) if begins else None
+    if doubled is None:
+        return None, ""
+    found = flip_coefficient(place, doubled)
+    stable = bool(np.all(np.abs(doubled.free_multipliers) < 1.0))
+    return found, f", {'stable' if stable else 'unstable'}, on the side of {_side(found)} {name}"
+
+
+def _side(coefficient: float) -> str:
+    return "larger" if coefficient > 0.0 else "smaller"
 
 
 def _status(why: list[str]) -> Status:

@@ -130,7 +130,7 @@ def zero_between(place: Place, after: Place, function: Callable[[Place], float])
 def zero_on_the_way(
     known: dict[float, Any], step: Callable[[float], Any], function: Callable[[Any], float]
 ) -> Any:
-    """What a ``step`` of a length gives where a function of that changes its sign, between two ``known`` ends.
+    """What a ``step`` of a length gives where a function of that is zero, between two ``known`` ends.
 
     None if it does not change its sign, or a step fails.
     """

@@ -149,6 +149,17 @@ def test_the_quadratic_map(a, u, period, span, expected):
     np.testing.assert_allclose(branch.period, period, rtol=1e-12)
 
 
+def test_what_folds_and_flips_begin():
+    """``u = 2 - 2 e`` at ``a = (e^2 - 1) / 4``; beyond the flip ``u`` swings by ``sqrt(4 a - 3) / 2 a``."""
+    orbit = periodic_orbit(quadratic_map(0.5), (0.4, np.sqrt(3.0) - 1.0), period=1.0)
+    fold, flip = sorted(continue_orbit(orbit, "a", (-1.0, 1.0)).bifurcations, key=lambda each: each.value)
+    assert fold.coefficient == pytest.approx(0.25, rel=1e-4)
+    assert "on the side of larger a" in fold.message
+    # The size of u is that of the first orbit, which is larger.
+    assert flip.coefficient == pytest.approx(0.75**2 * (np.sqrt(3.0) - 1.0) ** 2, rel=1e-2)
+    assert "stable, on the side of larger a" in flip.message
+
+
 def test_the_converter_doubles_its_period():
     converter = models.buck_converter()
     arc = simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters={"E": 20.0})

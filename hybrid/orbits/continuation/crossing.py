@@ -1,0 +1,84 @@
+"""The branch that crosses another one, or begins on it: an orbit of it, and which way it goes."""
+
+from __future__ import annotations
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.continuation.route import Loop
+
+# The first orbit is this far from where the branches meet, in units of its size, or nearer by halves.
+DISTANCE = 0.02
+NEAREST = 1e-6
+# Distance at which the parameter of a fold is compared with that at the fold.
+APART = 1e-3
+
+
+def crossing(place: Place, times: int) -> Pass | None:
+    """An orbit of the other branch, which passes that of a place so many times; None if none is found.
+
+    At a flip the equations of the orbit passed twice are singular in two directions: along the branch, and
+    along the eigenvector of the multiplier -1. At a branch point those of one pass are. The other branch
+    begins in the direction across the first one (Seydel 2010, section 5.6).
+    """
+    repeated = _repeated(place, times)
+    if repeated is None:
+        return None
+    orbit, units, (along,) = repeated.orbit, repeated.units, repeated.tangents
+    one, other = np.linalg.svd(repeated.matrix)[2][-2:]
+    direction = one * (other @ along) - other * (one @ along)
+    direction /= np.linalg.norm(direction)
+    distance = DISTANCE
+    while distance > NEAREST:
+        guess = orbit.loop.plus(distance * units * direction)
+        found = repeated.family.corrected(guess, orbit, units, direction[None])
+        if found is not None:
+            return found[0]
+        distance /= 2.0
+    return None
+
+
+def _repeated(place: Place, times: int) -> Place | None:
+    """An orbit that is passed several times, and the tangent of its branch."""
+    family, loop = place.family, place.orbit.loop
+    first, last = loop.x.size, loop.x.size + len(loop.times)
+    change = place.units * place.tangents[0]
+    moved, longer = change[first:last], change[last - 1] - change[first]
+    again = Loop(
+        np.tile(loop.x, (times, 1)),
+        np.concatenate([loop.times[:1], *(loop.times[1:] + k * loop.period for k in range(times))]),
+        loop.values,
+    )
+    orbit = attrs.evolve(family, periods=times * family.periods, route=times * family.route).around(again)
+    if orbit is None:
+        return None
+    onward = np.concatenate(
+        [
+            np.tile(change[:first], times),
+            moved[:1],
+            *(moved[1:] + k * longer for k in range(times)),
+            change[last:],
+        ]
+    ) / orbit.units(place.sizes)
+    return Place(orbit, onward[None] / np.linalg.norm(onward), place.sizes)
+
+
+def fold_coefficient(place: Place) -> float | None:
+    """``c`` of ``p = p0 + c s^2`` at a fold, ``s`` being the largest change of a state in its units."""
+    made = [place.step(np.array([sign * APART])) for sign in (1.0, -1.0)]
+    if made[0] is None or made[1] is None:
+        return None
+    ends = [each[0] for each in made if each is not None]
+    middle = 0.5 * (ends[0].value + ends[1].value) - place.value
+    change = 0.5 * (ends[0].orbit.loop.x - ends[1].orbit.loop.x) / place.orbit.scale
+    return float(middle / np.abs(change).max() ** 2)
+
+
+def flip_coefficient(place: Place, doubled: Pass) -> float:
+    """``c`` of ``p = p0 + c s^2`` for orbits of twice the period, whose halves differ by ``2 s``."""
+    x = doubled.loop.x
+    half = len(x) // 2
+    s = 0.5 * np.abs((x[half:] - x[:half]) / place.orbit.scale).max()
+    return float((doubled.loop.values[0] - place.value) / s**2)
