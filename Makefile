@@ -15,8 +15,11 @@ PIP_INSTALL := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --
 demo: $(VENV)/.installed
 	$(BIN)/python -m lyapunov $(ARGS)
 
+# Each process of the tests would compile the kernels that it needs. Tests of one file run in one process, which
+# compiles their models once.
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n auto $(ARGS)
+	$(BIN)/python -m hybrid compile
+	$(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
