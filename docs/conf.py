@@ -12,13 +12,14 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
+    # Formulas are shown without a network, too.
+    "sphinx-mathjax-offline",
     "sphinx_design",
 ]
 source_suffix = {".md": "markdown"}
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 # Links to headings have the same form as where the pages are read without the site.
 myst_heading_anchors = 4
-suppress_warnings = ["myst.header"]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

@@ -42,7 +42,8 @@ def main() -> None:
     shutil.rmtree(source, ignore_errors=True)
     write_pages(source)
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet"]
-    done = subprocess.run([*command, "--builder", "html", str(source), str(output / "html")], check=False)
+    command += ["--builder", "html", "--doctree-dir", str(output / "doctrees")]
+    done = subprocess.run([*command, str(source), str(output / "html")], check=False)
     if done.returncode:
         sys.exit(done.returncode)
     print(f"Open {output / 'html' / 'index.html'}")
