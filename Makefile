@@ -10,21 +10,28 @@ BIN := $(VENV)/bin
 PIP_INSTALL := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .DELETE_ON_ERROR:
-.PHONY: demo test lint clean
+.PHONY: demo test lint docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python -m lyapunov $(ARGS)
 
+# Each process of the tests would compile the kernels that it needs. Tests of one file run in one process, which
+# compiles their models once.
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n auto $(ARGS)
+	$(BIN)/python -m hybrid compile
+	$(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+# The site opens from the file system: build/site/html/index.html.
+docs: $(VENV)/.installed-docs
+	$(BIN)/python docs/make_site.py $(ARGS)
+
 clean:
-	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find hybrid models lyapunov tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -1,11 +1,15 @@
 """Settings of all tests: the same examples each time, no deadlines, no display."""
 
+import gc
 import os
 from contextlib import suppress
 
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# SymPy makes many small objects. Fewer searches for garbage among them save 5 % of the processor time.
+gc.set_threshold(20_000, 20, 20)
 
 # A first example may compile a kernel, so deadlines and slowness checks are switched off.
 settings.register_profile(

@@ -26,6 +26,8 @@ LARGEST_DENOMINATOR = 7
 WIDEST_GAP = 8
 # Ratios at two points differ if they do by more than this share.
 DIFFERENT = 1e-10
+# Where points are drawn that tell two expressions apart: first where all is positive.
+RANGES = ((0.5, 1.5), (-1.5, -0.5), *((-0.3, 0.3), (-1.5, 1.5)) * 4)
 
 
 def with_fractions(expression: sympy.Expr, known: Sequence[sympy.Expr]) -> sympy.Expr:
@@ -94,18 +96,22 @@ def is_multiple(expression: sympy.Expr, other: sympy.Expr, symbols: Symbols) -> 
 def _ratio_varies(expression: sympy.Expr, other: sympy.Expr, symbols: Symbols) -> bool:
     """Whether the ratio has different values at two points, for the same parameters.
 
-    SymPy takes minutes to simplify the ratio of large expressions with many parameters.
+    SymPy takes minutes to simplify the ratio of large expressions with many parameters. The points lie where
+    both expressions have values. If no such points are found, the ratio may vary or not.
     """
     names = sorted(symbols_of(expression) | symbols_of(other), key=str)
     generator = np.random.default_rng(0)
-    point = dict(zip(names, generator.uniform(0.5, 1.5, len(names)), strict=True))
-    moved = {name: value + generator.uniform(0.1, 0.5) for name, value in point.items()}
-    moved |= {name: value for name, value in point.items() if name not in symbols.variables}
     program = Program([expression, other])
-    with np.errstate(all="ignore"):
-        (one, below), (two, beside) = program.run(point), program.run(moved)
-        # The comparison fails where a value is not finite.
-        return bool(abs(one * beside - two * below) > DIFFERENT * (abs(one * beside) + abs(two * below)))
+    for low, high in RANGES:
+        point = dict(zip(names, generator.uniform(low, high, len(names)), strict=True))
+        moved = {name: value + generator.uniform(0.1, 0.5) for name, value in point.items()}
+        moved |= {name: value for name, value in point.items() if name not in symbols.variables}
+        with np.errstate(all="ignore"):
+            (one, below), (two, beside) = program.run(point), program.run(moved)
+            size = abs(one * beside) + abs(two * below)
+            if np.isfinite(size):
+                return bool(abs(one * beside - two * below) > DIFFERENT * size)
+    return False
 
 
 @attrs.frozen

@@ -68,7 +68,7 @@ class TestTypes:
 
         refused(field, r"field: value 1 is .* compiled and .* in Python, at t = .*a branch on the type")
 
-    @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+    @pytest.mark.parametrize("unit", [1e-12, 1e12])
     def test_derivatives_that_branch_on_the_type_are_refused_in_any_units(self, unit):
         """The whole number in the field cannot be traced, so its derivative is the complex step."""
 
@@ -78,7 +78,7 @@ class TestTypes:
 
         refused(field, "field: the derivative is .* compiled and .* in Python, at t = .*a branch on the type")
 
-    @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+    @pytest.mark.parametrize("unit", [1e-12, 1e12])
     def test_derivatives_that_cancel_are_no_fault(self, unit):
         def field(t, x, p):
             force = unit * PAIR[int(p.k)] * (np.sin(x.q) ** 2 + np.cos(x.q) ** 2)
@@ -272,7 +272,7 @@ class TestTheCompilersErrors:
         """The compiler either solves the system or raises an error that explains the limit."""
 
         def field(t, x, p):
-            return np.linalg.solve(np.array([[2.0, x[0]], [x[1], 3.0]]), x) * np.linalg.det(np.eye(2))
+            return np.linalg.solve(np.array([[2.0, x[0]], [x[1], 3.0]]), x)
 
         solved, compiled, refusal = system(field, state=2), None, ""
         try:

@@ -19,7 +19,7 @@ class Lookalike:
     tableau = hybrid.DOP853.tableau
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def compiled():
     """A mode with an exact series, and one that cannot be traced."""
 

@@ -35,14 +35,18 @@ def filled(first):
     )
 
 
+# Compiled once for all tests.
+FILLED = filled(table)
+
+
 @pytest.mark.parametrize(
     "solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=lambda each: type(each).__name__
 )
 def test_a_pulse_that_cannot_be_traced_may_be_stepped_over(solver):
-    arc = simulate(filled(table), (0.0,), (0.0, 10.0), mode="fill", solver=solver)
+    arc = simulate(FILLED, (0.0,), (0.0, 10.0), mode="fill", solver=solver)
     assert "forcing of mode 'fill' cannot be bounded" in arc.status.message
     assert "cannot be bounded" in repr(arc)
-    short = simulate(filled(table), (0.0,), (0.0, 10.0), mode="fill", solver=type(solver)(max_step=0.005))
+    short = simulate(FILLED, (0.0,), (0.0, 10.0), mode="fill", solver=type(solver)(max_step=0.005))
     assert short.x[-1, 0] == pytest.approx(1.0, abs=0.5)
 
 
@@ -53,14 +57,14 @@ def test_modes_that_a_run_does_not_visit_are_not_told():
 
 
 def test_the_error_of_such_a_run_is_not_certain():
-    found = global_error(filled(table), (0.0,), (0.0, 10.0), mode="fill")
+    found = global_error(FILLED, (0.0,), (0.0, 10.0), mode="fill")
     assert "cannot be bounded" in found.status.message
     assert "cannot be bounded" in repr(found)
 
 
 def test_many_runs_tell_the_same():
     starts = np.linspace(0.0, 1.0, 3)[:, None]
-    many = simulate_many(filled(table), starts, (0.0, 10.0), mode="fill")
-    single = simulate(filled(table), starts[0], (0.0, 10.0), mode="fill")
+    many = simulate_many(FILLED, starts, (0.0, 10.0), mode="fill")
+    single = simulate(FILLED, starts[0], (0.0, 10.0), mode="fill")
     assert "cannot be bounded" in str(many.message.values[0])
     assert str(many.message.values[0]) in str(single.status)

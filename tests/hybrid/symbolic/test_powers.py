@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate, split
@@ -89,6 +89,7 @@ HIGH = {
 
 
 @pytest.mark.parametrize("shape", HIGH)
+@settings(max_examples=20)
 @given(
     size=st.floats(0.9, 1.1),
     sign=st.sampled_from([1, -1]),

@@ -30,7 +30,6 @@ from hybrid.testing import (
     small_systems,
     states,
 )
-from hybrid.testing.crossings import CROSSINGS
 from hybrid.testing.events import JUMPS, SIDES
 from hybrid.testing.invariance import ELASTIC
 from hybrid.testing.saltation import CONTINUITY, SUM_RULE
@@ -40,10 +39,6 @@ BALL = models.bouncing_ball()
 
 # Properties that are not checked for a system without a continuous event, a second transition or elasticity.
 NOT_CONTINUOUS, NOT_ELASTIC = CONTINUITY, ELASTIC
-
-
-DOWNHILL = {"states": {"theta": (-0.3, 0.4), "omega": (0.5, 2.0)}}
-BUCK = {"states": {"v": (11.4, 12.4), "i": (0.4, 0.7), "tau": (0.0, 0.5)}, "t_span": (0.0, 1.6e-3)}
 
 
 def friction():
@@ -88,21 +83,12 @@ def rattler():
 @pytest.mark.parametrize(
     ("system", "options", "unchecked"),
     [
-        (models.bouncing_ball(), {}, {NOT_CONTINUOUS, NOT_ELASTIC}),
         (
             models.bouncing_ball(),
             {"parameters": {"e": 1.0}, "elastic": ("v",)},
             {NOT_CONTINUOUS},
         ),
-        (models.impact_oscillator(), {}, {NOT_CONTINUOUS, NOT_ELASTIC}),
-        (
-            models.vibroimpact(),
-            {"states": {"x1": (-0.02, 0.02), "x2": (-0.01, 0.03), "v1": (-0.1, 0.1), "v2": (-0.4, 0.4)}},
-            {NOT_ELASTIC},
-        ),
         (rattler(), {}, {NOT_ELASTIC}),
-        (models.solvable_oscillator(), {}, {CROSSINGS, SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
-        (models.rimless_wheel(), DOWNHILL, {NOT_CONTINUOUS, NOT_ELASTIC}),
         (systems.jerk(), {}, {NOT_ELASTIC}),
         (systems.constant_fields(), {"mode": "left"}, {NOT_CONTINUOUS, NOT_ELASTIC}),
         (systems.switched_linear(), {}, {SIDES, NOT_CONTINUOUS, NOT_ELASTIC}),
@@ -116,18 +102,11 @@ def rattler():
             {"mode": "fall", "t_span": (0.0, 40.0)},
             {SUM_RULE, NOT_CONTINUOUS, NOT_ELASTIC},
         ),
-        (
-            models.buck_converter(),
-            {**BUCK, "examples": 30, "parameters": {**models.buck_converter().parameters, "E": (24.0, 26.0)}},
-            {NOT_CONTINUOUS, NOT_ELASTIC},
-        ),
     ],
-    ids=[
-        "ball", "elastic ball", "impact oscillator", "vibro-impact", "rattler", "solvable", "wheel", "jerk",
-        "constant", "switched", "stick-slip", "incline", "buck",
-    ],
-)  # fmt: skip
+    ids=["elastic ball", "rattler", "jerk", "constant", "switched", "stick-slip", "incline"],
+)
 def test_ours(system, options, unchecked):
+    """Those of ``models`` have every property too: ``tests/models/test_laws.py``."""
     report = check_system(system, **{"examples": 15, **options})
     assert set(report.unchecked) == unchecked
     assert not report.never_seen

@@ -41,7 +41,7 @@ import_numba()
 assert "scipy.linalg" not in sys.modules
 import numba, numpy as np
 a = np.arange(9.0).reshape(3, 3) + np.eye(3)
-assert np.array_equal(numba.njit(lambda a: np.linalg.inv(a @ a) @ np.cov(a))(a).shape, (3, 3))
+assert numba.njit(lambda a: np.cov(a))(a).shape == (3, 3)
 assert "scipy.linalg" in sys.modules
 """
 
@@ -355,21 +355,27 @@ KERNELS, SPECTRUM, COMPILER, TRACER = range(4)
         ("models/bouncing_ball.py", set()),
     ],
 )
-def test_an_edit_changes_the_keys_of_what_it_goes_into(sources, edited, changed):
-    def keys():
-        done = subprocess.run(
-            [sys.executable, "-c", KEYS], cwd=sources, capture_output=True, text=True, check=True
-        )
-        return done.stdout.split()
-
-    before = keys()
+def test_an_edit_changes_the_keys_of_what_it_goes_into(sources, before, edited, changed):
     path = sources / edited
     content = path.read_text() if path.exists() else None
     path.parent.mkdir(exist_ok=True)
     path.write_text((content or "") + "# Another version.\n")
-    after = keys()
+    after = keys(sources)
     path.unlink() if content is None else path.write_text(content)
     assert {i for i, (one, other) in enumerate(zip(before, after, strict=True)) if one != other} == changed
+
+
+def keys(sources):
+    done = subprocess.run(
+        [sys.executable, "-c", KEYS], cwd=sources, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()
+
+
+@pytest.fixture(scope="module")
+def before(sources):
+    """The keys of the copy, which each test leaves as it was."""
+    return keys(sources)
 
 
 @pytest.fixture(scope="module")

@@ -133,6 +133,8 @@ class TestIsMultiple:
         [
             *[(x + 0.01, x), (x * y, x), (symbols.t * x, x)],
             *[(1e-15 * x + 1e-17, x), (1e15 * x * y, 1e-15 * x)],
+            # Without values where all is positive.
+            (sympy.sqrt(-x) + y, -x),
         ],
     )
     def test_factor_of_the_state(self, expression, other, monkeypatch):
