@@ -24,15 +24,15 @@ from hybrid.orbits.continuation.place import (
 from hybrid.orbits.continuation.route import Route
 from hybrid.simulation.simulate import simulate
 
-# The change is enclosed by so many halvings of a step before it is asked what changes.
-HALVINGS = 5
+# The change is enclosed by so many halvings of a step, each time before it is asked what changes.
+HALVINGS = 6
 MOST_HALVINGS = 60
 # Two places this near on the branch are the same to rounding.
 SHORTEST = 1e-13
 # A measure that has vanished is this share of what it was at a real place nearby.
 VANISHED = 1e-3
 # A change found from its two sides has the same parameter, to this share of the range.
-CLOSE = 1e-5
+CLOSE = 1e-2
 # A stretch shorter than this share of the longest may take no time at the change.
 SHARE_OF_A_STAY = 0.02
 # Distances from the orbit at a change at which the system itself is asked for its way, in their units.
@@ -117,8 +117,9 @@ class Change:
         stays = any(len({mode for each in way for mode in (each.mode, each.end_mode)}) == 1 for way in routes)
         if self.key.kind in AT_A_CORNER and stays and len(self.place.family.system.modes) > 1:
             return "border"
-        tangent = self.key.kind in TANGENT
-        if tangent and kick(self.place.orbit, self.key) is not None:
+        tangent = {self.key.kind, self.exact.key.kind} & set(TANGENT)
+        exact = self.exact
+        if exact.key.kind in TANGENT and kick(exact.place.orbit, exact.key) is not None:
             return "grazing"
         passing, i = onward.passing, onward.stretch
         if passing is None or i is None:
@@ -189,7 +190,7 @@ def located(place: Place, after: Place) -> Change | None:
             near = made[0]
         else:
             far = made[0]
-        if number < HALVINGS:
+        if number % HALVINGS != HALVINGS - 1:
             continue
         for key in changed(near.orbit, far.orbit):
             measure = measure_of(key)
