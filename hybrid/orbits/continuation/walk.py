@@ -18,7 +18,7 @@ from hybrid.orbits.continuation.place import (
     zero_between,
 )
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.continuation.smooth import TESTS, halves, told
+from hybrid.orbits.continuation.smooth import TESTS, branch_point, halves, told
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
@@ -30,6 +30,10 @@ LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 NOTHING = 1e-12
+# Another branch crosses near a place where the equations are this near to singular; a step that ends there is
+# taken longer.
+CROSSED = 3e-3
+OVER = 1.5
 # A change of the route this near to the one before, in the range of the parameter, is the same one.
 SAME_CHANGE = 1e-7
 
@@ -55,6 +59,9 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
                 yield "lost"
                 return
             continue
+        if _is_crossed(made[0]) and not _is_crossed(place):
+            # So near to another branch that it may be on that one: the step goes over the place.
+            made = place.step(np.array([OVER * length])) or made
         after, corrections = made
         if not is_real(after.orbit):
             change = located(place, after)
@@ -105,6 +112,11 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             length = min(LONGEST_STEP, LONGER * length)
         place = refined(after)
     yield "most"
+
+
+def _is_crossed(place: Place) -> bool:
+    """Whether another branch crosses here, to a few digits."""
+    return abs(branch_point(place)) < CROSSED
 
 
 def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterator[Place | Event]:
