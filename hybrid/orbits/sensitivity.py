@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, share_of
 
 # Relative change of a parameter for the differences of multipliers, which are extrapolated.

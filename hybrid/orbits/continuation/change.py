@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.family import Family, Pass
+from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.measures import Key, changed, measure_of
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import (
     Place,
     distance,
@@ -20,12 +21,20 @@ from hybrid.orbits.continuation.place import (
     slides,
     start_of,
 )
-from hybrid.orbits.continuation.route import instants
+from hybrid.orbits.continuation.route import Route
 from hybrid.simulation.simulate import simulate
 
-# The change is enclosed by so many halvings of a step before it is asked what changes.
-HALVINGS = 5
-MOST_HALVINGS = 24
+# The change is enclosed by so many halvings of a step, each time before it is asked what changes.
+HALVINGS = 6
+MOST_HALVINGS = 60
+# Two places this near on the branch are the same to rounding.
+SHORTEST = 1e-13
+# A measure that has vanished is this share of what it was at a real place nearby.
+VANISHED = 1e-3
+# A change found from its two sides has the same parameter, to this share of the range.
+CLOSE = 1e-2
+# A stretch shorter than this share of the longest may take no time at the change.
+SHARE_OF_A_STAY = 0.02
 # Distances from the orbit at a change at which the system itself is asked for its way, in their units.
 FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
 
@@ -58,6 +67,15 @@ class Onward:
 
 
 @attrs.frozen(eq=False)
+class Exact:
+    """The same change from its side of fewer jumps: the orbit there, its measure, a real place before it."""
+
+    place: Place
+    key: Key
+    before: Place
+
+
+@attrs.frozen(eq=False)
 class Change:
     """Where the route changes.
 
@@ -71,12 +89,25 @@ class Change:
         A real place before it.
     onward
         What comes beyond.
+    exact
+        The place, the measure and a real place from the side of fewer jumps.
     """
 
     place: Place
     key: Key
     before: Place
     onward: Onward
+    exact: Exact = attrs.field()
+
+    @exact.default
+    def _itself(self) -> Exact:
+        return Exact(self.place, self.key, self.before)
+
+    @property
+    def routes(self) -> tuple[Route, ...]:
+        """The routes before and beyond it."""
+        onward = self.onward.place
+        return (self.place.family.route, *(() if onward is None else (onward.family.route,)))
 
     @property
     def kind(self) -> str:
@@ -86,8 +117,9 @@ class Change:
         stays = any(len({mode for each in way for mode in (each.mode, each.end_mode)}) == 1 for way in routes)
         if self.key.kind in AT_A_CORNER and stays and len(self.place.family.system.modes) > 1:
             return "border"
-        tangent = self.key.kind in TANGENT
-        if tangent and kick(self.place.orbit, self.key) is not None:
+        tangent = {self.key.kind, self.exact.key.kind} & set(TANGENT)
+        exact = self.exact
+        if exact.key.kind in TANGENT and kick(exact.place.orbit, exact.key) is not None:
             return "grazing"
         passing, i = onward.passing, onward.stretch
         if passing is None or i is None:
@@ -108,7 +140,7 @@ class Change:
         """The square-root coefficient ``(n,)`` of a grazing; None where there is none."""
         if self.kind != "grazing":
             return None
-        return square_root_coefficient(self.place.orbit, self.key)
+        return square_root_coefficient(self.exact.place.orbit, self.exact.key)
 
     @property
     def told(self) -> str:
@@ -143,25 +175,54 @@ def _listed(names: tuple[str, ...]) -> str:
 
 def located(place: Place, after: Place) -> Change | None:
     """The first change between a real place and one that is not; None if no measure explains it."""
-    low, high, far = 0.0, distance(place, after), after
-    near = place
+    near, far, share = place, after, 0.5
     for number in range(MOST_HALVINGS):
-        s = 0.5 * (low + high)
-        made = place.step(np.array([s]))
-        if made is not None and is_real(made[0].orbit):
-            low, near = s, made[0]
-        elif made is not None:
-            high, far = s, made[0]
-        else:
-            high = s
+        length = distance(near, far)
+        if not length > SHORTEST:
+            break
+        made = near.step(np.array([share * length]))
+        if made is None:
+            # It is reached from nearer.
+            share /= 2.0
             continue
-        if number < HALVINGS:
+        share = 0.5
+        if is_real(made[0].orbit):
+            near = made[0]
+        else:
+            far = made[0]
+        if number % HALVINGS != HALVINGS - 1:
             continue
         for key in changed(near.orbit, far.orbit):
-            found = interpolated_zero(place, measure_of(key), (low, high))
-            if found is not None:
-                return Change(found, key, near, _onward(near, found, key))
-    return None
+            measure = measure_of(key)
+            found = interpolated_zero(near, lambda each: measure(each.orbit), (0.0, distance(near, far)))  # noqa: B023
+            if found is not None and abs(measure(found.orbit)) <= VANISHED * abs(measure(near.orbit)):
+                return _simplest(Change(found, key, near, _onward(near, found, key)))
+    keys = changed(near.orbit, far.orbit)
+    # What jumps has no zero: it is between two places that are the same to rounding.
+    return Change(near, keys[0], near, _onward(near, near, keys[0])) if keys else None
+
+
+def _simplest(change: Change) -> Change:
+    """A change with the place found from its side of fewer jumps, if that is the other one.
+
+    On the side of more jumps some of them come to the same instant, and the equations are singular there.
+    """
+    onward = change.onward.place
+    if onward is None or len(onward.family.route) >= len(change.place.family.route):
+        return change
+    back = attrs.evolve(onward, tangents=-onward.tangents, bend=0.0)
+    reached = abs(onward.value - change.place.value) + SHORTEST
+    for length in reached / float(onward.sizes[0]) * np.array([2.0, 8.0, 32.0]):
+        made = back.step(np.array([length]))
+        if made is None or is_real(made[0].orbit):
+            continue
+        for key in changed(back.orbit, made[0].orbit):
+            measure = measure_of(key)
+            found = interpolated_zero(back, lambda each: measure(each.orbit), (0.0, distance(back, made[0])))  # noqa: B023
+            if found is not None and abs(found.value - change.place.value) < CLOSE * float(onward.sizes[0]):
+                exact = Exact(found, key, back)
+                return attrs.evolve(change, exact=exact)
+    return change
 
 
 def _onward(near: Place, at: Place, key: Key) -> Onward:
@@ -226,20 +287,24 @@ def _asked(near: Place, place: Place, key: Key, farther: float) -> Iterator[Aske
         )
         if not arc.status.ok or str(arc.mode[-1]) != mode:
             continue
-        new = [tuple(jump.transition for jump in group) for group in instants(list(arc.jumps))]
-        same, last = _common(old, new)
-        local = old[same : len(old) - last], new[same : len(new) - last]
-        if local[0] == local[1] or any(name in starting for names in new for name in names):
+        if starting & {str(name) for name in arc.jumps.transition}:
             continue
         started = start_of(family, arc, period, values)
         first = None if started is None else started[0].around(started[1])
         if first is None:
             continue
-        if len(local[1]) >= len(local[0]):
-            between, times = [same + k for k in range(len(local[1]) - 1)], first.loop.times
-        else:
-            stretches = [(i + 1) % len(loop.x) for i in turned]
-            between, times = stretches[same : same + len(local[0]) - 1], loop.times
+        # The route of a run begins after its first jump, which ends the last stretch.
+        theirs = [i for i, stretch in enumerate(first.family.route) if stretch.fired]
+        theirs = [*theirs[-1:], *theirs[:-1]]
+        new = [first.family.route[i].fired for i in theirs]
+        same, last = _common(old, new)
+        local = old[same : len(old) - last], new[same : len(new) - last]
+        if local[0] == local[1]:
+            continue
+        more = len(local[1]) >= len(local[0])
+        count, times = (len(first.loop.x), first.loop.times) if more else (len(loop.x), loop.times)
+        passed = (theirs if more else turned)[same : same + max(map(len, local))]
+        between = [(i + 1) % count for i in passed[:-1]]
         yield first.family, first, local, min(between, key=lambda i: np.diff(times)[i], default=None)
 
 
@@ -259,7 +324,8 @@ def _around(
 def _quiet(orbit: Pass, key: Key) -> tuple[int, float]:
     """A long stretch whose states may be moved to all sides, and a share of its time far from the change."""
     stays = np.diff(orbit.loop.times)
-    free = [i for i in range(len(stays)) if not slides(orbit, i)] or list(range(len(stays)))
+    lasting = [i for i in range(len(stays)) if stays[i] > SHARE_OF_A_STAY * stays.max()]
+    free = [i for i in lasting if not slides(orbit, i)] or lasting
     j = max(free, key=lambda i: stays[i])
     if j == key.stretch and key.kind == "top":
         return j, key.share / 2 if key.share > 0.5 else (1.0 + key.share) / 2

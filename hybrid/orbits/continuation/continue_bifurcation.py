@@ -14,7 +14,7 @@ from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.curve import SMOOTH, Curve, Special, Spot, along_curve
-from hybrid.orbits.continuation.measures import measure_of
+from hybrid.orbits.continuation.measures import curve_measure_of
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of
 from hybrid.orbits.continuation.route import Loop
@@ -29,10 +29,13 @@ from hybrid.system.graph import HybridSystem
 if TYPE_CHECKING:
     import xarray
 
+PLURALS = {"torus": "tori"}
+
 ENDS = {
     "range": "the end of a range",
     "closed": "its start: it is closed",
     "change": "a place where the orbit has other transitions",
+    "infinity": "an orbit that grows without bound",
     "strong resonance": "a strong resonance, where the pair of multipliers becomes real",
     "most": "the limit of steps",
     "lost": "a place beyond which Newton's method finds no point",
@@ -104,9 +107,8 @@ class BifurcationCurve:
     def __repr__(self) -> str:
         spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
         special = ", ".join(each.kind for each in self.points) or "nothing special"
-        return (
-            f"<Curve of {self.kind}s, {spans}, {counted(len(self), 'point')}, {special}, {self.status.brief}>"
-        )
+        kinds, count = PLURALS.get(self.kind, f"{self.kind}s"), counted(len(self), "point")
+        return f"<Curve of {kinds}, {spans}, {count}, {special}, {self.status.brief}>"
 
     def orbit(self, i: int) -> PeriodicOrbit:
         """The orbit of a point of the curve.
@@ -130,7 +132,7 @@ class BifurcationCurve:
             "multipliers": (("point", "multiplier"), self.multipliers.astype(complex)),
         }
         coords = {name: ("point", self[name], names.of(name)) for name in self.names}
-        made_by = attributes(f"curve of {self.kind}s", self.status, self.system)
+        made_by = attributes(f"curve of {PLURALS.get(self.kind, f'{self.kind}s')}", self.status, self.system)
         return xarray.Dataset(variables, {**coords, **names.coords()}, made_by)
 
 
@@ -253,9 +255,10 @@ def _curve_of(bifurcation: Bifurcation, place: Place) -> Curve:
     if bifurcation.kind in SMOOTH:
         return Curve(bifurcation.kind, SMOOTH[bifurcation.kind])
     assert bifurcation._change is not None
-    measure = measure_of(bifurcation._change.key)
-    side = float(np.sign(measure(bifurcation._change.before.orbit)))
-    bounded = bifurcation._change.key.kind != "speed"
+    exact = bifurcation._change.exact
+    measure = curve_measure_of(exact.key)
+    side = float(np.sign(measure(exact.before.orbit)))
+    bounded = exact.key.kind != "speed"
     return Curve(bifurcation.kind, lambda each: measure(each.orbit), side, bounded)
 
 

@@ -9,7 +9,7 @@ from hybrid import arguments
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient
+from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, mode_at, orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
@@ -27,6 +27,7 @@ AT_MINUS_ONE = 1e-3
 ENDS = {
     "range": "the end of the range",
     "closed": "the branch closes",
+    "equilibrium": "a point, where the orbit has no size",
     "infinity": "an orbit that grows without bound",
     "most": "the limit of steps",
     "lost": "Newton's method finds no orbit farther on",
@@ -187,11 +188,11 @@ def is_stable(place: Place) -> bool:
 
 def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points: Points) -> Bifurcation:
     """An event as a result."""
-    place = event.place
+    place = event.place if event.change is None else event.change.exact.place
     orbit = orbit_of(place.orbit, points)
     if event.change is not None and not np.all(np.isfinite(orbit.fundamental)):
         # Where a guard loses its speed the derivatives have no bound: they are those of an orbit nearby.
-        near = orbit_of(event.change.before.orbit, points)
+        near = orbit_of(event.change.exact.before.orbit, points)
         orbit = attrs.evolve(
             orbit,
             multipliers=near.multipliers,
@@ -207,7 +208,7 @@ def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points
         event.message + further,
         stable,
         coefficient,
-        event.place,
+        place,
         event.change,
     )
 
@@ -225,8 +226,12 @@ def _normal_form(event: Event) -> tuple[np.ndarray | float | None, str]:
     if doubled is None:
         return None, ""
     found = flip_coefficient(place, doubled)
-    stable = bool(np.all(np.abs(doubled.free_multipliers) < 1.0))
-    return found, f", {'stable' if stable else 'unstable'}, on the side of {_side(found)} {name}"
+    stable = "stable" if is_supercritical(place, found) else "unstable"
+    return found, f", {stable}, on the side of {_side(found)} {name}"
+
+
+def _a(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
 
 def _side(coefficient: float) -> str:
@@ -234,7 +239,7 @@ def _side(coefficient: float) -> str:
 
 
 def _status(why: list[str]) -> Status:
-    told = " and at ".join(ENDS.get(each, f"a {each}") for each in dict.fromkeys(why))
+    told = " and at ".join(ENDS.get(each, _a(each)) for each in dict.fromkeys(why))
     if not {"lost", "most"} & set(why):
         return attrs.evolve(SUCCESS, message=f"The branch ends at {told}.")
     return Status(

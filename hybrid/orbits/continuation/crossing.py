@@ -5,7 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.continuation.route import Loop
 
@@ -72,7 +72,8 @@ def fold_coefficient(place: Place) -> float | None:
         return None
     ends = [each[0] for each in made if each is not None]
     middle = 0.5 * (ends[0].value + ends[1].value) - place.value
-    change = 0.5 * (ends[0].orbit.loop.x - ends[1].orbit.loop.x) / place.orbit.scale
+    sizes = np.where(place.orbit.own_scale > 0.0, place.orbit.own_scale, 1.0)
+    change = 0.5 * (ends[0].orbit.loop.x - ends[1].orbit.loop.x) / sizes
     return float(middle / np.abs(change).max() ** 2)
 
 
@@ -80,5 +81,21 @@ def flip_coefficient(place: Place, doubled: Pass) -> float:
     """``c`` of ``p = p0 + c s^2`` for orbits of twice the period, whose halves differ by ``2 s``."""
     x = doubled.loop.x
     half = len(x) // 2
-    s = 0.5 * np.abs((x[half:] - x[:half]) / place.orbit.scale).max()
+    sizes = np.where(place.orbit.own_scale > 0.0, place.orbit.own_scale, 1.0)
+    s = 0.5 * np.abs((x[half:] - x[:half]) / sizes).max()
     return float((doubled.loop.values[0] - place.value) / s**2)
+
+
+def is_supercritical(place: Place, coefficient: float) -> bool:
+    """Whether the orbits of twice the period are stable: single ones are on the other side alone.
+
+    That is exact near the flip, where one multiplier alone decides (Kuznetsov 2023, section 4.5).
+    """
+    for sign in (1.0, -1.0):
+        made = place.step(np.array([sign * APART]))
+        if made is None:
+            return False
+        stable = bool(np.all(np.abs(made[0].orbit.free_multipliers) < 1.0))
+        if stable == ((made[0].value - place.value) * coefficient > 0.0):
+            return False
+    return True

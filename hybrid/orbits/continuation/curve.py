@@ -8,7 +8,7 @@ from functools import partial
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, is_real, passes_by, zero_on_the_way
 from hybrid.orbits.continuation.smooth import flip, singular, torus
 
@@ -34,6 +34,10 @@ STANDS = 1e-3
 REAL = 1e-9
 
 SMOOTH: dict[str, Test] = {"fold": singular, "flip": flip, "torus": torus}
+# A second multiplier like that of the bifurcation: what is added to it, and the kind.
+DOUBLE = {"fold": (-1.0, "1:1 resonance"), "flip": (1.0, "1:2 resonance")}
+# An orbit that is larger than the first one by this factor grows without bound.
+UNBOUNDED = 2.0**26
 # Angles on the unit circle where a torus is resonant, as shares of a turn.
 RESONANCES = {"1:4 resonance": 1 / 4, "1:3 resonance": 1 / 3}
 
@@ -162,9 +166,10 @@ def along_curve(
             continue
         ended = _ended(curve, after, lows, highs)
         if ended:
+            last = None
             if ended == "range":
-                last = _zero(curve, spot, after, lambda each: _outside(each, lows, highs)) or spot
-            else:
+                last = _zero(curve, spot, after, partial(_outside, lows, highs))
+            if last is None:
                 last = _last(curve, spot, length, lambda each: _ended(curve, each, lows, highs) == "")
             yield from _between(curve, spot, last)
             if last is not spot:
@@ -178,20 +183,23 @@ def along_curve(
         if number > 1 and passes_by(start.place, spot.place, after.place):
             yield "closed"
             return
+        if np.any(after.place.orbit.scale > UNBOUNDED * start.place.orbit.scale):
+            yield "infinity"
+            return
         spot, length = after, min(LONGEST_STEP, LONGER * length)
     yield "most"
 
 
 def _ended(curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray) -> str:
     """Why the curve has ended at a spot; empty if it has not."""
-    if _outside(spot, lows, highs) > 0.0:
+    if _outside(lows, highs, spot) > 0.0:
         return "range"
     if curve.kind == "torus" and not angle(spot.place.orbit) > 0.0:
         return "strong resonance"
     return "" if curve.is_real(spot) else "change"
 
 
-def _outside(spot: Spot, lows: np.ndarray, highs: np.ndarray) -> float:
+def _outside(lows: np.ndarray, highs: np.ndarray, spot: Spot) -> float:
     """How far a spot is out of the ranges, as a share of them; negative within."""
     values = spot.place.values
     return float((np.maximum(lows - values, values - highs) / (highs - lows)).max())
@@ -245,6 +253,9 @@ def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float]
             away = partial(_from_resonance, 2 * np.pi * turn)
             yield name, away, "the multipliers of the torus are roots of 1"
         return
+    if kind in DOUBLE:
+        sign, name = DOUBLE[kind]
+        yield name, partial(_others, sign), f"another multiplier is {-sign:.0f} too"
     if kind == "fold":
         # Along the curve both parameters stop and turn back.
         yield "cusp", lambda other: float(spot.along[-2:] @ other.along[-2:]), "two curves of folds meet"
@@ -252,6 +263,12 @@ def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float]
         if other != kind:
             name = "fold-flip" if {other, kind} == {"fold", "flip"} else f"{kind}-{other}"
             yield name, partial(_at_spot, SMOOTH[other]), f"there is a {other} too"
+
+
+def _others(sign: float, spot: Spot) -> float:
+    """The product of ``mu + sign`` over the multipliers but for the one that is nearest to ``-sign``."""
+    values = spot.place.orbit.free_multipliers + sign
+    return float(np.prod(np.delete(values, int(np.argmin(np.abs(values))))).real)
 
 
 def _from_resonance(turn: float, spot: Spot) -> float:

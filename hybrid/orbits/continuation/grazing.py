@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.orbits.continuation.family import Pass
 from hybrid.orbits.continuation.measures import Key, extremum
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment
 from hybrid.system.functions import reset_function
 
@@ -39,7 +39,7 @@ def square_root_coefficient(orbit: Pass, key: Key) -> np.ndarray | None:
 
 def share_of_touch(orbit: Pass, key: Key) -> float:
     """Where in its stretch a guard is touched: at an extremum, or at the end."""
-    return extremum(key, orbit)[0] if key.kind == "top" else 1.0
+    return extremum(key, orbit)[0] % 1.0 if key.kind == "top" else 1.0
 
 
 def kick(orbit: Pass, key: Key) -> np.ndarray | None:

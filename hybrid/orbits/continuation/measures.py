@@ -8,7 +8,7 @@ from functools import partial
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Transition
 
@@ -18,6 +18,8 @@ PLACES = 129
 SAME = 0.1
 # A guard that is zero at an end of a stretch by its nature has this share of its size there.
 NOTHING = 1e-9
+# Shares by which a stretch is looked at beyond an end where it goes on smoothly.
+BESIDE = 0.05
 
 
 @attrs.frozen
@@ -55,14 +57,17 @@ def measures(orbit: Pass) -> dict[Key, float]:
 
 
 def _of_guard(orbit: Pass, i: int, transition: Transition) -> Iterable[tuple[Key, float]]:
-    heights, shares = heights_of(orbit, i, transition), np.linspace(0.0, 1.0, PLACES)
+    # Where a stretch goes on smoothly from the one before, or into the next, an extremum may lie at its end.
+    begin = -BESIDE if orbit.landings[i - 1] is None else 0.0
+    end = 1.0 + BESIDE if orbit.landings[i] is None else 1.0
+    shares = np.linspace(begin, end, PLACES)
+    heights = heights_of(orbit, i, transition, shares)
     if heights is None:
         return
-    size = float(np.abs(heights).max())
-    name = transition.name
-    if transition.name not in orbit.family.route[i].fired[:1] and abs(heights[-1]) > NOTHING * size:
+    size, name = float(np.abs(heights).max()), transition.name
+    if end == 1.0 and name not in orbit.family.route[i].fired[:1] and abs(heights[-1]) > NOTHING * size:
         yield Key("end", i, name), float(heights[-1])
-    if abs(heights[0]) > NOTHING * size:
+    if begin == 0.0 and abs(heights[0]) > NOTHING * size:
         yield Key("begin", i, name), float(heights[0])
     if not np.ptp(heights) > NOTHING * size:
         return
@@ -91,27 +96,34 @@ def _of_landing(orbit: Pass, i: int) -> Iterable[tuple[Key, float]]:
 
 
 def _condition(orbit: Pass, transition: Transition, t: float, x: np.ndarray) -> float | None:
-    """The value of a transition's condition, if it is a number that may be zero."""
+    """The value of a transition's condition, if it has one."""
     if transition.guard.when is None:
         return None
     family = orbit.family
     variables = family.system.variables
     p = variables.parameter_view(family.vector(orbit.loop.values))
     value = transition.guard.when(np.float64(t), variables.state_view(x), p)
-    return None if isinstance(value, (bool, np.bool_)) else float(value)
+    # A comparison jumps between two values.
+    return (1.0 if value else -1.0) if isinstance(value, (bool, np.bool_)) else float(value)
 
 
-def heights_of(
-    orbit: Pass, i: int, transition: Transition, shares: np.ndarray | None = None
-) -> np.ndarray | None:
-    """A guard at shares ``(N,)`` of a stretch; None if it is not finite, or the stretch takes no time."""
-    flow, loop, family = orbit.flows[i], orbit.loop, orbit.family
-    if flow.arc is None:
+def heights_of(orbit: Pass, i: int, transition: Transition, shares: np.ndarray) -> np.ndarray | None:
+    """A guard at shares ``(N,)`` of a stretch; None if it is not finite, or the stretch takes no time.
+
+    Shares below 0 and above 1 lie in the stretches before and after, which take the same time.
+    """
+    loop, family, count = orbit.loop, orbit.family, len(orbit.flows)
+    if orbit.flows[i].arc is None:
         return None
-    if shares is None:
-        shares = np.linspace(0.0, 1.0, PLACES)
+    states = orbit.flows[i].at(shares)
+    for outside, other, shift in (
+        (shares < 0.0, (i - 1) % count, 1.0),
+        (shares > 1.0, (i + 1) % count, -1.0),
+    ):
+        if np.any(outside):
+            states[outside] = orbit.flows[other].at(shares[outside] + shift)
     begin, end = loop.times[i : i + 2]
-    states, times = flow.at(shares), begin + shares * (end - begin)
+    times = begin + shares * (end - begin)
     variables, values = family.system.variables, family.vector(loop.values)
     try:
         with np.errstate(all="ignore"):
@@ -135,7 +147,10 @@ def extremum(key: Key, orbit: Pass) -> tuple[float, float]:
     from scipy.optimize import minimize_scalar
 
     transition = _transition(orbit, key)
-    near = np.linspace(max(0.0, key.share - SAME), min(1.0, key.share + SAME), 33)
+    i = key.stretch
+    low = -2 * BESIDE if orbit.landings[i - 1] is None else 0.0
+    high = 1.0 + 2 * BESIDE if orbit.landings[i] is None else 1.0
+    near = np.linspace(max(low, key.share - SAME), min(high, key.share + SAME), 33)
     heights = heights_of(orbit, key.stretch, transition, near)
     if heights is None:
         return np.nan, np.nan
@@ -158,6 +173,21 @@ def extremum(key: Key, orbit: Pass) -> tuple[float, float]:
 def measure_of(key: Key) -> Callable[[Pass], float]:
     """One measure as a function of the orbit; nan where it has none."""
     return partial(_MEASURES[key.kind], key)
+
+
+def curve_measure_of(key: Key) -> Callable[[Pass], float]:
+    """One measure along a curve on which it is zero: an extremum may move along its stretch."""
+    return partial(_lowest, key) if key.kind == "top" else measure_of(key)
+
+
+def _lowest(key: Key, orbit: Pass) -> float:
+    """The extremum of a guard within a stretch that is nearest to zero; nan if there is none."""
+    found = [
+        height
+        for each, height in _of_guard(orbit, key.stretch, _transition(orbit, key))
+        if each.kind == "top"
+    ]
+    return min(found, key=abs, default=np.nan)
 
 
 def _speed(key: Key, orbit: Pass) -> float:

@@ -12,7 +12,8 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.family import ROUNDING, Family, Pass
+from hybrid.orbits.continuation.family import ROUNDING, Family
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, route_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
@@ -151,7 +152,7 @@ def zero_on_the_way(
 
 
 def interpolated_zero(
-    place: Place, measure: Callable[[Pass], float], bracket: tuple[float, float]
+    place: Place, measure: Callable[[Place], float], bracket: tuple[float, float]
 ) -> Place | None:
     """The place where a measure is zero, between two distances along the branch.
 
@@ -165,7 +166,7 @@ def interpolated_zero(
         places, heights = [], []
         for share in SHARES:
             made = place.step(np.array([centre + share * width]))
-            height = np.nan if made is None else measure(made[0].orbit)
+            height = np.nan if made is None else measure(made[0])
             if made is not None and np.isfinite(height):
                 places.append(made[0])
                 heights.append(height)
@@ -187,7 +188,9 @@ def interpolated_zero(
     if best is None or not error < LOOSE:
         return None
     orbit = best.family.around(best.orbit.loop)
-    return best if orbit is None else attrs.evolve(best, orbit=orbit)
+    found = best if orbit is None else attrs.evolve(best, orbit=orbit)
+    beside = high - low
+    return found if low - beside <= distance(place, found) <= high + beside else None
 
 
 def _at_zero(heights: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
@@ -219,7 +222,8 @@ def begun(family: Family, loop: Loop, sizes: np.ndarray) -> Place | None:
     units, k = first.units(sizes), len(sizes)
     fixed = np.eye(len(units))[-k:]
     try:
-        made = family.corrected(loop, first, units, fixed)
+        # At a fold there is none with the same parameters but for rounding.
+        made = family.corrected(loop, first, units, fixed) or family.corrected(loop, first, units)
     except ArgumentError:
         return None
     return None if made is None else place_of(made[0], fixed, sizes)

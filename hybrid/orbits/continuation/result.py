@@ -5,7 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.family import Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
 from hybrid.orbits.orbit import PeriodicOrbit

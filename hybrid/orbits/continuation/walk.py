@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
-from hybrid.orbits.continuation.family import Pass
 from hybrid.orbits.continuation.place import (
     Place,
     distance,
@@ -18,7 +17,8 @@ from hybrid.orbits.continuation.place import (
     refined,
     zero_between,
 )
-from hybrid.orbits.continuation.smooth import TESTS, halves, told
+from hybrid.orbits.continuation.route import Route
+from hybrid.orbits.continuation.smooth import TESTS, branch_point, halves, told
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
@@ -30,6 +30,10 @@ LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 NOTHING = 1e-12
+# Another branch crosses near a place where the equations are this near to singular; a step that ends there is
+# taken longer.
+CROSSED = 3e-3
+OVER = 1.5
 # A change of the route this near to the one before, in the range of the parameter, is the same one.
 SAME_CHANGE = 1e-7
 
@@ -46,7 +50,7 @@ class Event:
 
 def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
     """Places along a branch with the events between them; the last item is why it ends."""
-    length, start, passed = FIRST_STEP, place, np.nan
+    length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
     for _ in range(most):
         made = place.step(np.array([length]))
         if made is None:
@@ -55,6 +59,9 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
                 yield "lost"
                 return
             continue
+        if _is_crossed(made[0]) and not _is_crossed(place):
+            # So near to another branch that it may be on that one: the step goes over the place.
+            made = place.step(np.array([OVER * length])) or made
         after, corrections = made
         if not is_real(after.orbit):
             change = located(place, after)
@@ -66,20 +73,27 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
                 yield from _to_the_edge(place, last, low, high)
                 yield "range"
                 return
-            yield from _between(place, last)
+            near = SAME_CHANGE * float(place.sizes[0])
+            # Where a guard has no speed the parameter may stand still: that is no fold.
+            yield from (each for each in _between(place, last) if abs(each.place.value - last.value) > near)
             beyond = change.onward.place
-            again = abs(last.value - passed) < SAME_CHANGE * float(place.sizes[0])
+            met = (change.routes, last.value)
+            again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
             if not again:
                 yield Event(change.kind, last, change.told, change)
             if beyond is None or again:
                 yield change.kind
                 return
-            place, passed, length = beyond, last.value, min(length, FIRST_STEP)
+            passed.append(met)
+            place, length = beyond, min(length, FIRST_STEP)
             yield place
             continue
         if not low <= after.value <= high:
             yield from _to_the_edge(place, after, low, high)
             yield "range"
+            return
+        if _turned(place, after):
+            yield "equilibrium"
             return
         half = _halved(place, after)
         if half is not None:
@@ -100,6 +114,11 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
     yield "most"
 
 
+def _is_crossed(place: Place) -> bool:
+    """Whether another branch crosses here, to a few digits."""
+    return abs(branch_point(place)) < CROSSED
+
+
 def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterator[Place | Event]:
     edge = low if after.value < low else high
     last = zero_between(place, after, lambda each: each.value - edge)
@@ -110,15 +129,31 @@ def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterato
 
 def _between(place: Place, after: Place) -> Iterator[Event]:
     """The smooth bifurcations between two places."""
-    for kind, function in TESTS.items():
-        one, other = function(place), function(after)
-        # A function that is zero to rounding all along says nothing.
-        if not one * other < 0.0 or min(abs(one), abs(other)) < NOTHING:
-            continue
-        found = zero_between(place, after, function)
+    changed = [kind for kind, function in TESTS.items() if _changes(function(place), function(after))]
+    if "branch point" in changed and "fold" in changed:
+        # A branch that crosses another one at its turn, as the arms of a pitchfork do.
+        changed.remove("fold")
+    for kind in changed:
+        found = zero_between(place, after, TESTS[kind])
+        if found is None:
+            # The equations are singular there.
+            found = interpolated_zero(place, TESTS[kind], (0.0, distance(place, after)))
         message = "" if found is None else told(kind, found)
         if found is not None and message:
             yield Event(kind, found, message)
+
+
+def _changes(one: float, other: float) -> bool:
+    """Whether a function changes its sign; one that is zero to rounding all along says nothing."""
+    return one * other < 0.0 and min(abs(one), abs(other)) >= NOTHING
+
+
+def _turned(place: Place, after: Place) -> bool:
+    """Whether an autonomous orbit without jumps has passed a point: its field goes the other way."""
+    if place.family.forced or len(place.family.route) > 1 or place.family.route[0].fired:
+        return False
+    rates = [each.orbit.flows[0].first_rate / place.orbit.scale for each in (place, after)]
+    return bool(rates[0] @ rates[1] < 0.0)
 
 
 def _halved(place: Place, after: Place) -> Place | None:
@@ -127,8 +162,8 @@ def _halved(place: Place, after: Place) -> Place | None:
     if here is None or there is None or not here @ there < 0.0:
         return None
 
-    def along(orbit: Pass) -> float:
-        found = halves(orbit)
+    def along(each: Place) -> float:
+        found = halves(each.orbit)
         return 0.0 if found is None else float(here @ found)
 
     return interpolated_zero(place, along, (0.0, distance(place, after)))

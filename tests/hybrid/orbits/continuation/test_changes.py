@@ -247,3 +247,111 @@ def simulate_back(system, x, t, length, w):
     """The state of the free oscillator a while before."""
     forward = simulate(system, (0.0, 0.0), (t - length, t), parameters={"w": w, "d": 9.0}, tangent=True)
     return np.linalg.solve(forward.fundamental, np.asarray(x) - forward.x[-1])
+
+
+def test_a_branch_point_on_a_curved_branch():
+    """``u = g(b)`` and ``(u - g)^2 = b``: arms leave at ``b = 0``, the branch goes straight on."""
+
+    def g(b):
+        return 0.3 * np.sin(2 * b) + 0.5 * b**2 + 0.4
+
+    def law(t, x, p):
+        d = x.u - g(p.b)
+        return 0.0, x.u + 0.5 * d * (p.b - d**2), 0.3 * x.w + x.u
+
+    system = HybridSystem(
+        state=("s", "u", "w"),
+        parameters={"b": -0.5},
+        modes=[Mode("on", lambda t, x, p: (1.0, 0.0, 0.0))],
+        transitions=[Transition("on", "on", Guard(lambda t, x, p: x.s - 1.0, +1), Reset(law))],
+    )
+    orbit = periodic_orbit(system, (0.4, g(-0.5), g(-0.5) / 0.7), period=1.0)
+    branch = continue_orbit(orbit, "b", (-0.9, 0.9))
+    (point,) = branch.bifurcations
+    assert point.kind == "branch point"
+    assert point.value == pytest.approx(0.0, abs=1e-10)
+    np.testing.assert_allclose(branch.x0[:, 1], g(branch.parameter), atol=1e-9)
+    np.testing.assert_array_equal(branch.stable, branch.parameter < 0.0)
+    arm = switch_branch(point)
+    assert (arm.x0[1] - g(arm.parameters["b"])) ** 2 == pytest.approx(arm.parameters["b"], abs=1e-9)
+
+
+def test_jumps_of_one_instant_each_move_their_own_time():
+    """Two oscillators that do not know of each other have the multipliers of one, twice."""
+
+    def twice(field):
+        return lambda t, x, p: (*field(t, x.x, x.v, p), *field(t, x.y, x.u, p))
+
+    system = HybridSystem(
+        state=("x", "v", "y", "u"),
+        parameters={"w": 1.0},
+        modes=[Mode("m", twice(lambda t, x, v, p: (v, np.cos(p.w * t) - 0.1 * v - x)))],
+        transitions=[
+            Transition(
+                "m",
+                "m",
+                Guard(lambda t, x, p: x.x - 1.0, +1),
+                Reset(lambda t, x, p: {"v": -0.8 * x.v}),
+                name="one",
+            ),
+            Transition(
+                "m",
+                "m",
+                Guard(lambda t, x, p: x.y - 1.0, +1),
+                Reset(lambda t, x, p: {"u": -0.8 * x.u}),
+                name="other",
+            ),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    alone = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    branch = continue_orbit(periodic_orbit(system, (0.9, 1.0, 0.9, 1.0)), "w", (0.95, 1.05))
+    i = int(np.argmin(np.abs(branch.parameter - 1.0)))
+    found = sorted(branch.multipliers[i], key=lambda each: each.imag)
+    expected = sorted(np.repeat(alone.multipliers, 2), key=lambda each: each.imag)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.02, -0.02])
+def test_a_touch_at_phase_zero(shift):
+    """Nothing depends on where the phase of the forcing begins."""
+    delay = np.arctan2(0.1 * np.sqrt(1.99), 1.0 - 1.99) + shift
+    system = HybridSystem(
+        state=("x", "v"),
+        parameters={"w": 1.9},
+        modes=[Mode("m", lambda t, x, p: (x.v, np.cos(p.w * t + delay) - 0.1 * x.v - x.x))],
+        transitions=[
+            Transition(
+                "m", "m", Guard(lambda t, x, p: x.x - 1.0, +1), Reset(lambda t, x, p: {"v": -0.8 * x.v})
+            )
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    branch = continue_orbit(periodic_orbit(system, (0.3, 0.0)), "w", (1.2, 2.0))
+    grazing = next(each for each in branch.bifurcations if each.kind == "grazing")
+    assert grazing.value == pytest.approx(np.sqrt(1.99), abs=1e-10)
+
+
+def test_a_compliant_stop_is_touched_alike_from_both_sides():
+    """``hypot(k1 - w^2, c w) = A`` for a gap of 1, in the bilinear oscillator with its stop at 1."""
+    system = HybridSystem(
+        state=("x", "v"),
+        parameters={"A": 1.0},
+        modes=[
+            Mode("free", lambda t, x, p: (x.v, p.A * np.cos(1.6 * t) - 0.1 * x.v - x.x)),
+            Mode("held", lambda t, x, p: (x.v, p.A * np.cos(1.6 * t) - 0.1 * x.v - x.x - 9.0 * (x.x - 1.0))),
+        ],
+        transitions=[
+            Transition("free", "held", Guard(lambda t, x, p: x.x - 1.0, +1)),
+            Transition("held", "free", Guard(lambda t, x, p: x.x - 1.0, -1)),
+        ],
+        period=2 * np.pi / 1.6,
+    )
+    exact = np.hypot(1 - 1.6**2, 0.16)
+    for A, mode in ((1.2, "free"), (1.7, "free")):
+        orbit = settled(system, (0.0, 0.0), 200, mode=mode, A=A)
+        branch = continue_orbit(orbit, "A", (1.1, 1.8))
+        assert branch.status.ok
+        (grazing,) = (each for each in branch.bifurcations if each.kind == "grazing")
+        assert grazing.value == pytest.approx(exact, abs=1e-9)
+        assert {orbit.transitions for orbit in branch.orbits} >= {()}

@@ -155,8 +155,8 @@ def test_what_folds_and_flips_begin():
     fold, flip = sorted(continue_orbit(orbit, "a", (-1.0, 1.0)).bifurcations, key=lambda each: each.value)
     assert fold.coefficient == pytest.approx(0.25, rel=1e-4)
     assert "on the side of larger a" in fold.message
-    # The size of u is that of the first orbit, which is larger.
-    assert flip.coefficient == pytest.approx(0.75**2 * (np.sqrt(3.0) - 1.0) ** 2, rel=1e-2)
+    # u = 2 / 3 there.
+    assert flip.coefficient == pytest.approx(0.25, rel=1e-2)
     assert "stable, on the side of larger a" in flip.message
 
 

@@ -1,0 +1,284 @@
+"""One pass around an orbit: the equations stretch by stretch, their derivatives, and the tangent maps."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.orbits.continuation.route import Loop
+from hybrid.orbits.periodic_schur import product_eigenvalues
+from hybrid.simulation.arc import HybridArc
+
+# The gap of each equation counts as closed at this share of the sizes.
+CLOSED = 1e-10
+# Places of a stretch at which the size of the states is taken.
+LOOKED_AT = 17
+# Eigenvalues of one matrix are wrong by its norm times rounding; above this they come from its factors.
+BLURRED = 1e-9
+
+
+@attrs.frozen(eq=False)
+class Flow:
+    """One stretch of an orbit.
+
+    Attributes
+    ----------
+    arc
+        The run of the extended system, whose last components are the parameters; None if it takes no time.
+    end
+        State ``(n,)`` at the end, before the jump.
+    slopes
+        Derivatives ``(n, n + k)`` of that in the start and the parameters, at fixed times.
+    first_rate, last_rate
+        The field ``(n,)`` at the two ends.
+    """
+
+    arc: HybridArc | None
+    end: np.ndarray
+    slopes: np.ndarray
+    first_rate: np.ndarray
+    last_rate: np.ndarray
+
+    def at(self, shares: np.ndarray) -> np.ndarray:
+        """States ``(N, n)`` at shares ``(N,)`` of the time."""
+        if self.arc is None:
+            return np.tile(self.end, (len(shares), 1))
+        begin, end = self.arc.t[0], self.arc.t[-1]
+        times = np.clip(begin + shares * (end - begin), begin, end)
+        return np.asarray(self.arc(times)[:, : len(self.end)])
+
+
+@attrs.frozen(eq=False)
+class Landing:
+    """What the jumps at the end of a stretch do.
+
+    Attributes
+    ----------
+    after
+        State ``(n,)`` after them.
+    slopes
+        Derivatives ``(n, n + k + 1)`` of that in the state before, the parameters and the time.
+    height, gradient
+        The guard of the first of them, and its derivatives ``(n + k + 1,)`` in the same.
+    parts
+        The jumps as those that move by themselves: each with what a jump sets off at its instant, as the
+        derivatives ``(n, n + k + 1)`` of the state after in that before, the gradient of its guard, and the
+        field after it ``(n,)``, None after the last.
+    """
+
+    after: np.ndarray
+    slopes: np.ndarray
+    height: float
+    gradient: np.ndarray
+    parts: tuple[tuple[np.ndarray, np.ndarray, np.ndarray | None], ...]
+
+
+@attrs.frozen(eq=False)
+class Pass:
+    """One pass around an orbit, or near one: where its stretches end, and how that depends on unknowns."""
+
+    family: Any
+    loop: Loop
+    flows: tuple[Flow, ...]
+    landings: tuple[Landing | None, ...]
+    _derivatives: dict[tuple[float, ...], np.ndarray] = attrs.field(factory=dict, init=False)
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """Sizes ``(n,)`` of the components along the orbit, or along the first one if these are larger."""
+        sizes = np.maximum(self.own_scale, self.family.least)
+        return np.where(sizes > 0.0, sizes, 1.0)
+
+    @cached_property
+    def own_scale(self) -> np.ndarray:
+        """Largest absolute values ``(n,)`` of the components along the orbit."""
+        shares = np.linspace(0.0, 1.0, LOOKED_AT)
+        states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
+        return np.asarray(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0))
+
+    def units(self, sizes: np.ndarray) -> np.ndarray:
+        """Units of the unknowns, for parameters of the ``sizes (k,)``.
+
+        The states and times of many stretches count as much together as those of one.
+        """
+        count = len(self.flows)
+        share = np.sqrt(count)
+        return np.concatenate(
+            [np.tile(share * self.scale, count), np.full(count + 1, share * self._span), sizes]
+        )
+
+    def derivatives(self, sizes: np.ndarray) -> np.ndarray:
+        """Derivatives ``(m, m + k)`` of the scaled equations here, made once for these sizes."""
+        key = tuple(sizes)
+        if key not in self._derivatives:
+            self._derivatives[key] = self.equations(self, self.units(sizes))[0]
+        return self._derivatives[key]
+
+    @property
+    def _span(self) -> float:
+        return abs(self.loop.period) or 1.0
+
+    @cached_property
+    def saltations(self) -> list[np.ndarray]:
+        """The saltation matrix ``(n, n)`` of the jumps at the end of each stretch, or the identity."""
+        n, found = self.loop.x.shape[1], []
+        for i, (flow, landing) in enumerate(zip(self.flows, self.landings, strict=True)):
+            if landing is None:
+                found.append(np.eye(n))
+                continue
+            product, before = np.eye(n), flow.last_rate
+            for moved, gradient, rate in landing.parts:
+                after = self.flows[(i + 1) % len(self.flows)].first_rate if rate is None else rate
+                late = after - moved[:, :n] @ before - moved[:, -1]
+                with np.errstate(all="ignore"):
+                    speed = gradient[:n] @ before + gradient[-1]
+                    product = (moved[:, :n] + np.outer(late, gradient[:n]) / speed) @ product
+                before = after
+            found.append(product)
+        return found
+
+    @cached_property
+    def maps(self) -> list[np.ndarray]:
+        """The tangent map ``(n, n)`` of each stretch and the jumps at its end, at fixed times."""
+        n = self.loop.x.shape[1]
+        pairs = zip(self.saltations, self.flows, strict=True)
+        found = [saltation @ flow.slopes[:, :n] for saltation, flow in pairs]
+        if all(landing is None for landing in self.landings):
+            found[-1] = self._onto_its_surface() @ found[-1]
+        return found
+
+    def _onto_its_surface(self) -> np.ndarray:
+        """The projection ``(n, n)`` onto the surface that an orbit without jumps stays on; else the identity.
+
+        Other orbits come to such a surface by a jump, which forgets how far they were from it.
+        """
+        family, loop, n = self.family, self.loop, self.loop.x.shape[1]
+        mode, t = family.route[0].mode, float(loop.times[0])
+        across = []
+        for transition in family.system.transitions:
+            if transition.target != mode or transition.source == mode:
+                continue
+            gradient = family.gradient(transition.name, t, loop.x[0], loop.values)
+            height = family.height(transition.name, t, loop.x[0], loop.values)
+            terms = np.append(gradient[:n] * self.flows[0].first_rate, gradient[-1])
+            near = abs(height) <= CLOSED * float(np.abs(gradient[:n]) @ self.scale)
+            if near and abs(terms.sum()) <= CLOSED * np.abs(terms).sum():
+                across.append(gradient[:n])
+        if not across:
+            return np.eye(n)
+        normals = np.linalg.svd(np.array(across))[2][: np.linalg.matrix_rank(np.array(across))]
+        return np.asarray(np.eye(n) - normals.T @ normals)
+
+    @cached_property
+    def multipliers(self) -> np.ndarray:
+        """Floquet multipliers ``(n,)``, largest first; nan where a guard is touched."""
+        product = np.eye(self.loop.x.shape[1])
+        for each in self.maps:
+            product = each @ product
+        if not np.all(np.isfinite(product)):
+            return np.full(len(product), np.nan, dtype=complex)
+        if len(self.maps) > 1 and np.finfo(float).eps * np.linalg.norm(product) > BLURRED:
+            values = product_eigenvalues(self.maps, set()).values
+        else:
+            values = np.linalg.eigvals(product)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    @property
+    def free_multipliers(self) -> np.ndarray:
+        """Multipliers without the one along an autonomous orbit."""
+        values = self.multipliers
+        if self.family.forced:
+            return values
+        return np.delete(values, int(np.argmin(np.abs(values - 1.0))))
+
+    def speed(self, i: int, rate: np.ndarray | None = None) -> float:
+        """Speed of the guard at the end of a stretch, along the field there or another rate ``(n,)``."""
+        landing, n = self.landings[i], self.loop.x.shape[1]
+        assert landing is not None
+        along = self.flows[i].last_rate if rate is None else rate
+        return float(landing.gradient[:n] @ along + landing.gradient[-1])
+
+    def fires_in_direction(self, i: int) -> bool:
+        """Whether the guard at the end of a stretch, if there is one, is crossed in its direction."""
+        stretch, system = self.family.route[i], self.family.system
+        if not stretch.fired:
+            return True
+        transition = system.transitions[system.transition_index(stretch.fired[0])]
+        return float(transition.guard.direction) * self.speed(i) >= 0.0
+
+    def equations(self, anchor: Pass, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled equations: derivatives ``(m, m + k)`` in the scaled unknowns, and values ``(m,)``.
+
+        ``anchor`` is the orbit before: sizes are those there, and the phase of an autonomous orbit without
+        jumps.
+        """
+        count, n = self.loop.x.shape
+        k = len(self.loop.values)
+        first, last = count * n, count * n + count + 1
+        matrix, values = np.zeros((last, last + k)), np.zeros(last)
+        for i, (flow, landing) in enumerate(zip(self.flows, self.landings, strict=True)):
+            # How the end depends on all unknowns.
+            end = np.zeros((n, last + k))
+            end[:, i * n : (i + 1) * n], end[:, last:] = flow.slopes[:, :n], flow.slopes[:, n:]
+            end[:, first + i] -= flow.slopes[:, :n] @ flow.first_rate
+            end[:, first + i + 1] += flow.last_rate
+            rows, after = slice(i * n, (i + 1) * n), slice((i + 1) % count * n, ((i + 1) % count + 1) * n)
+            if landing is None:
+                matrix[rows], values[rows] = end, flow.end
+                self._join(i, matrix[first + i], values, first)
+            else:
+                matrix[rows], values[rows] = landing.slopes[:, :n] @ end, landing.after
+                matrix[rows, last:] += landing.slopes[:, n:-1]
+                matrix[rows, first + i + 1] += landing.slopes[:, -1]
+                row = landing.gradient[:n] @ end
+                row[last:] += landing.gradient[n:-1]
+                row[first + i + 1] += landing.gradient[-1]
+                matrix[first + i], values[first + i] = row, landing.height
+            matrix[rows, after] -= np.eye(n)
+            values[rows] -= self.loop.x[(i + 1) % count]
+        self._close(anchor, matrix[-1], values, first)
+        matrix *= units
+        sizes = np.concatenate([np.tile(anchor.scale, count), np.abs(matrix[first:]).max(axis=1)])
+        sizes[sizes == 0.0] = 1.0
+        return matrix / sizes[:, None], values / sizes
+
+    def _join(self, i: int, row: np.ndarray, values: np.ndarray, first: int) -> None:
+        """A stretch that goes on smoothly ends at its share of the time between two jumps."""
+        count, times = len(self.flows), self.loop.times
+        if all(landing is None for landing in self.landings):
+            begin, end = 0, count
+            if i == count - 1:
+                # The time of the start stays. The last equation fixes the phase of an autonomous orbit.
+                row[first] = 1.0
+                return
+        else:
+            begin = i
+            while begin > 0 and self.landings[begin - 1] is None:
+                begin -= 1
+            end = i + 1
+            while self.landings[end - 1] is None:
+                end += 1
+        share = (i + 1 - begin) / (end - begin)
+        row[first + i + 1] += 1.0
+        row[first + begin] -= 1.0 - share
+        row[first + end] -= share
+        values[first + i] = times[i + 1] - (1.0 - share) * times[begin] - share * times[end]
+
+    def _close(self, anchor: Pass, row: np.ndarray, values: np.ndarray, first: int) -> None:
+        """The last equation: the period is that of the forcing, or the time of the start is fixed."""
+        loop, family, k = self.loop, self.family, len(self.loop.values)
+        jumps = any(landing is not None for landing in self.landings)
+        if family.forced:
+            row[-k - 1], row[first] = 1.0, -1.0
+            row[-k:] = -family.slopes_of_period(loop.values)
+            values[-1] = loop.period - family.period(loop.values)
+        elif jumps:
+            row[first], values[-1] = 1.0, loop.times[0] - anchor.loop.times[0]
+        else:
+            n = loop.x.shape[1]
+            across = anchor.flows[0].first_rate / anchor.scale**2
+            row[:n] = across
+            values[-1] = across @ (loop.x[0] - anchor.loop.x[0])
