@@ -15,6 +15,8 @@ from hybrid.status import SUCCESS
 from tests.cases import systems
 from tests.reference.impacts import ImpactOscillator
 
+BALL, OSCILLATOR, IMPACTS = models.bouncing_ball(), models.solvable_oscillator(), models.impact_oscillator()
+
 
 def bouncing_ball(rng):
     """Bounces up to a random share, 30 to 80 %, of the time at which they accumulate."""
@@ -31,7 +33,7 @@ def bouncing_ball(rng):
         s = end - t
         exact = times, (q + v * s - g * s**2 / 2, v - g * s)
     run = {"x0": (h, 0.0), "t_span": (0.0, end), "parameters": {"g": g, "e": e}}
-    return models.bouncing_ball(), run, exact
+    return BALL, run, exact
 
 
 def solvable_oscillator(rng, span=10):
@@ -48,7 +50,7 @@ def solvable_oscillator(rng, span=10):
         grown = (u - sign) * mp.exp(rate / 4)
         exact = times, (sign - grown * rate / w, -grown * (w + rate**2 / w))
     run = {"x0": (u0, 0.0), "t_span": (0.0, span + 0.25), "mode": "plus", "parameters": {"b": b}}
-    return models.solvable_oscillator(), run, exact
+    return OSCILLATOR, run, exact
 
 
 @functools.cache
@@ -62,7 +64,7 @@ def impact_oscillator(rng):
     x0 = [(-0.8, 0.3), (0.1, -0.9), (0.6, 0.6), (-0.2, 0.5)][rng.integers(4)]
     exact = flight(*x0)
     run = {"x0": x0, "t_span": (0.0, exact["t_end"])}
-    return models.impact_oscillator(), run, (exact["t"], exact["x_end"])
+    return IMPACTS, run, (exact["t"], exact["x_end"])
 
 
 def shares(case, solver, count):

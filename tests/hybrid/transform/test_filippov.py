@@ -1,5 +1,6 @@
 """Filippov systems with exact answers: crossing, sliding, tangencies, moving surfaces."""
 
+import functools
 import json
 import math
 import subprocess
@@ -371,6 +372,7 @@ class TestModel:
         assert json.loads(result.stdout) is False
 
 
+@functools.cache
 def in_units(state, time):
     """The relay and the block in other units of length and time."""
     relay = planar(

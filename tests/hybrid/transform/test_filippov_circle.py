@@ -6,19 +6,19 @@ import pytest
 from hybrid import DOP853, RadauIIA, Taylor, Tsit5, filippov, simulate
 
 SOLVERS = (Taylor(), DOP853(), Tsit5(), RadauIIA())
+SYSTEM = filippov(
+    ("x", "y"),
+    {},
+    lambda t, x, p: (x.x - x.y, x.x + x.y),
+    lambda t, x, p: (-x.x - x.y, x.x - x.y),
+    lambda t, x, p: x.x**2 + x.y**2 - 1,
+)
 
 
 @pytest.mark.parametrize("solver", SOLVERS, ids=repr)
 @pytest.mark.parametrize("end", [1.2, 2.0, 20.0])
 def test_the_derivative_of_a_motion_that_slides_along_a_circle(solver, end):
-    system = filippov(
-        ("x", "y"),
-        {},
-        lambda t, x, p: (x.x - x.y, x.x + x.y),
-        lambda t, x, p: (-x.x - x.y, x.x - x.y),
-        lambda t, x, p: x.x**2 + x.y**2 - 1,
-    )
-    arc = simulate(system, (0.3, 0.1), (0.0, end), solver=solver, tangent=True)
+    arc = simulate(SYSTEM, (0.3, 0.1), (0.0, end), solver=solver, tangent=True)
     angle = np.arctan2(0.1, 0.3) + end
     turned = np.array([-np.sin(angle), np.cos(angle)])
     assert arc.status.ok

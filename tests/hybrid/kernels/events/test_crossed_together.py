@@ -1,6 +1,7 @@
 """Guards that the flow reaches almost together: each fires once, at its own zero."""
 
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ def swing(t, x, p):
     return x.v, -2 * np.sin(x.q), 0.3 * np.cos(x.q) - 0.2 * x.z
 
 
+@cache
 def modes_of_subsets(kinds):
     """A mode for each set of guards crossed so far; every guard falls along ``swing``."""
     subsets = [s for size in range(len(kinds) + 1) for s in itertools.combinations(range(len(kinds)), size)]
@@ -48,14 +50,22 @@ def modes_of_subsets(kinds):
     )
 
 
+PLAIN = HybridSystem(state=("q", "v", "z"), modes=[Mode("swing", swing)])
+
+
 def levels(kinds, rng):
     """A start, and levels that the guards reach within 1e-16 to 1e-5 of one instant."""
-    plain = HybridSystem(state=("q", "v", "z"), modes=[Mode("swing", swing)])
     start = (rng.uniform(0.5, 1.5), 0.0, 0.0)
-    arc = simulate(plain, start, (0.0, rng.uniform(0.3, 0.9)), solver=DOP853(rtol=1e-13, atol=1e-15))
+    arc = simulate(PLAIN, start, (0.0, rng.uniform(0.3, 0.9)), solver=DOP853(rtol=1e-13, atol=1e-15))
     there = type("State", (), dict(zip("qvz", arc.x[-1], strict=True)))
     apart = rng.choice([-1.0, 0.0, 1.0], size=len(kinds)) * 10 ** rng.uniform(-16, -5, size=len(kinds))
     return start, {f"c{i}": VALUES[kind](arc.t[-1], there) + apart[i] for i, kind in enumerate(kinds)}
+
+
+@cache
+def drawn(kinds):
+    rng = np.random.default_rng(7)
+    return [levels(kinds, rng) for _ in range(25)]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -63,9 +73,8 @@ def levels(kinds, rng):
     "kinds", [("q", "v"), ("falling time", "v"), ("product", "bent"), ("q", "v", "falling time", "bent")]
 )
 def test_each_guard_fires_once(kinds, method):
-    system, rng = modes_of_subsets(kinds), np.random.default_rng(7)
-    for _ in range(25):
-        start, parameters = levels(kinds, rng)
+    system = modes_of_subsets(kinds)
+    for start, parameters in drawn(kinds):
         arc = simulate(
             system, start, (0.0, 1.0), mode="crossed ", parameters=parameters, solver=METHODS[method]
         )

@@ -1,5 +1,6 @@
 """Guards that jump or have gaps, each watched in both directions: every change of side fires once."""
 
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -61,27 +62,36 @@ def changes(guard, a, b, start):
     return when[sign[at + 1] > 0], when[sign[at + 1] < 0]
 
 
+@cache
+def with_and_without_reset(guard):
+    return both_ways(guard), both_ways(guard, Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0)))
+
+
+@cache
+def runs(guard, seed=4, count=12, least=0.5, most=3.0):
+    """Parameters and starts, with the changes that are known there."""
+    rng, found = np.random.default_rng(seed), []
+    for _ in range(count):
+        a, b = float(rng.uniform(least, most)), float(rng.uniform(-0.8, 0.8))
+        start = tuple(map(float, rng.uniform(-1.2, 1.2, 2)))
+        wanted = changes(guard, a, b, start)
+        if wanted is not None:
+            found.append((a, b, start, wanted))
+    return found
+
+
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 @pytest.mark.parametrize("guard", [*JUMPING.values(), *GAPS.values()], ids=[*JUMPING, *GAPS])
 def test_each_change_of_side_fires_once(guard, solver):
-    rng = np.random.default_rng(4)
-    systems = both_ways(guard), both_ways(guard, Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0)))
-    compared = 0
-    for _ in range(12):
-        a, b = float(rng.uniform(0.5, 3.0)), float(rng.uniform(-0.8, 0.8))
-        start = tuple(map(float, rng.uniform(-1.2, 1.2, 2)))
-        wanted = changes(guard, a, b, start)
-        if wanted is None:
-            continue
-        compared += 1
-        for system in systems:
+    assert runs(guard)
+    for a, b, start, wanted in runs(guard):
+        for system in with_and_without_reset(guard):
             arc = simulate(system, (*start, 0.0), (0.0, END), parameters={"a": a, "b": b}, solver=solver)
             assert arc.status.ok
             for name, times in zip(("up", "down"), wanted, strict=True):
                 found = [jump.t for jump in arc.jumps if jump.transition == name]
                 assert len(found) == len(times), (name, a, b, start)
                 assert np.allclose(found, times, rtol=0, atol=2e-4), (name, a, b, start)
-    assert compared > 0
 
 
 @pytest.mark.parametrize("solver", ["Taylor", "DOP853"])
@@ -229,6 +239,19 @@ AMID = {
 }
 
 
+@cache
+def beside_another(guard):
+    other = Guard(lambda t, x, p: (x.q - 0.3) * (x.v + 0.1))
+    count = Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0))
+    system = both_ways(guard)
+    return HybridSystem(
+        state=system.state,
+        parameters=system.parameters,
+        modes=system.modes,
+        transitions=[*system.transitions, Transition("swing", "swing", other, count, name="other")],
+    )
+
+
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 @pytest.mark.parametrize("guard", AMID.values(), ids=AMID)
 def test_a_guard_that_is_zero_amid_its_jump_fires_once(guard, solver):
@@ -236,22 +259,9 @@ def test_a_guard_that_is_zero_amid_its_jump_fires_once(guard, solver):
 
     Another guard ends a step soon after.
     """
-    other = Guard(lambda t, x, p: (x.q - 0.3) * (x.v + 0.1))
-    count = Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0))
-    system = both_ways(guard)
-    system = HybridSystem(
-        state=system.state,
-        parameters=system.parameters,
-        modes=system.modes,
-        transitions=[*system.transitions, Transition("swing", "swing", other, count, name="other")],
-    )
-    rng, compared = np.random.default_rng(8), 0
-    for _ in range(40):
-        a, b = float(rng.uniform(0.6, 1.4)), float(rng.uniform(-0.8, 0.8))
-        start = tuple(map(float, rng.uniform(-1.2, 1.2, 2)))
-        wanted = changes(guard, a, b, start)
-        if wanted is None:
-            continue
+    system, known = beside_another(guard), runs(guard, 8, 40, 0.6, 1.4)
+    assert len(known) > 10
+    for a, b, start, wanted in known:
         arc = simulate(
             system, (*start, 0.0), (0.0, END), mode="swing", parameters={"a": a, "b": b}, solver=solver
         )
@@ -260,5 +270,3 @@ def test_a_guard_that_is_zero_amid_its_jump_fires_once(guard, solver):
             found = [jump.t for jump in arc.jumps if jump.transition == name]
             assert len(found) == len(times), (a, b, start, name)
             np.testing.assert_allclose(found, times, rtol=0, atol=2e-4)
-        compared += 1
-    assert compared > 10

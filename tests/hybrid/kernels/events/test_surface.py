@@ -52,6 +52,7 @@ SURFACES = {
 }
 
 
+@cache
 def machine(place, form=lambda e, t, x: e):
     impact = Reset(lambda t, x, p: (x.q, -0.8 * x.v + 0.05 * x.z, x.z + 0.1 * x.q))
     return HybridSystem(
