@@ -21,6 +21,8 @@ BALL = models.bouncing_ball()
         lambda **options: hybrid.periodic_orbit(BALL, (1.0, 0.0), **options),
         lambda **options: hybrid.stroboscopic_section(BALL, (1.0, 0.0), periods=1, **options),
         lambda **options: lyapunov.lyapunov_spectrum(BALL, (1.0, 0.0), **options),
+        lambda **options: lyapunov.covariant_vectors(BALL, (1.0, 0.0), **options),
+        lambda **options: lyapunov.finite_time_exponents(BALL, (1.0, 0.0), **options),
         lambda **options: lyapunov.two_orbit_exponents(BALL, (1.0, 0.0), **options),
         lambda **options: lyapunov.chart(BALL, {"e": [0.8]}, (1.0, 0.0), **options),
     ],

@@ -88,6 +88,8 @@ NOT_CALLED = {
     "Section",
     "WorkPrecision",
     "LyapunovSpectrum",
+    "CovariantVectors",
+    "ZeroOneTest",
     "ModelComparison",
     "TwoOrbitExponents",
     "Case",

@@ -231,5 +231,22 @@ def runs(made):
                 "points": [None, "a", 3, [], [1], ["a"], [{"nope": 1.0}], [{"c": "1"}]],
             },
         ),
+        (call(lyapunov.covariant_vectors, *start, intervals=5, transient=2), EXPONENTS),
+        (
+            call(lyapunov.finite_time_exponents, *start),
+            {
+                **{name: EXPONENTS[name] for name in ("system", "mode", "parameters", "solver", "t0")},
+                "x0": [*NUMBERS, (0.5,), 0.5, [[0.5]], (math.nan, 0.0), [(math.nan, 0.0)], {"x": 1.0}, Odd()],
+                "interval": EXPONENTS["interval"],
+            },
+        ),
+        (
+            call(lyapunov.kaplan_yorke_dimension, [0.1, -0.2]),
+            {"exponents": [*NUMBERS, 0.5, [], [[0.1, 0.2]], [math.nan], [math.inf, -1.0]]},
+        ),
+        (
+            call(lyapunov.zero_one_test, [0.0, 1.0] * 50),
+            {"series": [*NUMBERS, 0.5, [0.1, 0.2], [math.nan] * 200], "frequencies": [0, *COUNT]},
+        ),
         (call(lyapunov.floquet_exponents, made["orbit"]), {"orbit": [None, "a", 3, OSCILLATOR, Odd()]}),
     ]

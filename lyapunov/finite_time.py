@@ -1,0 +1,119 @@
+"""Finite-time Lyapunov exponents: growth from a start over a given time, through jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hybrid import ArgumentError, HybridSystem, arguments
+from hybrid.errors import HybridError
+from hybrid.kernels.types import codes
+from hybrid.orbits.factors import fundamental_factors
+from hybrid.orbits.periodic_schur import product_eigenvalues
+from hybrid.simulation.trajectory import start
+from hybrid.solvers import Solver
+from hybrid.system.graph import as_system
+from hybrid.system.growth import growing
+from lyapunov.spectrum import interval_length
+
+STARTS = "be a state (n,) or states of shape (N, n)"
+
+
+@growing
+def finite_time_exponents(
+    system: HybridSystem,
+    x0: ArrayLike,
+    *,
+    interval: float | None = None,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    t0: float = 0.0,
+    solver: Solver | None = None,
+) -> np.ndarray:
+    r"""Growth rates over a time from a start, or from many.
+
+    .. math:: \lambda_i(x_0, T) = \frac{1}{T} \ln \sigma_i\big(\Phi(t_0 + T, t_0)\big)
+
+    with the singular values :math:`\sigma_i` of the fundamental matrix, in which each jump has its saltation
+    matrix. The matrix is kept as a product of well-conditioned factors, so each exponent has its own relative
+    accuracy, however far the others are. Singular values depend on the units of the states; the limit of
+    :math:`\lambda_i` for long times does not.
+
+    Parameters
+    ----------
+    system, mode, parameters, t0, solver
+        As for :func:`hybrid.simulate`.
+    x0
+        A start ``(n,)``, or starts ``(N, n)``.
+    interval
+        The time :math:`T`; by default as for :func:`lyapunov.lyapunov_spectrum`.
+
+    Returns
+    -------
+    (n,) or (N, n) array
+        Largest first, in inverse units of time. Minus infinity for a direction that a jump annihilates; nan
+        for a start whose run does not reach its end, or that no mode allows.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    References
+    ----------
+    S. C. Shadden, F. Lekien, J. E. Marsden, Physica D 212 (2005) 271, equation (8),
+    doi:10.1016/j.physd.2005.10.007.
+
+    Examples
+    --------
+    >>> import models
+    >>> finite_time_exponents(models.bouncing_ball(), (1.0, 0.0), interval=0.1).round(3)
+    array([ 0.5, -0.5])
+    """
+    as_system("system", system)
+    starts = arguments.numbers("x0", x0, STARTS)
+    if starts.ndim == 1:
+        return _exponents(system, starts, interval, mode, parameters, t0, solver)
+    if starts.ndim != 2 or starts.shape[1] != system.dimension:
+        raise ArgumentError(f"x0 must {STARTS}, here n = {system.dimension}; got shape {starts.shape}.")
+    bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
+    if bad.size:
+        raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {starts[bad[0]].tolist()}.")
+    found = np.full(starts.shape, np.nan)
+    failures = []
+    for i, each in enumerate(starts):
+        try:
+            found[i] = _exponents(system, each, interval, mode, parameters, t0, solver)
+        except HybridError as failure:
+            failures.append(failure)
+    if len(failures) == len(starts) and failures:
+        # Not one start is at fault, but another argument.
+        raise failures[0]
+    return found
+
+
+def _exponents(
+    system: HybridSystem,
+    x0: np.ndarray,
+    interval: float | None,
+    mode: str | None,
+    parameters: Mapping[str, float] | None,
+    t0: float,
+    solver: Solver | None,
+) -> np.ndarray:
+    n = system.dimension
+    trajectory = start(
+        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=np.eye(n), time="t0"
+    )
+    length = interval_length(trajectory, interval, 1)
+    factors = fundamental_factors(trajectory, trajectory.t + length, np.ones(n))
+    whole = factors.code == codes.DONE
+    if not whole or not all(np.all(np.isfinite(each)) for each in factors.matrices):
+        return np.full(n, np.nan)
+    # The squares of the singular values are the eigenvalues of the transposed matrix times the matrix.
+    count = len(factors.matrices)
+    product = [*factors.matrices, *(each.T for each in reversed(factors.matrices))]
+    singular = [*factors.singular, *(2 * count - 1 - i for i in factors.singular)]
+    return product_eigenvalues(product, singular).log_moduli / (2 * length)
