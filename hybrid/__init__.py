@@ -10,6 +10,10 @@ from typing import Any
 from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
+from hybrid.attractors.attractor import Attractor, Attractors
+from hybrid.attractors.attractors import attractors
+from hybrid.attractors.basins import basins
+from hybrid.attractors.fractions import basin_fractions
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.continuation.branch import Bifurcation, Branch
 from hybrid.continuation.continue_orbit import continue_orbit
@@ -39,6 +43,8 @@ __all__ = [
     "DOP853",
     "Answer",
     "ArgumentError",
+    "Attractor",
+    "Attractors",
     "Bifurcation",
     "Branch",
     "CompiledSystem",
@@ -63,6 +69,9 @@ __all__ = [
     "Transition",
     "Tsit5",
     "WorkPrecision",
+    "attractors",
+    "basin_fractions",
+    "basins",
     "compile_system",
     "continue_orbit",
     "filippov",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import HybridSystem, Status, arguments
+from hybrid.accuracy.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.display.progress import progress_bar
 from hybrid.display.tables import counted
 from hybrid.orbits.triangles import Interval, Triangles
@@ -19,7 +20,6 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
 from lyapunov.spectrum import first_vectors, interval_length
-from lyapunov.statistics import TaperedMean, standard_error, taper_inflation
 
 if TYPE_CHECKING:
     import xarray

@@ -57,6 +57,8 @@ def made():
         "ends": hybrid.simulate_many(BALL, [(1.0, 0.0), (2.0, 0.0)], (0.0, 0.1)),
         "error": hybrid.global_error(BALL, (1.0, 0.0), (0.0, 0.1)),
         "swept": hybrid.sweep(lambda point: {"square": point["a"] ** 2}, {"a": [1.0, 2.0]}),
+        "basins": hybrid.basins(OSCILLATOR, {"x": [-1.0, 0.0], "v": [0.0, 1.0]}),
+        "fractions": hybrid.basin_fractions(OSCILLATOR, {"x": (-1.0, 0.0), "v": 0.0}, starts=3),
         "two": lyapunov.two_orbit_exponents(OSCILLATOR, (0.0, 0.0), intervals=5),
         "spectrum": lyapunov.lyapunov_spectrum(OSCILLATOR, (0.0, 0.0), intervals=5),
     }
@@ -89,6 +91,8 @@ NOT_CALLED = {
     "WorkPrecision",
     "LyapunovSpectrum",
     "CovariantVectors",
+    "Attractor",
+    "Attractors",
     "ZeroOneTest",
     "ModelComparison",
     "TwoOrbitExponents",
