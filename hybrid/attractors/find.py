@@ -34,18 +34,18 @@ class Found:
     attractor: Attractor
     radius: np.ndarray
 
-    def near(self, states: np.ndarray, mode: np.ndarray) -> np.ndarray:
-        """Which states ``(N, n)`` in these modes ``(N,)`` are near a point."""
+    def distances(self, states: np.ndarray, mode: np.ndarray) -> np.ndarray:
+        """How far states ``(N, n)`` in these modes ``(N,)`` are from the points, in radii."""
         # SciPy's spatial algorithms take long to import.
         from scipy.spatial import cKDTree
 
-        inside = np.zeros(len(states), dtype=bool)
+        far = np.full(len(states), np.inf)
         for name in np.unique(mode):
             own, theirs = self.attractor.mode == name, mode == name
             if own.any():
                 tree = cKDTree(self.attractor.points[own] / self.radius)
-                inside[theirs] = tree.query(states[theirs] / self.radius, p=np.inf)[0] <= 1.0
-        return inside
+                far[theirs] = tree.query(states[theirs] / self.radius, p=np.inf)[0]
+        return far
 
 
 def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
@@ -179,9 +179,12 @@ def _wandering(
     )
     found = Found(attractor, setup.tolerance * np.where(moved > 0, moved, extent))
     while True:
-        inside = found.near(more, names[more_places[:, 0]])
+        far = float(np.quantile(found.distances(more, names[more_places[:, 0]]), REVISITED))
         found = extended(found, more, names[more_places[:, 0]])
-        if inside.mean() >= REVISITED or len(found.attractor.points) >= MOST_POINTS:
+        if len(found.attractor.points) >= MOST_POINTS and np.isfinite(far):
+            # A sample tells nothing below the distances of its own points.
+            return attrs.evolve(found, radius=found.radius * max(far, 1.0))
+        if far <= 1.0 or len(found.attractor.points) >= MOST_POINTS:
             return found
         more, more_places = _collected(points, len(found.attractor.points))
         if points.code != codes.DONE:

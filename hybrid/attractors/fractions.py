@@ -1,4 +1,4 @@
-"""Shares of starts that lead to each attractor, at one set of parameters or followed along one of them."""
+"""FractionsAt of starts that lead to each attractor, at one set of parameters or followed along one of them."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def basin_fractions(
     executor: Any = None,
     progress: bool | None = None,
 ) -> xarray.Dataset:
-    r"""Shares of random starts that lead to each attractor, with standard errors; also over a parameter.
+    r"""FractionsAt of random starts that lead to each attractor, with standard errors; also over a parameter.
 
     A share :math:`f` of :math:`N` independent starts has the standard error
     :math:`\sqrt{f (1 - f) / N}`.
@@ -116,7 +116,7 @@ def basin_fractions(
     }
     first = origins[np.lexsort(origins.T[::-1])[0]]
     setup = setup_of(system, first, parameters=parameters, **options)
-    task = Shares(setup, origins, name)
+    task = FractionsAt(setup, origins, name)
     shown = as_flag(progress)
     if name is None:
         with CTRL_C:
@@ -134,7 +134,9 @@ def basin_fractions(
     return result.assign_attrs({**swept.attrs, **result.attrs})
 
 
-def _along(system: HybridSystem, along: object, parameters: object) -> tuple[str | None, np.ndarray]:
+def _along(
+    system: HybridSystem, along: object, parameters: Mapping[str, float] | None
+) -> tuple[str | None, np.ndarray]:
     if along is None:
         return None, np.empty(0)
     given = arguments.mapping("along", along, WANTED)
@@ -142,6 +144,7 @@ def _along(system: HybridSystem, along: object, parameters: object) -> tuple[str
         raise arguments.refusal("along", WANTED, along)
     [(key, value)] = given.items()
     name = arguments.known("along: Parameter", key, system.parameters, "Parameters")
+    system.parameter_values(parameters)
     if name in named("parameters", parameters):
         raise ArgumentError(f"along: Parameter {name!r} is given twice: in along and in parameters.")
     values = arguments.numbers(f"along[{name!r}]", getattr(value, "values", value), "be values in order")
@@ -160,7 +163,7 @@ def _status(swept: xarray.Dataset) -> Status:
 
 
 @attrs.frozen(eq=False)
-class Shares:
+class FractionsAt:
     """The task of a sweep: the attractors at one value of a parameter, and their shares of the starts."""
 
     setup: Setup
@@ -199,7 +202,7 @@ class Shares:
 def _dataset(
     setup: Setup, found: list[dict[str, Any] | None], name: str | None, values: Any, status: Status
 ) -> xarray.Dataset:
-    """Shares over labels, and over the values of a parameter if there is one."""
+    """FractionsAt over labels, and over the values of a parameter if there is one."""
     import xarray
 
     known = [each for each in found if each is not None]

@@ -92,7 +92,8 @@ class Search:
         points, modes = new.attractor.points, new.attractor.mode
         for i, old in enumerate(self.found):
             # The same attractor in more points, unless one of the two is periodic.
-            if not old.attractor.round and not new.attractor.round and old.near(points, modes).mean() >= 0.5:
+            sampled = not old.attractor.round and not new.attractor.round
+            if sampled and np.median(old.distances(points, modes)) <= 1.0:
                 self.found[i] = extended(old, points, modes)
                 return True
         self.found.append(new)

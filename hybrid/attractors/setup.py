@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -128,8 +129,14 @@ def setup_of(
         interval=float(length or forcing or 0.0),
         periods=arguments.count("periods", periods, 1),
         recurrences=arguments.count("recurrences", recurrences, 1),
-        tolerance=arguments.positive("tolerance", tolerance, "be a positive share"),
+        tolerance=arguments.positive("tolerance", tolerance, "be a share below 1"),
     )
+    known = math.sqrt(found.solver.rtol)
+    if not known < found.tolerance < 1.0:
+        raise ArgumentError(
+            f"tolerance must be above {known:.2g} and below 1; got {found.tolerance}. Points of an orbit are "
+            "known to the square root of the solver's rtol: give a smaller one, solver=Taylor(rtol=...)."
+        )
     check_time("t0", found.t0, forcing or 0.0)
     compile_system(marked)
     if not found.interval:
