@@ -19,12 +19,12 @@ from hybrid.orbits.triangles import Triangles
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.simulate import simulate
 
-# Points in which a period is looked for, and the most that are kept of an attractor without one.
+# Points in which a period is looked for, and after how many without one an attractor has none.
 WINDOW, MOST_POINTS = 1024, 16_384
 # Share of its points that an attractor visits again, near earlier ones, before a sample counts as complete.
 REVISITED = 0.9
-# Intervals from which exponents are averaged, and those over which the size of the orbit is taken.
-INTERVALS, LOOKED_AT = 400, 16
+# Intervals from which exponents are averaged at first, at most, and those over which the size of the orbit is taken.
+INTERVALS, MOST_INTERVALS, LOOKED_AT = 400, 1600, 16
 
 
 @attrs.frozen(eq=False)
@@ -54,20 +54,19 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
     before, _ = _collected(points, setup.periods)
     if points.code != codes.DONE:
         return None
-    whole = np.vstack([x0, before])
-    while True:
-        states, places = _collected(points, WINDOW)
+    extent, share = _extent(np.vstack([x0, before])), math.sqrt(setup.solver.rtol)
+    sample = np.empty((0, len(x0))), np.empty((0, 2), dtype=np.int64)
+    # Chaos may be a long transient of a periodic orbit, so it takes many points to call an attractor chaotic.
+    while len(sample[0]) < MOST_POINTS:
+        window = _collected(points, WINDOW)
         if points.code != codes.DONE:
             return None
-        whole = np.vstack([whole, states])
-        count = _round(states, places[:, 0], _extent(whole), math.sqrt(setup.solver.rtol))
+        extent = np.maximum(extent, _extent(window[0]))
+        count = _round(window[0], window[1][:, 0], extent, share)
         if count:
-            return _periodic(setup, points, count, _extent(whole), x0)
-        # What has not settled by now is not periodic, or takes very long.
-        found = _wandering(setup, points, states, places, _extent(whole), x0)
-        settles = found is not None and found.attractor.kind == "periodic" and setup.forced
-        if not settles or len(whole) > setup.periods + MOST_POINTS:
-            return found
+            return _periodic(setup, points, count, extent, x0)
+        sample = np.vstack([sample[0], window[0]]), np.vstack([sample[1], window[1]])
+    return _wandering(setup, points, *sample, extent, x0)
 
 
 def _collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -177,18 +176,26 @@ def _wandering(
         standard_error=error,
         start=x0,
     )
-    found = Found(attractor, setup.tolerance * np.where(moved > 0, moved, extent))
+    whole = Found(attractor, setup.tolerance * np.where(moved > 0, moved, extent))
+    return _thinned(whole, more, names[more_places[:, 0]])
+
+
+def _thinned(whole: Found, states: np.ndarray, mode: np.ndarray) -> Found:
+    """The attractor with as many of its points as it takes to be near later ones.
+
+    A sample tells nothing below the distances of its own points, so the radius grows if all are too few.
+    """
+    count = WINDOW
     while True:
-        far = float(np.quantile(found.distances(more, names[more_places[:, 0]]), REVISITED))
-        found = extended(found, more, names[more_places[:, 0]])
-        if len(found.attractor.points) >= MOST_POINTS and np.isfinite(far):
-            # A sample tells nothing below the distances of its own points.
-            return attrs.evolve(found, radius=found.radius * max(far, 1.0))
-        if far <= 1.0 or len(found.attractor.points) >= MOST_POINTS:
+        attractor = whole.attractor
+        part = attrs.evolve(attractor, points=attractor.points[:count], mode=attractor.mode[:count])
+        found = attrs.evolve(whole, attractor=part)
+        far = float(np.quantile(found.distances(states, mode), REVISITED))
+        if far <= 1.0 or not np.isfinite(far):
             return found
-        more, more_places = _collected(points, len(found.attractor.points))
-        if points.code != codes.DONE:
-            return None
+        if count >= len(attractor.points):
+            return attrs.evolve(found, radius=found.radius * far)
+        count *= 2
 
 
 def extended(found: Found, states: np.ndarray, mode: np.ndarray) -> Found:
@@ -199,20 +206,29 @@ def extended(found: Found, states: np.ndarray, mode: np.ndarray) -> Found:
 
 
 def _exponents(setup: Setup, x: np.ndarray, mode: str, pace: float) -> tuple[np.ndarray, np.ndarray]:
-    """Exponents ``(n,)`` and their standard errors, averaged over intervals of one point each."""
+    """Exponents ``(n,)`` and their standard errors, averaged over intervals of one point each.
+
+    They are averaged for longer while more of them cannot be told from zero than must be zero.
+    """
     n = len(x)
     try:
         trajectory = setup.begin(x, mode, tangent=np.eye(n))
     except HybridError:
         return np.full(n, np.nan), np.full(n, np.nan)
     basis = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))[0]
-    following = Triangles(trajectory, pace, basis).following(INTERVALS)
-    growths = np.array([each.growth for each in following]).reshape(-1, n) / pace
-    mean = TaperedMean(n)
-    mean.add(growths)
-    values, error = mean.value(), standard_error(growths) * taper_inflation()
-    order = np.argsort(-values, kind="stable")
-    return values[order], error[order]
+    triangles = Triangles(trajectory, pace, basis)
+    growths = np.empty((0, n))
+    while True:
+        count = max(INTERVALS, len(growths))
+        rows = [each.growth / pace for each in triangles.following(count)]
+        growths = np.vstack([growths, *rows])
+        mean = TaperedMean(n)
+        mean.add(growths)
+        values, error = mean.value(), standard_error(growths) * taper_inflation()
+        zeros = int(np.sum(np.abs(values) <= 2 * error)) - (0 if setup.system.period is not None else 1)
+        if zeros <= 0 or len(rows) < count or len(growths) >= MOST_INTERVALS:
+            order = np.argsort(-values, kind="stable")
+            return values[order], error[order]
 
 
 def _kind(exponents: np.ndarray, error: np.ndarray, *, forced: bool) -> str:

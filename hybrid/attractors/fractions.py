@@ -1,4 +1,4 @@
-"""FractionsAt of starts that lead to each attractor, at one set of parameters or followed along one of them."""
+"""Shares of starts that lead to each attractor, at one set of parameters or followed along one of them."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def basin_fractions(
     executor: Any = None,
     progress: bool | None = None,
 ) -> xarray.Dataset:
-    r"""FractionsAt of random starts that lead to each attractor, with standard errors; also over a parameter.
+    r"""Shares of random starts that lead to each attractor, with standard errors; also over a parameter.
 
     A share :math:`f` of :math:`N` independent starts has the standard error
     :math:`\sqrt{f (1 - f) / N}`.
@@ -202,7 +202,7 @@ class FractionsAt:
 def _dataset(
     setup: Setup, found: list[dict[str, Any] | None], name: str | None, values: Any, status: Status
 ) -> xarray.Dataset:
-    """FractionsAt over labels, and over the values of a parameter if there is one."""
+    """Shares over labels, and over the values of a parameter if there is one."""
     import xarray
 
     known = [each for each in found if each is not None]
