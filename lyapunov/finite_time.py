@@ -12,7 +12,7 @@ from hybrid.errors import HybridError
 from hybrid.kernels.types import codes
 from hybrid.orbits.factors import fundamental_factors
 from hybrid.orbits.periodic_schur import product_eigenvalues
-from hybrid.simulation.trajectory import start
+from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
@@ -27,12 +27,13 @@ def finite_time_exponents(
     x0: ArrayLike,
     *,
     interval: float | None = None,
+    intervals: int | None = None,
     mode: str | None = None,
     parameters: Mapping[str, float] | None = None,
     t0: float = 0.0,
     solver: Solver | None = None,
 ) -> np.ndarray:
-    r"""Growth rates over a time from a start, or from many.
+    r"""Growth rates over a time from a start, or from many; also over intervals one after the other.
 
     .. math:: \lambda_i(x_0, T) = \frac{1}{T} \ln \sigma_i\big(\Phi(t_0 + T, t_0)\big)
 
@@ -49,12 +50,14 @@ def finite_time_exponents(
         A start ``(n,)``, or starts ``(N, n)``.
     interval
         The time :math:`T`; by default as for :func:`lyapunov.lyapunov_spectrum`.
+    intervals
+        Number of intervals along the run, each with exponents of its own; by default one, without an axis.
 
     Returns
     -------
-    (n,) or (N, n) array
+    (n,), (N, n), (intervals, n) or (N, intervals, n) array
         Largest first, in inverse units of time. Minus infinity for a direction that a jump annihilates; nan
-        for a start whose run does not reach its end, or that no mode allows.
+        for an interval whose end a run does not reach, and for a start that no mode allows.
 
     Raises
     ------
@@ -63,7 +66,7 @@ def finite_time_exponents(
 
     References
     ----------
-    S. C. Shadden, F. Lekien, J. E. Marsden, Physica D 212 (2005) 271, equation (8),
+    S. C. Shadden, F. Lekien, J. E. Marsden, Physica D 212 (2005) 271, section 2,
     doi:10.1016/j.physd.2005.10.007.
 
     Examples
@@ -74,46 +77,51 @@ def finite_time_exponents(
     """
     as_system("system", system)
     starts = arguments.numbers("x0", x0, STARTS)
-    if starts.ndim == 1:
-        return _exponents(system, starts, interval, mode, parameters, t0, solver)
+    count = 1 if intervals is None else arguments.count("intervals", intervals, 1)
+    one = starts.ndim == 1
+    if not one:
+        _check(system, starts)
+    found = np.full((1 if one else len(starts), count, system.dimension), np.nan)
+    failures = []
+    for i, each in enumerate(starts[None] if one else starts):
+        try:
+            trajectory = start(
+                system,
+                each,
+                t0,
+                mode=mode,
+                parameters=parameters,
+                solver=solver,
+                tangent=np.eye(system.dimension),
+            )
+            _fill(found[i], trajectory, interval_length(trajectory, interval, count))
+        except HybridError as failure:
+            failures.append(failure)
+    if failures and len(failures) == len(found):
+        # Not one start is at fault, but another argument.
+        raise failures[0]
+    found = found[:, 0] if intervals is None else found
+    return found[0] if one else found
+
+
+def _check(system: HybridSystem, starts: np.ndarray) -> None:
     if starts.ndim != 2 or starts.shape[1] != system.dimension:
         raise ArgumentError(f"x0 must {STARTS}, here n = {system.dimension}; got shape {starts.shape}.")
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if bad.size:
         raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {starts[bad[0]].tolist()}.")
-    found = np.full(starts.shape, np.nan)
-    failures = []
-    for i, each in enumerate(starts):
-        try:
-            found[i] = _exponents(system, each, interval, mode, parameters, t0, solver)
-        except HybridError as failure:
-            failures.append(failure)
-    if len(failures) == len(starts) and failures:
-        # Not one start is at fault, but another argument.
-        raise failures[0]
-    return found
 
 
-def _exponents(
-    system: HybridSystem,
-    x0: np.ndarray,
-    interval: float | None,
-    mode: str | None,
-    parameters: Mapping[str, float] | None,
-    t0: float,
-    solver: Solver | None,
-) -> np.ndarray:
-    n = system.dimension
-    trajectory = start(
-        system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=np.eye(n), time="t0"
-    )
-    length = interval_length(trajectory, interval, 1)
-    factors = fundamental_factors(trajectory, trajectory.t + length, np.ones(n))
-    whole = factors.code == codes.DONE
-    if not whole or not all(np.all(np.isfinite(each)) for each in factors.matrices):
-        return np.full(n, np.nan)
-    # The squares of the singular values are the eigenvalues of the transposed matrix times the matrix.
-    count = len(factors.matrices)
-    product = [*factors.matrices, *(each.T for each in reversed(factors.matrices))]
-    singular = [*factors.singular, *(2 * count - 1 - i for i in factors.singular)]
-    return product_eigenvalues(product, singular).log_moduli / (2 * length)
+def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:
+    """Write the exponents of intervals of this length into ``out (intervals, n)``."""
+    begin, n = trajectory.t, out.shape[1]
+    for i in range(len(out)):
+        factors = fundamental_factors(trajectory, begin + (i + 1) * length, np.ones(n))
+        whole = all(np.all(np.isfinite(each)) for each in factors.matrices)
+        if factors.code != codes.DONE or not whole:
+            return
+        # The squares of the singular values are the eigenvalues of the transposed matrix times the matrix.
+        count = len(factors.matrices)
+        product = [*factors.matrices, *(each.T for each in reversed(factors.matrices))]
+        singular = [*factors.singular, *(2 * count - 1 - k for k in factors.singular)]
+        out[i] = product_eigenvalues(product, singular).log_moduli / (2 * length)

@@ -80,7 +80,7 @@ DEFAULTS = {
         "progress": False,
     },
     lyapunov.covariant_vectors: {**LONG, "intervals": 1000, "interval": None, "transient": 200},
-    lyapunov.finite_time_exponents: {**RUN, "interval": None, "t0": 0.0},
+    lyapunov.finite_time_exponents: {**RUN, "interval": None, "intervals": None, "t0": 0.0},
     lyapunov.zero_one_test: {"frequencies": 100},
     lyapunov.lyapunov_spectrum: {
         **{**LONG, "k": None, "intervals": 1000, "interval": None, "transient": 200, "history": True},

@@ -33,12 +33,12 @@ class Attractor:
         Points of the section ``(P, n)`` and names of their modes ``(P,)``: one round of a periodic orbit, in
         the order in which it visits them; a sample of other attractors.
     round
-        How many points one round has: for a forced system the number of forcing periods. 0 if the motion is
-        not periodic.
+        How many points one round has: for a forced system the number of forcing periods. 0 if the points do
+        not come back: the motion is not periodic, or the points of an orbit are taken at equal times.
     period
         Time of one round; nan if the motion is not periodic.
     jumps
-        Jumps per round, or per point if the motion is not periodic.
+        Jumps per period, or per point if the motion is not periodic.
     exponents, standard_error
         Lyapunov exponents ``(n,)``, largest first, in inverse units of time, and their errors. Those of a
         periodic orbit are the logarithms of its multipliers over the period.

@@ -68,7 +68,7 @@ def attractors(
         Surface for the points, for autonomous systems or in place of the forcing period.
     interval
         Time between two points of an autonomous system without a section; by default the time scale of its
-        field. Periodic orbits have a period only on a section.
+        field.
     starts, seed
         Number of random starts, and of their sequence. An attractor with a share ``f`` of the starts is
         missed with the probability ``(1 - f) ** starts``.
@@ -87,7 +87,7 @@ def attractors(
     Returns
     -------
     Attractors
-        A mapping of the labels 1, 2, ... to :class:`Attractor`, with a status.
+        A mapping of the labels 1, 2, ... to :class:`hybrid.Attractor`, with a status.
 
     Raises
     ------

@@ -18,12 +18,14 @@ from hybrid.orbits.periodic_schur import product_eigenvalues
 from hybrid.orbits.triangles import Triangles
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.simulate import simulate
+from hybrid.system.elements import Guard
+from hybrid.transform.markers import with_section
 
 # Points in which a period is looked for, and after how many without one an attractor has none.
 WINDOW, MOST_POINTS = 1024, 16_384
 # Share of its points that an attractor visits again, near earlier ones, before a sample counts as complete.
 REVISITED = 0.9
-# Intervals from which exponents are averaged at first, at most, and those over which the size of the orbit is taken.
+# Intervals from which exponents are averaged at first and at most, and those that show the size of the orbit.
 INTERVALS, MOST_INTERVALS, LOOKED_AT = 400, 1600, 16
 
 
@@ -177,7 +179,31 @@ def _wandering(
         start=x0,
     )
     whole = Found(attractor, setup.tolerance * np.where(moved > 0, moved, extent))
+    if attractor.kind == "periodic":
+        whole = attrs.evolve(whole, attractor=_closed(setup, attractor, origin, mode))
     return _thinned(whole, more, names[more_places[:, 0]])
+
+
+def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Attractor:
+    """The attractor with the period and the multipliers of its orbit, if that crosses a plane in rounds.
+
+    Points at equal times do not come back. The plane lies through a point, across the speed there.
+    """
+    extent = np.maximum(_extent(attractor.points), np.finfo(float).tiny)
+    normal = (setup.begin(x, mode).field() / extent / extent).tolist()
+    place = list(enumerate(zip(normal, x.tolist(), strict=True)))
+    plane = Guard(lambda t, x, p: sum(each * (x[i] - at) for i, (each, at) in place), +1)
+    marked = with_section(setup.system, plane)
+    crossed = attrs.evolve(setup, section=plane, marked=marked)
+    points = Points(crossed, x, mode)
+    states, places = _collected(points, WINDOW)
+    count = _round(states, places[:, 0], extent, math.sqrt(setup.solver.rtol)) if len(states) == WINDOW else 0
+    found = _periodic(crossed, points, count, extent, attractor.start) if count else None
+    if found is None:
+        return attractor
+    orbit = found.attractor
+    names = ("period", "jumps", "exponents", "standard_error")
+    return attrs.evolve(attractor, **{name: getattr(orbit, name) for name in names})
 
 
 def _thinned(whole: Found, states: np.ndarray, mode: np.ndarray) -> Found:

@@ -84,7 +84,7 @@ def basin_fractions(
     xarray.Dataset
         Over the axis ``label`` (-1: violates every mode, 0: no attractor, 1, 2, ...): ``fraction`` and its
         ``standard_error``, ``kind``, ``round`` and ``jumps`` of the attractors, as in
-        :class:`hybrid.attractors.Attractor`. With ``along`` also over the axis of the parameter: there the
+        :class:`hybrid.Attractor`. With ``along`` also over the axis of the parameter: there the
         labels count attractors in the order in which they appear; ``first`` and ``last`` are the values
         between which each of them lives.
 
@@ -127,9 +127,10 @@ def basin_fractions(
         alone["labels"] = list(range(1, len(alone["found"]) + 1))
         return _dataset(setup, [alone], None, None, status)
     swept = sweep(task, {name: values}, store=store, executor=executor, progress=shown)
-    if "found" not in swept:
+    failed = np.flatnonzero(swept.status.values == StatusCode.FAILED)
+    if failed.size == len(values):
         raise ArgumentError(str(swept.message.values[0]))
-    made = swept["found"].values.tolist()
+    made = swept["found"].values.tolist() if "found" in swept else [""] * len(values)
     result = _dataset(setup, followed(task, values, made), name, values, _status(swept))
     return result.assign_attrs({**swept.attrs, **result.attrs})
 

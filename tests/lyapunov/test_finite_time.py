@@ -41,6 +41,19 @@ def test_a_map_with_a_lost_direction():
     assert found[:, 2].tolist() == [-np.inf, -np.inf]
 
 
+def test_intervals_along_a_run():
+    """Each is that of a start at its beginning; the map shrinks and stretches by known factors."""
+    system = clocked(("x",), lambda t, x, p: (4 * x.x * (1 - x.x),))
+    found = lyapunov.finite_time_exponents(system, (0.1, 0.5), interval=1.0, intervals=5)
+    x = [0.1]
+    for _ in range(4):
+        x.append(4 * x[-1] * (1 - x[-1]))
+    rates = np.log(np.abs(4 - 8 * np.array(x)))
+    np.testing.assert_allclose(found, np.sort(np.column_stack([rates, np.zeros(5)]))[:, ::-1], atol=1e-9)
+    many = lyapunov.finite_time_exponents(system, [(0.1, 0.5), (0.1, 0.5)], interval=1.0, intervals=5)
+    np.testing.assert_array_equal(many, [found, found])
+
+
 def test_a_start_that_does_not_reach_the_end_has_no_exponents():
     found = lyapunov.finite_time_exponents(models.bouncing_ball(), [(1.0, 0.0), (30.0, 0.0)], interval=4.5)
     assert np.isnan(found[0]).all()

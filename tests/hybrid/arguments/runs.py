@@ -276,6 +276,7 @@ def runs(made):
                 **{name: EXPONENTS[name] for name in ("system", "mode", "parameters", "solver", "t0")},
                 "x0": [*NUMBERS, (0.5,), 0.5, [[0.5]], (math.nan, 0.0), [(math.nan, 0.0)], {"x": 1.0}, Odd()],
                 "interval": EXPONENTS["interval"],
+                "intervals": [0, *COUNT[1:]],
             },
         ),
         (

@@ -84,8 +84,9 @@ def test_a_limit_cycle_on_a_section():
     np.testing.assert_allclose(cycle.points, [[2.0086, 0.0]], atol=1e-4)
     np.testing.assert_allclose(cycle.exponents, [0.0, -1.0594], atol=1e-4)
     [by_time] = hybrid.attractors(system, given, starts=10).values()
-    assert by_time.kind == "periodic"
-    assert by_time.round == 0
+    assert (by_time.kind, by_time.round, by_time.jumps) == ("periodic", 0, 0.0)
+    assert by_time.period == pytest.approx(cycle.period, abs=1e-6)
+    np.testing.assert_allclose(by_time.exponents, cycle.exponents, atol=1e-6)
 
 
 def test_a_torus():

@@ -1,6 +1,10 @@
 """Basins whose boundaries are known, and labels that depend on the starts alone."""
 
 import json
+import signal
+import threading
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -105,6 +109,20 @@ def test_modes_by_their_guards():
     assert found.kind.values.tolist() == ["periodic"]
 
 
+def test_ctrl_c_keeps_the_lines_that_are_complete():
+    system = models.impact_oscillator()
+    over = {"x": np.linspace(-3.0, 1.0, 2000), "v": np.linspace(-3.0, 3.0, 500)}
+    pressed = threading.Timer(0.7, signal.raise_signal, (signal.SIGINT,))
+    pressed.start()
+    found = hybrid.basins(system, over, **TWO)
+    pressed.join()
+    assert found.attrs["status"] == "INTERRUPTED"
+    complete = (found.status != StatusCode.NOT_RUN).any("v")
+    assert 0 < complete.sum() < 2000
+    assert (found.label.where(complete, 1) > 0).all()
+    assert (found.label.where(~complete, 0) == 0).all()
+
+
 def test_a_store_holds_what_is_done(tmp_path):
     values = np.linspace(-2.0, 2.0, 10)
     path = tmp_path / "wells.zarr"
@@ -119,3 +137,10 @@ def test_names_that_results_have_are_refused():
     system = hybrid.HybridSystem(state=("label",), modes=[hybrid.Mode("m", lambda t, x, p: (-x.label,))])
     with pytest.raises(hybrid.ArgumentError, match="over: 'label' is also the name of a result"):
         hybrid.basins(system, {"label": [0.0, 1.0]})
+
+
+def test_processes_give_the_same(impacting):
+    over = {"x": impacting.x.values[::8], "v": impacting.v.values[::8]}
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        found = hybrid.basins(models.impact_oscillator(), over, **TWO, executor=pool)
+    np.testing.assert_array_equal(found.label, impacting.label[::8, ::8])
