@@ -40,7 +40,7 @@ def impact_picture(folder: Path) -> None:
 
 def founding_picture(folder: Path) -> None:
     """The torus of the founding system at 7.46 and the orbit of 396 periods, with their basins."""
-    over = {"x1": 0.0, "x2": np.linspace(-0.02, 0.14, 120), "v1": 0.0, "v2": np.linspace(-1.2, 1.2, 120)}
+    over = {"x1": 0.0, "x2": np.linspace(0.0, 0.16, 64), "v1": 0.0, "v2": np.linspace(-1.2, 1.2, 64)}
     found = basins(models.vibroimpact(), over, parameters={"omega": 7.46})
     ax = plot_basins(found, figsize=(6.4, 4.6))
     save(ax.figure, folder / "basins_founding.png")
@@ -49,7 +49,7 @@ def founding_picture(folder: Path) -> None:
 def angles_picture(folder: Path) -> None:
     """Angles between stable and unstable directions of the impact oscillator, beside impact speeds."""
     system, parameters = models.impact_oscillator(), {"w": 2.8, "d": 0.0}
-    found = covariant_vectors(system, (-0.5, 0.0), parameters=parameters, intervals=6000)
+    found = covariant_vectors(system, (-0.5, 0.0), parameters=parameters, intervals=3000)
     angles, speeds = np.degrees(found.angles), np.full(len(found), np.nan)
     for i, (x, t) in enumerate(zip(found.x, found.t, strict=True)):
         impacts = simulate(system, x, (t, t + found.interval), parameters=parameters).jumps

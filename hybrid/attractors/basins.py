@@ -116,7 +116,9 @@ def basins(
     search = Search(setup, max(1, threads or cores()))
     with CTRL_C:
         search.pilot(grid.origins)
-        rows = _rows(setup, grid, list(search.found), store=store, executor=executor, progress=shown)
+        rows = _not_run(grid)
+        if not CTRL_C.is_set():
+            rows = _rows(setup, grid, list(search.found), store=store, executor=executor, progress=shown)
         if not CTRL_C.is_set():
             rows = search.decided(grid.origins, found=rows)
         stopped = CTRL_C.is_set()
@@ -126,6 +128,12 @@ def basins(
     return _dataset(setup, grid, search, rows, status)
 
 
+def _not_run(grid: Grid) -> np.ndarray:
+    rows = np.zeros((len(grid.origins), 4), dtype=np.int64)
+    rows[:, OWNER], rows[:, CODE] = NONE, StatusCode.NOT_RUN
+    return rows
+
+
 def _rows(setup: Setup, grid: Grid, found: list[Found], **options: Any) -> np.ndarray:
     """What is found of each start with the attractors known so far, by a sweep over lines of the grid."""
     if not grid.axes:
@@ -133,8 +141,7 @@ def _rows(setup: Setup, grid: Grid, found: list[Found], **options: Any) -> np.nd
     first = grid.axes[0]
     # The values of an axis may occur twice, and need not be in order.
     swept = sweep(Lines(setup, grid, tuple(found)), {first.name: first.points()}, **options)
-    rows = np.zeros((len(grid.origins), 4), dtype=np.int64)
-    rows[:, OWNER], rows[:, CODE] = NONE, StatusCode.NOT_RUN
+    rows = _not_run(grid)
     if "rows" in swept:
         made = swept["rows"].values.reshape(-1, 4)
         done = np.isfinite(made[:, 0])

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from hybrid.attractors.attractor import KINDS, Attractor
-from hybrid.attractors.find import Found, extended, find
+from hybrid.attractors.find import MOST_POINTS, Found, extended, find
 from hybrid.attractors.runs import CODE, MODE, NONE, OWNER, runs_of
 from hybrid.attractors.setup import Setup
 from hybrid.display.progress import Progress
@@ -91,9 +91,11 @@ class Search:
             return False
         points, modes = new.attractor.points, new.attractor.mode
         for i, old in enumerate(self.found):
-            # The same attractor in more points, unless one of the two is periodic.
-            sampled = not old.attractor.round and not new.attractor.round
-            if sampled and np.median(old.distances(points, modes)) <= 1.0:
+            same_kind = bool(old.attractor.round) == bool(new.attractor.round)
+            if same_kind and np.median(old.distances(points, modes)) <= 1.0:
+                # The run took longer than it may. More points of a sample may shorten the next one.
+                if old.attractor.round or len(old.attractor.points) >= MOST_POINTS:
+                    return False
                 self.found[i] = extended(old, points, modes)
                 return True
         self.found.append(new)

@@ -119,6 +119,19 @@ def test_runs_that_end_lead_nowhere():
     assert "The runs of 5 of 5 starts end" in found.status.message
 
 
+def test_starts_that_take_longer_than_they_may_make_no_second_attractor():
+    """At this amplitude chaos is a transient of some thousand periods, of an orbit of four."""
+    found = hybrid.attractors(
+        models.impact_oscillator(),
+        {"x": (-4.0, 1.0), "v": (-4.0, 4.0)},
+        parameters={"w": 2.6, "A": 4.95},
+        starts=60,
+        periods=300,
+    )
+    assert [each.round for each in found.values() if each.kind == "periodic"].count(4) == 1
+    assert found.status.code == StatusCode.NOT_CONVERGED
+
+
 def test_what_comes_back():
     found = hybrid.attractors(double_well(units={"x": "m"}), {"x": (-2.0, 3.0)}, starts=40)
     assert repr(found).startswith("<2 attractors, SUCCESS")
