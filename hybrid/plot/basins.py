@@ -160,6 +160,8 @@ def plot_fractions(
     colours = {-1: VIOLATES_COLOUR, 0: NONE_COLOUR}
     shown = [label for label in [*(each for each in labels if each > 0), 0, -1] if label in labels]
     along = [str(dim) for dim in fractions.fraction.dims if dim != "label"]
+    if along and fractions.sizes[along[0]] == 1:
+        fractions, along = fractions.isel({along[0]: 0}), []
     below: Any = 0.0
     for label in shown:
         colour, name = colours.get(label, _colour(label - 1)), _name(fractions, label)

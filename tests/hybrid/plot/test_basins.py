@@ -57,3 +57,5 @@ def test_shares_as_bars_and_as_bands():
     assert bands.get_xlabel() == "h"
     assert bands.get_ylim() == (0.0, 1.0)
     assert legend(bands) == ["1: equilibrium", "2: equilibrium"]
+    one = hybrid.plot(over.isel(h=[1]))
+    assert sum(bar.get_height() for bar in one.patches) == pytest.approx(1.0)
