@@ -111,19 +111,18 @@ def attractors(
     count = arguments.count("starts", starts, 1)
     origins = sample_of(system, axes, count, arguments.count("seed", seed, 0))
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
-    setup = setup_of(
-        system,
-        origins[np.lexsort(origins.T[::-1])[0]],
-        mode=mode,
-        parameters=parameters,
-        t0=t0,
-        section=section,
-        interval=interval,
-        periods=periods,
-        recurrences=recurrences,
-        tolerance=tolerance,
-        solver=solver,
-    )
+    given = {
+        "mode": mode,
+        "parameters": parameters,
+        "t0": t0,
+        "section": section,
+        "interval": interval,
+        "periods": periods,
+        "recurrences": recurrences,
+        "tolerance": tolerance,
+        "solver": solver,
+    }
+    setup = setup_of(system, origins[np.lexsort(origins.T[::-1])[0]], given)
     search = Search(setup, threads)
     with CTRL_C, progress_bar(count, "Attractors", as_flag(progress), "start") as bar:
         search.pilot(origins)

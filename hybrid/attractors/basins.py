@@ -15,7 +15,7 @@ from hybrid.attractors.attractors import as_flag, status_of_search
 from hybrid.attractors.find import Found
 from hybrid.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
 from hybrid.attractors.search import FIRST_POINTS, Search, known_of
-from hybrid.attractors.setup import Setup, setup_of
+from hybrid.attractors.setup import Setup, digest, setup_of
 from hybrid.attractors.starts import Grid, axes_of, grid_of
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
@@ -27,7 +27,7 @@ from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, starting_mode
 from hybrid.system.growth import growing
 
 if TYPE_CHECKING:
@@ -79,10 +79,11 @@ def basins(
     -------
     xarray.Dataset
         Over the axes of the grid: ``label``, 1, 2, ... for an attractor, 0 for none (see ``status``: the run
-        ended, or was near no attractor after ``periods`` points), -1 for a start that violates every mode,
-        or the mode that the call names; the attribute ``violated_modes`` names these. ``steps`` is the number
-        of points until the decision. With the attractors over the axis ``attractor``, as
-        ``Attractors.to_xarray`` gives them, and their share of the grid, ``fraction``.
+        ended, or was near no attractor after ``periods`` points), -1 for a start that violates every mode, or
+        the mode that the call or the system names: it lies beyond a guard of each. The attribute
+        ``violated_modes`` names these. ``steps`` is the number of points until the decision. With the
+        attractors over the axis ``attractor``, as ``Attractors.to_xarray`` gives them, and their share of the
+        grid, ``fraction``.
 
     Raises
     ------
@@ -99,19 +100,18 @@ def basins(
     axes = axes_of(system, over, RESERVED)
     shown = as_flag(progress)
     grid = grid_of(system, axes)
-    setup = setup_of(
-        system,
-        grid.origins[np.lexsort(grid.origins.T[::-1])[0]],
-        mode=mode,
-        parameters=parameters,
-        t0=t0,
-        section=section,
-        interval=interval,
-        periods=periods,
-        recurrences=recurrences,
-        tolerance=tolerance,
-        solver=solver,
-    )
+    given = {
+        "mode": mode,
+        "parameters": parameters,
+        "t0": t0,
+        "section": section,
+        "interval": interval,
+        "periods": periods,
+        "recurrences": recurrences,
+        "tolerance": tolerance,
+        "solver": solver,
+    }
+    setup = setup_of(system, grid.origins[np.lexsort(grid.origins.T[::-1])[0]], given)
     threads = executor if isinstance(executor, int) and not isinstance(executor, bool) else None
     search = Search(setup, max(1, threads or cores()))
     with CTRL_C:
@@ -190,8 +190,8 @@ class Lines:
         others = np.delete(
             self.grid.origins[:length], self.setup.system.state_names.index(self.grid.dims[0]), axis=1
         )
-        found = [(each.attractor.points.tolist(), each.radius.tolist()) for each in self.found]
-        return {**self.setup.facts(), "starts": others.tolist(), "attractors": found}
+        found = [digest(np.vstack([each.radius, each.attractor.points])) for each in self.found]
+        return {**self.setup.facts(), "starts": digest(others), "attractors": found}
 
 
 def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status: Status) -> xarray.Dataset:
@@ -199,7 +199,8 @@ def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status:
     found, labels = search.ordered()
     label = np.where(rows[:, OWNER] >= 0, labels[rows[:, OWNER]], 0)
     label[rows[:, CODE] == codes.REFUSED] = VIOLATES
-    violated = [setup.mode] if setup.mode is not None else list(system.mode_names)
+    named = starting_mode(system, setup.mode)
+    violated = list(system.mode_names) if named is None else [named]
     code = np.where(rows[:, CODE] == codes.REFUSED, StatusCode.FAILED, rows[:, CODE])
     code = np.where(rows[:, CODE] == codes.MAX_STEPS, StatusCode.NOT_CONVERGED, code)
     names = Names(system.state_names, dict(system.units))

@@ -14,7 +14,7 @@ from hybrid.attractors.attractors import as_flag, status_of_search
 from hybrid.attractors.follow import followed
 from hybrid.attractors.runs import CODE, OWNER
 from hybrid.attractors.search import Search
-from hybrid.attractors.setup import Setup, setup_of
+from hybrid.attractors.setup import Setup, digest, setup_of
 from hybrid.attractors.starts import axes_of, sample_of
 from hybrid.attractors.text import read, written
 from hybrid.errors import ArgumentError
@@ -104,8 +104,9 @@ def basin_fractions(
     count = arguments.count("starts", starts, 1)
     origins = sample_of(system, axes, count, arguments.count("seed", seed, 0))
     name, values = _along(system, along, parameters)
-    options: dict[str, Any] = {
+    given = {
         "mode": mode,
+        "parameters": parameters,
         "t0": t0,
         "section": section,
         "interval": interval,
@@ -115,7 +116,7 @@ def basin_fractions(
         "solver": solver,
     }
     first = origins[np.lexsort(origins.T[::-1])[0]]
-    setup = setup_of(system, first, parameters=parameters, **options)
+    setup = setup_of(system, first, given)
     task = FractionsAt(setup, origins, name)
     shown = as_flag(progress)
     if name is None:
@@ -197,7 +198,7 @@ class FractionsAt:
     @property
     def facts(self) -> dict[str, Any]:
         """What decides the results."""
-        return {**self.setup.facts(), "starts": self.origins.tolist()}
+        return {**self.setup.facts(), "starts": digest(self.origins)}
 
 
 def _dataset(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import lru_cache
 from typing import Any
 
@@ -11,6 +12,7 @@ from hybrid.attractors.setup import Setup
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
 from hybrid.display.progress import Progress, silent
+from hybrid.errors import ArgumentError
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C, Bursts
@@ -42,10 +44,10 @@ class Runs:
         self.plan = plan_of(self.compiled, setup.solver, 0)
         self.model = self.compiled.given(setup.parameters, self.plan.model)
         mode = starting_mode(setup.marked, setup.mode)
-        if mode is None and len(setup.system.modes) == 1:
-            [mode] = setup.system.mode_names
-        single = mode is not None and len(setup.marked.parts_of(mode)) == 1
-        self.named = setup.marked.mode_index(mode) if mode is not None and single else codes.NO_MODE
+        parts = [] if mode is None else setup.marked.parts_of(mode)
+        self.named = parts[0] if len(parts) == 1 else codes.NO_MODE
+        # The kernel does not choose among the parts of one mode.
+        self.in_parts = len(parts) > 1
         # Before threads need the same kernels.
         load_kernels(KERNELS)
         self.parts = self.plan.parts
@@ -58,8 +60,11 @@ class Runs:
         found[:, OWNER], found[:, CODE] = NONE, StatusCode.NOT_RUN
 
         def run(block: range) -> None:
-            part = slice(block.start, block.stop)
-            self._block(np.ascontiguousarray(origins[part]), known, most, found[part])
+            size = 1 if self.in_parts else len(block)
+            for i in range(block.start, block.stop, size):
+                part = slice(i, i + size)
+                settle = self._one if self.in_parts else self._block
+                settle(np.ascontiguousarray(origins[part]), known, most, found[part])
 
         run_in_blocks(run, len(origins), threads, bar or silent())
         return found
@@ -78,11 +83,11 @@ class Runs:
         kernel, advance = load_kernels(KERNELS).settle, load_kernels().advance
         verdicts = np.zeros(len(self.setup.marked.transitions), dtype=np.int64)
         reached, bursts = np.zeros(1, dtype=np.int64), Bursts([trajectory])
-        named, alone, first, resumed = self.named, int(self.setup.mode is not None), 0, 0
+        first, resumed = 0, 0
         while True:
             bursts.most()
             code = kernel(
-                *(advance, self.parts, task, *words, origins, named, alone, known, section, progress),
+                *(advance, self.parts, task, *words, origins, self.named, known, section, progress),
                 *(first, resumed, solver.max_steps, bursts.steps, found, verdicts, reached),
             )
             first, resumed = int(reached[0]), int(code == codes.GO_ON)
@@ -99,9 +104,15 @@ class Runs:
 
     def _one(self, origin: np.ndarray, known: Any, most: int, found: np.ndarray) -> None:
         """A start whose mode Python has to find; an ArgumentError if more than one mode allows the start."""
-        mode = self.setup.begin(origin[0], self.setup.mode, marked=True).mode
-        other = Runs(self.setup)
-        other.named = self.setup.marked.mode_index(mode)
+        try:
+            mode = self.setup.begin(origin[0], self.setup.mode, marked=True).mode
+        except ArgumentError:
+            if not self.in_parts:
+                raise
+            found[0] = NONE, 0, codes.REFUSED, codes.NO_MODE
+            return
+        other = copy(self)
+        other.named, other.in_parts = self.setup.marked.mode_index(mode), False
         other._block(origin, known, most, found)
 
     def section(self, phase0: float, most: int) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from hashlib import blake2b
 from typing import Any
 
 import attrs
@@ -90,30 +91,27 @@ class Setup:
         }
 
 
-def setup_of(
-    system: HybridSystem,
-    first: np.ndarray,
-    *,
-    mode: str | None,
-    parameters: Mapping[str, float] | None,
-    t0: float,
-    section: Guard | None,
-    interval: float | None,
-    periods: int,
-    recurrences: int,
-    tolerance: float,
-    solver: Solver | None,
-) -> Setup:
-    """The setup of a search with every argument checked; ``first`` is a start that shows the time scale."""
+def digest(array: np.ndarray) -> str:
+    """A text that stands for the numbers of an array among the facts of a store."""
+    return blake2b(np.ascontiguousarray(array).tobytes(), digest_size=8).hexdigest()
+
+
+def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) -> Setup:
+    """The setup of a search with every argument checked.
+
+    ``first`` is a start that shows the time scale; ``given`` has the arguments of :func:`hybrid.attractors`
+    that are fields of a setup.
+    """
     as_system("system", system)
-    given = named("parameters", parameters)
-    system.parameter_values(given)
+    overrides = named("parameters", given["parameters"])
+    system.parameter_values(overrides)
+    mode, section, interval = given["mode"], given["section"], given["interval"]
     if mode is not None:
         check_mode(system, mode)
     if section is not None:
         arguments.instance("section", section, Guard, "Write Guard(function, direction=...).")
     length = None if interval is None else arguments.positive("interval", interval, "be a positive time")
-    forcing = system.forcing_period(given)
+    forcing = system.forcing_period(overrides)
     if length is not None and (section is not None or forcing is not None):
         what = "the section" if section is not None else "the forcing period"
         raise ArgumentError(f"interval must be None here; got {length}: points are taken by {what}.")
@@ -122,20 +120,20 @@ def setup_of(
         system=system,
         marked=marked,
         mode=mode,
-        parameters=given,
-        t0=arguments.number("t0", t0),
-        solver=check_solver(solver),
+        parameters=overrides,
+        t0=arguments.number("t0", given["t0"]),
+        solver=check_solver(given["solver"]),
         section=section,
         interval=float(length or forcing or 0.0),
-        periods=arguments.count("periods", periods, 1),
-        recurrences=arguments.count("recurrences", recurrences, 1),
-        tolerance=arguments.positive("tolerance", tolerance, "be a share below 1"),
+        periods=arguments.count("periods", given["periods"], 1),
+        recurrences=arguments.count("recurrences", given["recurrences"], 1),
+        tolerance=arguments.positive("tolerance", given["tolerance"], "be a share below 1"),
     )
     known = math.sqrt(found.solver.rtol)
     if not known < found.tolerance < 1.0:
         raise ArgumentError(
             f"tolerance must be above {known:.2g} and below 1; got {found.tolerance}. Points of an orbit are "
-            "known to the square root of the solver's rtol: give a smaller one, solver=Taylor(rtol=...)."
+            "known to the square root of the solver's rtol: raise tolerance=, or give a solver= with a lower one."
         )
     check_time("t0", found.t0, forcing or 0.0)
     compile_system(marked)

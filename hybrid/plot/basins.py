@@ -89,7 +89,7 @@ def plot_basins(
     else:
         ax.set_yticks([])
     violated = json.loads(basins.attrs.get("violated_modes", "[]"))
-    names = [f"violates {', '.join(violated)}", "no attractor", *_described(basins)]
+    names = [f"violates {' and '.join(violated)}", "no attractor", *_described(basins)]
     present = [i for i in range(count + 2) if (values == i - 1).any()]
     handles = [
         Patch(facecolor=colours[i], edgecolor="0.4", linewidth=0.5, label=names[i], hatch="////" * (i == 0))

@@ -82,20 +82,6 @@ def next_point(advance, parts, task, section, progress, max_steps):
 
 
 @njit(**KERNEL)
-def begin(parts, task, named, alone, verdicts):
-    """The mode of a start: the one named if its guards allow it, else any other one; NO_MODE if none does.
-
-    With ``alone`` no other mode than the one named is tried.
-    """
-    mode = mode_of_start(parts, task, named, verdicts)
-    if mode != NO_MODE and guards_beyond(named, verdicts) == 0:
-        return mode
-    if named == NO_MODE or alone == 1:
-        return NO_MODE
-    return mode_of_start(parts, task, NO_MODE, verdicts)
-
-
-@njit(**KERNEL)
 def violates_all(model, verdicts):
     """Whether a guard of every mode speaks against a start."""
     for mode in range(model.first_outgoing.shape[0] - 1):
@@ -118,7 +104,6 @@ def violates_all(model, verdicts):
     INDICES,
     MATRIX,
     INTEGER,
-    INTEGER,
     Known,
     Section,
     Progress,
@@ -140,7 +125,6 @@ def settle(
     fresh_work,
     origins,
     named,
-    alone,
     known,
     section,
     progress,
@@ -156,9 +140,9 @@ def settle(
 
     A run stops at the point that decides its start. Its code is DONE then, and MAX_STEPS where ``most``
     points decide nothing; other codes are those of runs that end. REFUSED, with no mode at the start: it
-    violates every mode. Returns DONE after the last start, GO_ON if the ``budget`` of steps was used up,
-    after which the next call resumes the run ``reached (1,)``: ``resumed``; REFUSED if more than one mode
-    allows that start.
+    violates the mode ``named``, or every mode if that is NO_MODE. Returns DONE after the last start, GO_ON if
+    the ``budget`` of steps was used up, after which the next call resumes the run ``reached (1,)``:
+    ``resumed``; REFUSED if more than one mode allows that start.
     """
     run, n = task.run, task.model.dimension
     for i in range(first, origins.shape[0]):
@@ -171,11 +155,13 @@ def settle(
                 run.scale[c] = abs(origins[i, c])
             progress.cycle, progress.phase = run.cycle, section.phase
             progress.under_way, progress.points, progress.near, progress.streak = 0, 0, NONE, 0
-            mode = begin(parts, task, named, alone, verdicts)
+            mode = mode_of_start(parts, task, named, verdicts)
+            if guards_beyond(named, verdicts) > 0:
+                mode = NO_MODE
             found[i, MODE] = mode
             if mode == NO_MODE:
                 found[i, OWNER], found[i, POINTS], found[i, CODE] = NONE, 0, REFUSED
-                if alone == 0 and not violates_all(task.model, verdicts):
+                if named == NO_MODE and not violates_all(task.model, verdicts):
                     return REFUSED
                 continue
             run.mode = mode

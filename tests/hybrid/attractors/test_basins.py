@@ -100,6 +100,41 @@ def test_runs_that_end_have_a_status():
     assert json.loads(found.attrs["fixed"]) == {"v": 0.0}
 
 
+def test_the_mode_in_which_runs_start():
+    """With ``start=`` or ``mode=`` only that mode counts, as for `simulate`; else the guards decide."""
+
+    def system(**options):
+        return hybrid.HybridSystem(
+            state=("x",),
+            modes=[
+                hybrid.Mode("left", lambda t, x, p: (-1.0 - x.x,)),
+                hybrid.Mode("right", lambda t, x, p: (1.0 - x.x,)),
+            ],
+            transitions=[
+                hybrid.Transition("left", "right", hybrid.Guard(lambda t, x, p: x.x, +1)),
+                hybrid.Transition("right", "left", hybrid.Guard(lambda t, x, p: x.x, -1)),
+            ],
+            **options,
+        )
+
+    over = {"x": [-2.0, -0.5, 0.5, 2.0]}
+    assert hybrid.basins(system(), over).label.values.tolist() == [1, 1, 2, 2]
+    started = hybrid.basins(system(start="right"), over)
+    assert started.label.values.tolist() == [-1, -1, 1, 1]
+    assert json.loads(started.attrs["violated_modes"]) == ["right"]
+    assert hybrid.basins(system(), over, mode="left").label.values.tolist() == [1, 1, -1, -1]
+
+
+def test_modes_of_plain_equations():
+    """Parts of modes that the library has made, one of them only when a run needs it."""
+    wells = hybrid.from_equations(lambda t, x, p: (np.sign(x.x) - x.x,), state=("x",))
+    found = hybrid.basins(wells, {"x": np.linspace(-2.0, 2.0, 6)})
+    assert found.label.values.tolist() == [1, 1, 1, 2, 2, 2]
+    [name, *_] = {each.part_of for each in wells.modes if each.part_of}
+    named = hybrid.basins(wells, {"x": np.linspace(-2.0, 2.0, 6)}, mode=name)
+    assert named.label.values.tolist() == [1, 1, 1, 2, 2, 2]
+
+
 def test_modes_by_their_guards():
     """Starts in the contact and outside it: both are modes of the same basin."""
     over = {"x1": np.linspace(-0.01, 0.06, 8), "x2": 0.05, "v1": 0.0, "v2": 0.0}
