@@ -133,7 +133,7 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
     if not known < found.tolerance < 1.0:
         raise ArgumentError(
             f"tolerance must be above {known:.2g} and below 1; got {found.tolerance}. Points of an orbit are "
-            "known to the square root of the solver's rtol: raise tolerance=, or give a solver= with a lower one."
+            "known to the square root of the solver's rtol: raise tolerance=, or lower rtol by solver=."
         )
     check_time("t0", found.t0, forcing or 0.0)
     compile_system(marked)
