@@ -15,6 +15,7 @@ HERE = Path(__file__).parent
 # What draws each picture or group of pictures.
 COMMANDS = {
     "pictures": [str(HERE / "make_pictures.py")],
+    "basins": [str(HERE / "make_basins.py")],
     "gallery": [str(HERE / "make_gallery.py")],
     "architecture": [str(HERE / "make_architecture.py")],
     "founding_chart": [str(HERE / "make_founding_chart.py")],

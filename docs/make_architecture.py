@@ -28,6 +28,7 @@ PATHS = {
         "hybrid.orbits",
         "hybrid.accuracy",
         "hybrid.sweep",
+        "hybrid.attractors",
     ),
     "compile": ("hybrid.system", "hybrid.symbolic", "hybrid.transform", "hybrid.compiler"),
     "run": ("hybrid.simulation", "hybrid.kernels", "hybrid.solvers"),

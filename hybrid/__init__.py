@@ -10,6 +10,10 @@ from typing import Any
 from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
+from hybrid.attractors.attractor import Attractor, Attractors
+from hybrid.attractors.attractors import attractors
+from hybrid.attractors.basins import basins
+from hybrid.attractors.fractions import basin_fractions
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
@@ -45,6 +49,8 @@ __all__ = [
     "DOP853",
     "Answer",
     "ArgumentError",
+    "Attractor",
+    "Attractors",
     "Bifurcation",
     "BifurcationCurve",
     "Branch",
@@ -71,6 +77,9 @@ __all__ = [
     "Transition",
     "Tsit5",
     "WorkPrecision",
+    "attractors",
+    "basin_fractions",
+    "basins",
     "compile_system",
     "continue_bifurcation",
     "continue_orbit",

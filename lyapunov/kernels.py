@@ -15,12 +15,12 @@ from hybrid.kernels.types.codes import (
 from hybrid.kernels.types.kinds import INDICES, INTEGER, MATRIX, REAL, TRUTH
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
-from lyapunov import statistics
+from lyapunov import batches
 from lyapunov.interval import End
 
 UNLIMITED = 9223372036854775807
 
-push = njit(**KERNEL)(statistics.push)
+push = njit(**KERNEL)(batches.push)
 
 
 @njit(**KERNEL)

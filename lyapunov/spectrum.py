@@ -13,6 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
+from hybrid.accuracy.averages import (
+    TaperedMean,
+    running_tapered_mean,
+    standard_error_from_batches,
+    taper_inflation,
+)
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted, html_table
@@ -20,19 +26,13 @@ from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.pace import time_scale
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
+from lyapunov.batches import closed_batch_means, new_batches
 from lyapunov.interval import End
-from lyapunov.statistics import (
-    TaperedMean,
-    closed_batch_means,
-    new_batches,
-    running_tapered_mean,
-    standard_error_from_batches,
-    taper_inflation,
-)
 
 if TYPE_CHECKING:
     import xarray
@@ -50,9 +50,9 @@ class LyapunovSpectrum:
     Attributes
     ----------
     exponents
-        ``(k,)``. Tapered means of the growth rates (see ``lyapunov.statistics.TaperedMean``). On periodic and
-        quasi-periodic motion their error falls like ``M^-3``; the error of the plain mean falls like
-        ``1 / M``. Minus infinity for a direction that a saltation matrix annihilates.
+        ``(k,)``. Tapered means of the growth rates (see :class:`hybrid.accuracy.averages.TaperedMean`). On
+        periodic and quasi-periodic motion their error falls like ``M^-3``; the error of the plain mean falls
+        like ``1 / M``. Minus infinity for a direction that a saltation matrix annihilates.
     standard_error
         ``(k,)``. Exponent plus and minus two standard errors contains the true exponent of this attractor
         in 95 % of runs. Too wide on regular motion.
@@ -247,25 +247,6 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
             f"{math.ulp(latest):.2g} apart. Lengthen it, or start nearer to time zero."
         )
     return length
-
-
-def time_scale(trajectory: Trajectory) -> float:
-    """How long the field takes to change a state at the start, in any units of the states.
-
-    It is the reciprocal of the spectral radius of ``abs(D_x f)``, the smallest norm of the Jacobian in any
-    units of the states. If that is zero, as in free flight, it is the longest time in which rate and
-    acceleration change a component by its size. It is 1 if there is no such component.
-    """
-    jacobian, x, rate = trajectory.jacobian(), np.abs(trajectory.x), trajectory.field()
-    if not np.all(np.isfinite(jacobian)):
-        return 1.0
-    radius = float(np.abs(np.linalg.eigvals(np.abs(jacobian))).max())
-    if radius > 0:
-        return 1.0 / radius
-    speed, acceleration = np.abs(rate), np.abs(jacobian @ rate)
-    per_size = speed + np.sqrt(speed * speed + 2.0 * acceleration * x)
-    moves = (x > 0) & (per_size > 0)
-    return float(np.max(2.0 * x[moves] / per_size[moves], initial=0.0)) or 1.0
 
 
 @cache

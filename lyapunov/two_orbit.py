@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, StatusCode, arguments
+from hybrid.accuracy.averages import running_tapered_mean
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
@@ -22,7 +23,6 @@ from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from lyapunov.spectrum import INTERVALS_AT_ONCE, end_at, interval_length
-from lyapunov.statistics import running_tapered_mean
 
 # The renormalised companion has no digits left this many roundings of the state from the orbit, or so near
 # the least of all numbers.

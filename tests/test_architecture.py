@@ -45,6 +45,7 @@ ROOMS = (
     "hybrid.plot",
     "hybrid.accuracy",
     "hybrid.sweep",
+    "hybrid.attractors",
     "hybrid.testing",
     "hybrid.__main__",
     "hybrid",

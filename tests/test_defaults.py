@@ -19,6 +19,11 @@ LONG = {**RUN, "t0": 0.0, "progress": False}
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
 CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
 PLAIN = {"parameters": None, "period": None, "name": "", "units": None, "laws": None}
+SEARCH = {
+    **{**LONG, "progress": None, "section": None, "interval": None, "periods": 1000, "recurrences": 10},
+    "tolerance": 0.01,
+}
+SAMPLE = {"seed": 0}
 FIGURE = {"ax": None, "figsize": None}
 DEFAULTS = {
     hybrid.DOP853: TOLERANCES,
@@ -76,6 +81,9 @@ DEFAULTS = {
         **{"points": ({},), "k": None, "intervals": 300, "interval": None, "transient": 200},
         "progress": False,
     },
+    lyapunov.covariant_vectors: {**LONG, "intervals": 1000, "interval": None, "transient": 200},
+    lyapunov.finite_time_exponents: {**RUN, "interval": None, "intervals": None, "t0": 0.0},
+    lyapunov.zero_one_test: {"frequencies": 100},
     lyapunov.lyapunov_spectrum: {
         **{**LONG, "k": None, "intervals": 1000, "interval": None, "transient": 200, "history": True},
     },
@@ -83,6 +91,13 @@ DEFAULTS = {
         **{**LONG, "separation": 1e-8, "direction": None, "intervals": 1000, "interval": None},
         "transient": 0,
     },
+    hybrid.attractors: {**SEARCH, **SAMPLE, "starts": 500, "executor": None},
+    hybrid.basins: {**SEARCH, "store": None, "executor": None},
+    hybrid.basin_fractions: {
+        **{**SEARCH, **SAMPLE, "along": None, "starts": 1000, "store": None, "executor": None},
+    },
+    hybrid.plot.plot_basins: {"size": None, **FIGURE},
+    hybrid.plot.plot_fractions: FIGURE,
     hybrid.plot.plot_arc: {"components": None, **FIGURE},
     hybrid.plot.plot_ends: {"x": 0, "y": None, "size": None, **FIGURE},
     hybrid.plot.plot_global_error: FIGURE,
@@ -138,7 +153,7 @@ def test_every_public_call_is_listed():
     listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
     # Bases, errors and results are made by the library.
     made = {"Bifurcation", "BifurcationCurve", "Branch", "CodimensionTwo", "HybridArc", "Solver"}
-    made |= {"Status", "StatusCode", "TwoOrbitExponents"}
+    made |= {"Attractor", "Attractors", "Status", "StatusCode", "TwoOrbitExponents"}
     for package in (hybrid, lyapunov):
         for name in package.__all__:
             each = getattr(package, name)

@@ -15,6 +15,7 @@ from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
+from hybrid.plot.basins import plot_basins, plot_fractions
 from hybrid.plot.branches import plot_branch, plot_curve
 from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
@@ -32,9 +33,11 @@ __all__ = [
     "drawn",
     "plot",
     "plot_arc",
+    "plot_basins",
     "plot_branch",
     "plot_curve",
     "plot_ends",
+    "plot_fractions",
     "plot_global_error",
     "plot_graph",
     "plot_jumps",
@@ -64,7 +67,8 @@ def drawn(result: Any, **options: Any) -> Any:
         return plot_sweep(result, **options)
     wanted = (
         "be a system, an arc, a section, an orbit, a branch, a spectrum, jumps, a GlobalError, a comparison "
-        "of models, or a dataset of chart, simulate_many or sweep; print other results"
+        "of models, or a dataset of chart, basins, basin_fractions, simulate_many or sweep; print other "
+        "results"
     )
     raise arguments.refusal("result", wanted, result)
 
@@ -77,6 +81,8 @@ drawn.register(Jumps, plot_jumps)
 drawn.register(Section, plot_section)
 drawn.register(PeriodicOrbit, plot_orbit)
 DATASETS["t_end"] = plot_ends
+DATASETS["label"] = plot_basins
+DATASETS["fraction"] = plot_fractions
 
 
 def plot(result: Any, **options: Any) -> Any:
@@ -84,8 +90,10 @@ def plot(result: Any, **options: Any) -> Any:
 
     An arc is drawn by :func:`plot_arc`, a system by :func:`plot_graph`, a section by :func:`plot_section`,
     a periodic orbit by :func:`plot_orbit`, jumps by :func:`plot_jumps`, a dataset of ``simulate_many`` by
-    :func:`plot_ends` and one of ``sweep`` by :func:`plot_sweep`. A spectrum, a chart, a comparison of models
-    and exponents from two orbits are drawn by ``lyapunov.plot``, and any other object by its method ``plot``.
+    :func:`plot_ends`, one of ``basins`` by :func:`plot_basins`, one of ``basin_fractions`` by
+    :func:`plot_fractions` and one of ``sweep`` by :func:`plot_sweep`. A spectrum, a chart, a comparison of
+    models and exponents from two orbits are drawn by ``lyapunov.plot``, and any other object by its method
+    ``plot``.
 
     Parameters
     ----------

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -14,11 +12,11 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
-from hybrid.display.progress import Progress, progress_bar
+from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.interrupt import CTRL_C, Bursts, stopped_by
+from hybrid.simulation.interrupt import CTRL_C, Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import fresh_run, fresh_work
 from hybrid.simulation.periods import check_time, split_time
@@ -27,7 +25,8 @@ from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.local import LOOK, cores
+from hybrid.sweep.blocks import run_in_blocks
+from hybrid.sweep.local import cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
@@ -36,8 +35,6 @@ from hybrid.system.labels import named
 if TYPE_CHECKING:
     import xarray
 
-# Starts that a thread takes at a time: enough of them that threads end at about the same time.
-BLOCKS_PER_THREAD = 8
 STARTS = "be states of shape (N, n), or map each component to a number or to N of them"
 
 
@@ -114,41 +111,11 @@ def simulate_many(
         work: Any = _OneByOne(system, (t0, t1), options, most, found)
     else:
         work = _Runs(system, (t0, t1), options, most, found)
-    size = -(-len(origins) // (BLOCKS_PER_THREAD * threads))
-    blocks = [range(i, min(i + size, len(origins))) for i in range(0, len(origins), max(size, 1))]
     with CTRL_C, progress_bar(len(origins), "Runs", progress, "start") as bar:
-        if threads == 1 or len(blocks) == 1:
-            for block in blocks:
-                work.run(block)
-                bar.update(len(block))
-        else:
-            _in_threads(work.run, blocks, threads, bar)
+        run_in_blocks(work.run, len(origins), threads, bar)
         # An interrupt that came too late to stop anything is not raised either.
         CTRL_C.is_set()
     return found.dataset(system, overrides)
-
-
-def _in_threads(run: Callable[[range], None], blocks: list[range], threads: int, bar: Progress) -> None:
-    """Run all blocks; an interrupt in the main thread stops the others."""
-    stop = threading.Event()
-
-    def work(block: range) -> None:
-        with stopped_by(stop):
-            run(block)
-
-    with ThreadPoolExecutor(threads) as pool:
-        counts: dict[Future[None], int] = {pool.submit(work, block): len(block) for block in blocks}
-        waiting = set(counts)
-        try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=LOOK)
-                if CTRL_C.is_set():
-                    stop.set()
-                for future in done:
-                    future.result()
-                    bar.update(counts[future])
-        finally:
-            stop.set()
 
 
 def _origins(system: HybridSystem, x0: Any) -> np.ndarray:

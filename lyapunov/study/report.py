@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.accuracy.averages import running_tapered_mean
 from hybrid.display.tables import table
 from lyapunov.floquet import floquet_exponents
-from lyapunov.statistics import running_tapered_mean
 from lyapunov.study.column import PAPERS, PaperColumn, printed, running, steady
 from lyapunov.study.paper import DOUBTFUL, PAPER, ROWS
 from lyapunov.study.runs import STARTS, Regime

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.types.codes import DONE, ENTERING, MAX_STEPS, NO_TRANSITION, READY, STALE
-from lyapunov import kernels, statistics
+from lyapunov import kernels
+from lyapunov.batches import new_batches
 from lyapunov.interval import End
 
 later, distance, rescale = (each.py_func for each in (kernels.later, kernels.distance, kernels.rescale))
@@ -122,7 +123,7 @@ class TestGrowthRates:
         ours = task([1.0, 1.0, 1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.5, 0.0, 0.0, -1.25], tangents=2)
         ours.run.stage = stage
         end, rates = new_end(), np.full((rows, 3), -7.0)
-        batches, state = statistics.new_batches(3)
+        batches, state = new_batches(3)
         code = plain.growth_rates(advance, None, ours, end, 1.5, 123, resumed, rates, batches, state)
         return code, ours, end, rates, (batches, state)
 
@@ -151,7 +152,7 @@ class TestGrowthRates:
         assert state.tolist() == [1, 1, 0]
         ours.run.growth[:] = 3.0, 6.0
         ours.run.divergence, ours.run.log_determinant = 1.0, 2.0
-        batches = statistics.new_batches(3)
+        batches = new_batches(3)
         rates = np.zeros((2, 3))
         code = plain.growth_rates(Advance(), None, ours, end, 1.5, 123, True, rates, *batches)
         assert (code, end.done, end.cycle, end.phase) == (DONE, 2, 2, 0.5)
@@ -163,7 +164,7 @@ class TestGrowthRates:
         ours = task([1.0, 1.0, 1.0, 0.0, 0.0, 1.0], np.zeros(6), tangents=2)
         ours.work.jacobian[:] = 1e30
         rates = np.zeros((1, 3))
-        plain.growth_rates(Advance(), None, ours, new_end(), 1.5, 9, False, rates, *statistics.new_batches(3))
+        plain.growth_rates(Advance(), None, ours, new_end(), 1.5, 9, False, rates, *new_batches(3))
         assert rates[0, :2].tolist() == [0.0, 0.0]
 
     def test_vectors_of_which_only_rounding_is_left_are_counted(self, plain, monkeypatch):

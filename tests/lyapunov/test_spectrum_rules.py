@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hybrid.accuracy.averages import TaperedMean
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.status import SUCCESS, Status, StatusCode
 from lyapunov import spectrum
 from lyapunov.spectrum import Estimate
-from lyapunov.statistics import TaperedMean
 
 
 class Burst(Estimate):

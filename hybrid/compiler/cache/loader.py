@@ -61,6 +61,7 @@ ALL_KERNELS = (
     "hybrid.kernels.steps.late",
     "hybrid.kernels.events.sections",
     "hybrid.kernels.events.many",
+    "hybrid.kernels.events.settle",
     "hybrid.kernels.steps.dense",
     "hybrid.kernels.evaluate",
     "hybrid.kernels.events.initial_mode",

@@ -175,6 +175,14 @@ def plots(made):
             },
         ),
         (
+            call(hybrid.plot.plot_basins, made["basins"]),
+            {"basins": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": SIZE},
+        ),
+        (
+            call(hybrid.plot.plot_fractions, made["fractions"]),
+            {"fractions": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+        ),
+        (
             call(hybrid.plot.plot_sweep, made["swept"]),
             {"swept": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": SIZE},
         ),

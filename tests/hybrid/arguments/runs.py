@@ -35,6 +35,43 @@ from tests.hybrid.arguments.values import (
 )
 
 
+def searches():
+    """Calls that look for attractors."""
+    over = {"x": (-1.0, 0.0), "v": 0.0}
+    common = {
+        **{name: RUN[name] for name in ("system", "mode", "parameters", "solver")},
+        "over": [
+            *(None, "a", 3, [1], {}, {"nope": 1.0}, {"x": 0.0}, {3: 1.0}, Odd()),
+            *({"x": bad, "v": 0.0} for bad in (None, "a", True, [], [[1.0]], math.nan, (1.0, 0.0), (1.0,))),
+        ],
+        "t0": [*NUMBER, *BIG_TIMES],
+        "section": GUARD[1:],
+        "interval": [*OPTIONAL_POSITIVE, 1.0],
+        "periods": [0, *COUNT],
+        "recurrences": [0, *COUNT],
+        "tolerance": POSITIVE,
+        "progress": FLAG[1:],
+    }
+    drawn = {"starts": [0, *COUNT], "seed": COUNT}
+    stored = {"store": [3, True, 1.5, [1], Odd()], "executor": EXECUTOR}
+    return [
+        (
+            call(hybrid.attractors, OSCILLATOR, over, starts=3),
+            {**common, **drawn, "executor": EXECUTOR[:-2]},
+        ),
+        (call(hybrid.basins, OSCILLATOR, {"x": [0.0], "v": 0.0}), {**common, **stored}),
+        (
+            call(hybrid.basin_fractions, OSCILLATOR, over, starts=3, along={"c": [0.1]}),
+            {
+                **common,
+                **drawn,
+                **stored,
+                "along": ["a", 3, [1], {}, {"nope": [1.0]}, {"c": "a"}, {"c": [math.nan]}, {"c": 1.0}, Odd()],
+            },
+        ),
+    ]
+
+
 def runs(made):
     start = (OSCILLATOR, (0.0, 0.0))
     ball = (BALL, (1.0, 0.0))
@@ -230,6 +267,25 @@ def runs(made):
                 "reference": [None, *NAME],
                 "points": [None, "a", 3, [], [1], ["a"], [{"nope": 1.0}], [{"c": "1"}]],
             },
+        ),
+        *searches(),
+        (call(lyapunov.covariant_vectors, *start, intervals=5, transient=2), EXPONENTS),
+        (
+            call(lyapunov.finite_time_exponents, *start),
+            {
+                **{name: EXPONENTS[name] for name in ("system", "mode", "parameters", "solver", "t0")},
+                "x0": [*NUMBERS, (0.5,), 0.5, [[0.5]], (math.nan, 0.0), [(math.nan, 0.0)], {"x": 1.0}, Odd()],
+                "interval": EXPONENTS["interval"],
+                "intervals": [0, *COUNT[1:]],
+            },
+        ),
+        (
+            call(lyapunov.kaplan_yorke_dimension, [0.1, -0.2]),
+            {"exponents": [*NUMBERS, 0.5, [], [[0.1, 0.2]], [math.nan], [math.inf, -1.0]]},
+        ),
+        (
+            call(lyapunov.zero_one_test, [0.0, 1.0] * 50),
+            {"series": [*NUMBERS, 0.5, [0.1, 0.2], [math.nan] * 200], "frequencies": [0, *COUNT]},
         ),
         (call(lyapunov.floquet_exponents, made["orbit"]), {"orbit": [None, "a", 3, OSCILLATOR, Odd()]}),
     ]

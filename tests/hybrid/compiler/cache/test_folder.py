@@ -351,7 +351,7 @@ KERNELS, SPECTRUM, COMPILER, TRACER = range(4)
         ("hybrid/compiler/llvm/deeper/new.py", {COMPILER, TRACER}),
         ("hybrid/compiler/taylor/series.py", {TRACER}),
         ("hybrid/solvers/deeper/new.py", {TRACER}),
-        ("lyapunov/statistics.py", {SPECTRUM}),
+        ("lyapunov/batches.py", {SPECTRUM}),
         ("models/bouncing_ball.py", set()),
     ],
 )

@@ -1,6 +1,5 @@
 """The standard error covers the truth and the weighted mean converges as documented."""
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,12 +8,9 @@ from scipy.fft import dct
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from lyapunov import statistics
-from lyapunov.statistics import (
+from hybrid.accuracy import averages
+from hybrid.accuracy.averages import (
     TaperedMean,
-    closed_batch_means,
-    new_batches,
-    push,
     running_tapered_mean,
     standard_error,
     standard_error_from_batches,
@@ -176,48 +172,7 @@ def test_long_series_are_merged_into_at_most_1024_batches(length, size):
 def test_student_factors():
     two_sigma = norm.cdf(2.0)
     expected = t.ppf(two_sigma, np.arange(1, 9)) / 2.0
-    np.testing.assert_allclose(statistics.TWO_SIGMA_OF_STUDENT, expected, rtol=1e-7)
-
-
-def test_an_accumulator_begins_with_batches_of_one_value():
-    sums, state = new_batches(3)
-    assert sums.shape == (statistics.MAX_BATCHES, 3)
-    assert not sums.any()
-    assert state.tolist() == [0, 1, 0]
-
-
-def accumulate(series, batches, add=push):
-    sums, state = new_batches(series.shape[1])
-    sums = sums[:batches]
-    for row in series:
-        add(sums, state, row)
-    return sums, state
-
-
-@given(length=st.integers(0, 300), half=st.integers(1, 10))
-def test_accumulator_keeps_the_means_of_equal_batches(length, half):
-    series = np.random.default_rng(length).standard_normal((length, 2))
-    sums, state = accumulate(series, 2 * half)
-    closed, size, in_open = state
-    assert closed <= 2 * half
-    assert closed * size + in_open == length
-    expected = series[: closed * size].reshape(closed, size, 2).mean(axis=1)
-    np.testing.assert_allclose(closed_batch_means(sums, state), expected, atol=1e-13)
-
-
-def test_accumulator_gives_the_error_of_the_whole_series():
-    series = autoregressive(0.9, 9000, np.random.default_rng(8))[:, :2]
-    error = standard_error_from_batches(closed_batch_means(*accumulate(series, statistics.MAX_BATCHES)))
-    np.testing.assert_allclose(error, standard_error(series), rtol=0.1)
-
-
-def test_accumulator_compiles_and_agrees_with_itself_in_python():
-    series = np.random.default_rng(9).standard_normal((100, 3))
-    series[50, 2] = -np.inf
-    compiled, in_python = accumulate(series, 16, numba.njit(push)), accumulate(series, 16)
-    np.testing.assert_array_equal(compiled[0], in_python[0])
-    np.testing.assert_array_equal(compiled[1], in_python[1])
-    assert standard_error_from_batches(closed_batch_means(*compiled))[2] == 0.0
+    np.testing.assert_allclose(averages.TWO_SIGMA_OF_STUDENT, expected, rtol=1e-7)
 
 
 def tapered_mean(series):
@@ -276,5 +231,5 @@ def test_the_correlation_of_neighbours_has_no_bias(phi):
     noise = rng.standard_normal((256, 20_000))
     noise[0] /= np.sqrt(1.0 - phi**2)
     series = lfilter([1.0], [1.0, -phi], noise, axis=0)
-    found = statistics._lag_one_correlation(series - series.mean(axis=0))
+    found = averages._lag_one_correlation(series - series.mean(axis=0))
     assert found.mean() == pytest.approx(phi, abs=3.5e-3)

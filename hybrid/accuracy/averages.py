@@ -2,9 +2,7 @@
 
 Growth rates of successive intervals are correlated, sometimes over hundreds of intervals. Sometimes they
 cancel: on a torus, or for the logistic map, they are differences of a function along the orbit, and their
-mean converges like ``1/M``, not ``1/sqrt(M)``. The textbook ``std / sqrt(M)`` is wrong in both cases. The
-accumulator keeps a bounded number of batches for any length of the run, and the standard error is computed
-from the batches.
+mean converges like ``1/M``, not ``1/sqrt(M)``. The textbook ``std / sqrt(M)`` is wrong in both cases.
 """
 
 from __future__ import annotations
@@ -16,12 +14,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Batches of a long series from which its standard error is computed.
 MAX_BATCHES = 1024
-
-# Slots of the state of an accumulator.
-CLOSED = 0
-BATCH_SIZE = 1
-IN_OPEN_BATCH = 2
 
 # Few frequencies stay close to zero, where the spectrum is needed; many reduce the variance of the estimate.
 # With 8 frequencies, and a correlation fitted to some 32 batches, two standard errors cover the truth in 94
@@ -36,40 +30,6 @@ MAX_CORRELATION = 0.9
 TWO_SIGMA_OF_STUDENT = np.array(
     [6.9838651, 2.26326834, 1.65341109, 1.43465471, 1.32432472, 1.25826203, 1.21440257, 1.18320789]
 )
-
-
-def new_batches(k: int) -> tuple[Array, NDArray[np.int64]]:
-    """Empty accumulator for ``k`` columns: batch sums ``(MAX_BATCHES, k)`` and state ``(3,)`` for `push`."""
-    return np.zeros((MAX_BATCHES, k)), np.array([0, 1, 0], dtype=np.int64)
-
-
-def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
-    """Add ``values (k,)`` to ``batch_sums (B, k)``, ``B`` even; merge neighbours when all batches are full.
-
-    ``state (3,)`` holds the number of closed batches, the number of values per batch, and the number of
-    values in the open batch, which is the row after the closed ones. Kernels compile this function, so it
-    uses arrays and integers only.
-    """
-    if state[CLOSED] == batch_sums.shape[0]:
-        half = batch_sums.shape[0] // 2
-        for i in range(half):
-            for c in range(batch_sums.shape[1]):
-                batch_sums[i, c] = batch_sums[2 * i, c] + batch_sums[2 * i + 1, c]
-        batch_sums[half:] = 0.0
-        state[CLOSED] = half
-        state[BATCH_SIZE] *= 2
-    row = state[CLOSED]
-    for c in range(batch_sums.shape[1]):
-        batch_sums[row, c] += values[c]
-    state[IN_OPEN_BATCH] += 1
-    if state[IN_OPEN_BATCH] == state[BATCH_SIZE]:
-        state[CLOSED] += 1
-        state[IN_OPEN_BATCH] = 0
-
-
-def closed_batch_means(batch_sums: Array, state: NDArray[np.int64]) -> Array:
-    """Means ``(b, k)`` of the closed batches of an accumulator, without the open batch."""
-    return batch_sums[: state[CLOSED]] / state[BATCH_SIZE]
 
 
 def standard_error(series: Array) -> Array:
@@ -88,7 +48,7 @@ def standard_error(series: Array) -> Array:
     """
     series = np.asarray(series, dtype=float)
     size = max(1, math.ceil(len(series) / MAX_BATCHES))
-    return standard_error_from_batches(_merge(series, size))
+    return standard_error_from_batches(merged(series, size))
 
 
 def standard_error_from_batches(batch_means: Array) -> Array:
@@ -140,7 +100,7 @@ def standard_error_from_batches(batch_means: Array) -> Array:
 
     nu = min(FREQUENCIES, count // 2)
     spectrum = (_cosines(count, nu) @ deviations) ** 2
-    coarse = _merge(deviations, max(1, count // COARSE_BATCHES))
+    coarse = merged(deviations, max(1, count // COARSE_BATCHES))
     seen = _autoregressive_spectrum(_lag_one_correlation(coarse), len(coarse), nu)
     error = np.sqrt(spectrum.mean(axis=0) / seen / count) * TWO_SIGMA_OF_STUDENT[nu - 1]
 
@@ -148,7 +108,7 @@ def standard_error_from_batches(batch_means: Array) -> Array:
     return np.where(finite, error, np.where(collapsed, 0.0, np.nan))
 
 
-def _merge(series: Array, size: int) -> Array:
+def merged(series: Array, size: int) -> Array:
     """Means of batches of ``size`` rows; a remainder is dropped at the start, near the transient."""
     count = len(series) // size
     return series[len(series) - count * size :].reshape(count, size, *series.shape[1:]).mean(axis=1)

@@ -1,0 +1,131 @@
+"""An attractor as the user sees it, and a mapping of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from hybrid.display.tables import counted, html_table
+from hybrid.simulation.labelled import Names, attributes
+from hybrid.status import Status
+
+if TYPE_CHECKING:
+    import xarray
+
+KINDS = ("equilibrium", "periodic", "torus", "chaotic")
+UNKNOWN = "not known"
+
+
+@attrs.frozen(eq=False, repr=False)
+class Attractor:
+    """An attractor on its section.
+
+    Attributes
+    ----------
+    kind
+        ``"equilibrium"``, ``"periodic"``, ``"torus"`` or ``"chaotic"``, by the signs of the exponents: one
+        within two standard errors of zero counts as zero. ``"not known"`` if they could not be computed.
+    points, mode
+        Points of the section ``(P, n)`` and names of their modes ``(P,)``: one round of a periodic orbit, in
+        the order in which it visits them; a sample of other attractors.
+    round
+        How many points one round has: for a forced system the number of forcing periods. 0 if the points do
+        not come back: the motion is not periodic, or the points of an orbit are taken at equal times.
+    period
+        Time of one round; nan if the motion is not periodic.
+    jumps
+        Jumps per period, or per point if the motion is not periodic.
+    exponents, standard_error
+        Lyapunov exponents ``(n,)``, largest first, in inverse units of time, and their errors. Those of a
+        periodic orbit are the logarithms of its multipliers over the period.
+    start
+        A state that leads to it ``(n,)``.
+    """
+
+    kind: str
+    points: np.ndarray
+    mode: np.ndarray
+    round: int
+    period: float
+    jumps: float
+    exponents: np.ndarray
+    standard_error: np.ndarray
+    start: np.ndarray
+
+    def __repr__(self) -> str:
+        what = f"{self.kind}, {counted(self.round, 'point')}" if self.round else self.kind
+        values = ", ".join(f"{value:.4g}" for value in self.exponents)
+        return f"<Attractor: {what}, {self.jumps:.4g} jumps, exponents [{values}]>"
+
+
+class Attractors(Mapping[int, Attractor]):
+    """Attractors by label: 1, 2, ...
+
+    The labels depend on the attractors alone: equilibria and periodic orbits come first, those of fewer
+    points before others, then tori, then chaos; among equals the one with the lowest first component.
+
+    Attributes
+    ----------
+    status
+        How the search ended.
+    """
+
+    def __init__(self, found: tuple[Attractor, ...], status: Status, names: Names) -> None:
+        self._found, self.status, self.names = found, status, names
+
+    def __getitem__(self, label: int) -> Attractor:
+        if label not in range(1, len(self._found) + 1):
+            raise KeyError(label)
+        return self._found[label - 1]
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(range(1, len(self._found) + 1))
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def __repr__(self) -> str:
+        lines = [f"<{counted(len(self), 'attractor')}, {self.status.brief}>"]
+        return "\n".join([*lines, *(f"{label}: {each!r}" for label, each in self.items())])
+
+    def _repr_html_(self) -> str:
+        """A table for a notebook."""
+        rows = [
+            [str(label), each.kind, str(each.round or ""), f"{each.jumps:.4g}", f"{each.exponents[0]:.4g}"]
+            for label, each in self.items()
+        ]
+        head = ("label", "kind", "points per round", "jumps", "largest exponent")
+        return f"{html_table(head, rows)}\n<p>{escape(str(self.status))}</p>"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The attractors over the axis ``attractor``, with points filled up with nan."""
+        import xarray
+
+        n, found = len(self.names.state), self._found
+        most = max((len(each.points) for each in found), default=0)
+        points, modes = np.full((len(found), most, n), np.nan), np.full((len(found), most), "", dtype=object)
+        for i, each in enumerate(found):
+            points[i, : len(each.points)], modes[i, : len(each.points)] = each.points, each.mode
+        axes = ("attractor", "point", "state")
+        variables = {
+            "kind": ("attractor", np.array([each.kind for each in found], dtype=object)),
+            "round": ("attractor", np.array([each.round for each in found], dtype=np.int64)),
+            "period": ("attractor", np.array([each.period for each in found]), self.names.of("t")),
+            "jumps": ("attractor", np.array([each.jumps for each in found])),
+            "exponents": (("attractor", "exponent"), _rows(found, "exponents", n), self.names.rate),
+            "standard_error": (("attractor", "exponent"), _rows(found, "standard_error", n), self.names.rate),
+            "points": (axes, points, self.names.states),
+            "mode_of_point": (axes[:2], modes),
+        }
+        coords = {"attractor": np.arange(1, len(found) + 1), "exponent": np.arange(1, n + 1)}
+        return xarray.Dataset(
+            variables, {**coords, **self.names.coords()}, attributes("attractors", self.status)
+        )
+
+
+def _rows(found: tuple[Attractor, ...], name: str, n: int) -> np.ndarray:
+    return np.array([getattr(each, name) for each in found]).reshape(-1, n)

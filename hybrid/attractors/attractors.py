@@ -1,0 +1,157 @@
+"""The attractors that starts lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybrid import arguments
+from hybrid.attractors.attractor import Attractors
+from hybrid.attractors.runs import CODE, OWNER
+from hybrid.attractors.search import Search
+from hybrid.attractors.setup import setup_of
+from hybrid.attractors.starts import axes_of, sample_of
+from hybrid.display.progress import progress_bar
+from hybrid.kernels.types import codes
+from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.labelled import Names
+from hybrid.solvers import Solver
+from hybrid.status import Status, StatusCode
+from hybrid.sweep.local import cores
+from hybrid.system.elements import Guard
+from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import growing
+
+
+@growing
+def attractors(
+    system: HybridSystem,
+    over: Any,
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    t0: float = 0.0,
+    section: Guard | None = None,
+    interval: float | None = None,
+    starts: int = 500,
+    seed: int = 0,
+    periods: int = 1000,
+    recurrences: int = 10,
+    tolerance: float = 0.01,
+    solver: Solver | None = None,
+    executor: int | None = None,
+    progress: bool | None = None,
+) -> Attractors:
+    """Attractors that random starts lead to, by recurrences of their runs on a section.
+
+    The points of a run are taken once per forcing period; with ``section`` at each crossing of a surface;
+    otherwise, for autonomous systems, at equal times. The first run goes on until its points come back: a
+    round that repeats is a periodic orbit or an equilibrium, with the multipliers of its fundamental matrix;
+    other motion is a sample of points, with exponents averaged along the run. Each later run is stopped in
+    compiled code as soon as ``recurrences`` points in succession are near the points of one attractor. A run
+    that is near none after ``periods`` points is followed further, and gives the next attractor.
+
+    Recurrences suit attractors that are apart on the section. Where those of one kind lie closer together
+    than ``tolerance``, lower it; where a start may wander for long before it settles, raise ``periods``.
+
+    Parameters
+    ----------
+    system, mode, parameters, solver
+        As for :func:`hybrid.simulate`.
+    over
+        For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
+    t0
+        Time at the starts; its phase is that of the section of a forced system.
+    section
+        Surface for the points, for autonomous systems or in place of the forcing period.
+    interval
+        Time between two points of an autonomous system without a section; by default the time scale of its
+        field.
+    starts, seed
+        Number of random starts, and of their sequence. An attractor with a share ``f`` of the starts is
+        missed with the probability ``(1 - f) ** starts``.
+    periods
+        Points that a run has to settle.
+    recurrences
+        Points in succession near one attractor that decide a start.
+    tolerance
+        Two states are near each other if no component differs by more than this share of the distance by
+        which it changes along the attractor's orbit.
+    executor
+        Number of threads; by default all cores.
+    progress
+        Whether to show a progress bar; by default in a terminal or a notebook, after two seconds.
+
+    Returns
+    -------
+    Attractors
+        A mapping of the labels 1, 2, ... to :class:`hybrid.Attractor`, with a status.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    References
+    ----------
+    G. Datseris, A. Wagemakers, "Effortless estimation of basins of attraction", Chaos 32 (2022) 023104,
+    doi:10.1063/5.0076568, is the method on a grid of cells; here distances to the points take the place of
+    cells.
+
+    Examples
+    --------
+    >>> import models
+    >>> found = attractors(models.impact_oscillator(), {"x": (-1.0, 1.0), "v": (-2.0, 2.0)})
+    >>> found[1].kind, found[1].jumps
+    ('periodic', 1.0)
+    """
+    axes = axes_of(system, over)
+    count = arguments.count("starts", starts, 1)
+    origins = sample_of(system, axes, count, arguments.count("seed", seed, 0))
+    threads = cores() if executor is None else arguments.count("executor", executor, 1)
+    given = {
+        "mode": mode,
+        "parameters": parameters,
+        "t0": t0,
+        "section": section,
+        "interval": interval,
+        "periods": periods,
+        "recurrences": recurrences,
+        "tolerance": tolerance,
+        "solver": solver,
+    }
+    setup = setup_of(system, origins[np.lexsort(origins.T[::-1])[0]], given)
+    search = Search(setup, threads)
+    with CTRL_C, progress_bar(count, "Attractors", as_flag(progress), "start") as bar:
+        search.pilot(origins)
+        rows = search.decided(origins, bar)
+        stopped = CTRL_C.is_set()
+    found, _ = search.ordered()
+    status = interrupted_status("the attractors found so far") if stopped else status_of_search(rows, periods)
+    return Attractors(found, status, Names(system.state_names, dict(system.units)))
+
+
+def as_flag(progress: object) -> bool | None:
+    """The argument ``progress``, which may be None."""
+    return None if progress is None else arguments.flag("progress", progress)
+
+
+def status_of_search(rows: np.ndarray, periods: int) -> Status:
+    """What a search says of starts that lead to no attractor."""
+    undecided = int(np.sum((rows[:, OWNER] < 0) & (rows[:, CODE] == codes.MAX_STEPS)))
+    ended = int(np.sum((rows[:, OWNER] < 0) & (rows[:, CODE] > codes.MAX_STEPS)))
+    beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
+    told = []
+    if ended:
+        told.append(f"The runs of {ended} of {len(rows)} starts end on their way.")
+    if beyond:
+        told.append(f"{beyond} of {len(rows)} starts violate every mode.")
+    if undecided:
+        return Status(
+            StatusCode.NOT_CONVERGED,
+            f"{undecided} of {len(rows)} starts are near no attractor after {periods} points.",
+            "Raise periods=, or tolerance= where an attractor is a large set.",
+        )
+    return Status(StatusCode.SUCCESS, " ".join(["Every start is decided.", *told]))

@@ -1,0 +1,226 @@
+"""Basins of attraction: which attractor each start of a grid leads to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid.attractors.attractor import Attractors
+from hybrid.attractors.attractors import as_flag, status_of_search
+from hybrid.attractors.find import Found
+from hybrid.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
+from hybrid.attractors.search import FIRST_POINTS, Search, known_of
+from hybrid.attractors.setup import Setup, digest, setup_of
+from hybrid.attractors.starts import Grid, axes_of, grid_of
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types import codes
+from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.labelled import Names
+from hybrid.solvers import Solver
+from hybrid.status import Status, StatusCode
+from hybrid.sweep.local import cores
+from hybrid.sweep.sheet import flags
+from hybrid.sweep.sweep import sweep
+from hybrid.system.elements import Guard
+from hybrid.system.graph import HybridSystem, starting_mode
+from hybrid.system.growth import growing
+
+if TYPE_CHECKING:
+    import xarray
+
+RESERVED = (
+    *("label", "steps", "status", "message", "attractor", "exponent", "point", "state", "kind", "round"),
+    *("period", "jumps", "exponents", "standard_error", "points", "mode_of_point", "fraction", "unit"),
+)
+VIOLATES = -1
+
+
+@growing
+def basins(
+    system: HybridSystem,
+    over: Any,
+    *,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    t0: float = 0.0,
+    section: Guard | None = None,
+    interval: float | None = None,
+    periods: int = 1000,
+    recurrences: int = 10,
+    tolerance: float = 0.01,
+    solver: Solver | None = None,
+    store: str | PathLike[str] | None = None,
+    executor: Any = None,
+    progress: bool | None = None,
+) -> xarray.Dataset:
+    """Which attractor each start of a grid leads to, with the attractors.
+
+    The method is that of :func:`hybrid.attractors`. The labels depend neither on the order of the starts nor
+    on the number of threads. Ctrl-C ends the call, not the program: lines of the grid that are not complete
+    have the label 0 and the status ``NOT_RUN``.
+
+    Parameters
+    ----------
+    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, solver
+        As for :func:`hybrid.attractors`.
+    over
+        For each component of the state a number, which all starts have; an array of values; or a range
+        ``(low, high)``, of which 100 values are taken. Each array or range is an axis of the grid.
+    store, executor, progress
+        As for :func:`hybrid.sweep`: the points of the sweep are the lines of the grid along its first axis.
+        Lines that a store holds are not run again.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the axes of the grid: ``label``, 1, 2, ... for an attractor, 0 for none (see ``status``: the run
+        ended, or was near no attractor after ``periods`` points), -1 for a start that violates every mode, or
+        the mode that the call or the system names: it lies beyond a guard of each. The attribute
+        ``violated_modes`` names these. ``steps`` is the number of points until the decision. With the
+        attractors over the axis ``attractor``, as ``Attractors.to_xarray`` gives them, and their share of the
+        grid, ``fraction``.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Examples
+    --------
+    >>> import models
+    >>> found = basins(models.impact_oscillator(), {"x": np.linspace(-1, 1.5, 6), "v": [-1.0, 1.0]})
+    >>> found.label.values.tolist()
+    [[1, 1], [1, 1], [1, 1], [1, 1], [1, 1], [-1, -1]]
+    """
+    axes = axes_of(system, over, RESERVED)
+    shown = as_flag(progress)
+    grid = grid_of(system, axes)
+    given = {
+        "mode": mode,
+        "parameters": parameters,
+        "t0": t0,
+        "section": section,
+        "interval": interval,
+        "periods": periods,
+        "recurrences": recurrences,
+        "tolerance": tolerance,
+        "solver": solver,
+    }
+    setup = setup_of(system, grid.origins[np.lexsort(grid.origins.T[::-1])[0]], given)
+    threads = executor if isinstance(executor, int) and not isinstance(executor, bool) else None
+    search = Search(setup, max(1, threads or cores()))
+    with CTRL_C:
+        search.pilot(grid.origins)
+        rows = _not_run(grid)
+        if not CTRL_C.is_set():
+            rows = _rows(setup, grid, list(search.found), store=store, executor=executor, progress=shown)
+        if not CTRL_C.is_set():
+            rows = search.decided(grid.origins, found=rows)
+        stopped = CTRL_C.is_set()
+    status = (
+        interrupted_status("the lines that were complete") if stopped else status_of_search(rows, periods)
+    )
+    return _dataset(setup, grid, search, rows, status)
+
+
+def _not_run(grid: Grid) -> np.ndarray:
+    rows = np.zeros((len(grid.origins), 4), dtype=np.int64)
+    rows[:, OWNER], rows[:, CODE] = NONE, StatusCode.NOT_RUN
+    return rows
+
+
+def _rows(setup: Setup, grid: Grid, found: list[Found], **options: Any) -> np.ndarray:
+    """What is found of each start with the attractors known so far, by a sweep over lines of the grid."""
+    if not grid.axes:
+        return Lines(setup, grid, tuple(found)).rows(grid.origins)
+    first = grid.axes[0]
+    # The values of an axis may occur twice, and need not be in order.
+    swept = sweep(Lines(setup, grid, tuple(found)), {first.name: first.points()}, **options)
+    rows = _not_run(grid)
+    if "rows" in swept:
+        made = swept["rows"].values.reshape(-1, 4)
+        done = np.isfinite(made[:, 0])
+        rows[done] = made[done]
+    failed = np.flatnonzero(swept.status.values == StatusCode.FAILED)
+    if failed.size:
+        raise ArgumentError(str(swept.message.values[failed[0]]))
+    return rows
+
+
+@attrs.frozen(eq=False)
+class Lines:
+    """The task of a sweep: the starts of a grid that have one value along its first axis."""
+
+    setup: Setup
+    grid: Grid
+    found: tuple[Found, ...]
+
+    def __call__(self, point: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """What is found of each start of the line."""
+        [(name, value)] = point.items()
+        column = self.setup.system.state_names.index(name)
+        length = len(self.grid.origins) // self.grid.shape[0]
+        origins = self.grid.origins[:length].copy()
+        origins[:, column] = value
+        return {"rows": self.rows(origins).astype(float)}
+
+    def rows(self, origins: np.ndarray) -> np.ndarray:
+        """What is found of starts."""
+        most = min(FIRST_POINTS, self.setup.periods) if self.found else 0
+        return runs_of(self.setup).settle(origins, known_of(self.setup, list(self.found)), most)
+
+    def prepare(self) -> None:
+        """Load what the runs need."""
+        runs_of(self.setup)
+
+    @property
+    def system(self) -> HybridSystem:
+        """The model."""
+        return self.setup.system
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What decides the results: the setup, the other axes, the attractors."""
+        length = len(self.grid.origins) // self.grid.shape[0]
+        others = np.delete(
+            self.grid.origins[:length], self.setup.system.state_names.index(self.grid.dims[0]), axis=1
+        )
+        found = [digest(np.vstack([each.radius, each.attractor.points])) for each in self.found]
+        return {**self.setup.facts(), "starts": digest(others), "attractors": found}
+
+
+def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status: Status) -> xarray.Dataset:
+    system, shape, dims = setup.system, grid.shape, grid.dims
+    found, labels = search.ordered()
+    label = np.where(rows[:, OWNER] >= 0, labels[rows[:, OWNER]], 0)
+    label[rows[:, CODE] == codes.REFUSED] = VIOLATES
+    named = starting_mode(system, setup.mode)
+    violated = list(system.mode_names) if named is None else [named]
+    code = np.where(rows[:, CODE] == codes.REFUSED, StatusCode.FAILED, rows[:, CODE])
+    code = np.where(rows[:, CODE] == codes.MAX_STEPS, StatusCode.NOT_CONVERGED, code)
+    names = Names(system.state_names, dict(system.units))
+    made = Attractors(found, status, names).to_xarray()
+    told = {"0": "no attractor", "-1": f"violates {', '.join(violated)}"}
+    made["label"] = (dims, label.reshape(shape), {f"meaning of {key}": text for key, text in told.items()})
+    made["steps"] = (dims, rows[:, POINTS].reshape(shape))
+    made["status"] = (dims, code.reshape(shape).astype(np.int16), flags())
+    shares = [float(np.mean(label == i)) for i in range(1, len(found) + 1)]
+    made["fraction"] = ("attractor", np.array(shares))
+    for axis in grid.axes:
+        made = made.assign_coords(
+            {axis.name: (axis.name, axis.points(), {**names.of(axis.name), **axis.attrs})}
+        )
+    fixed = {name: float(grid.origins[0, i]) for i, name in enumerate(system.state_names) if name not in dims}
+    used = {**system.parameters, **setup.parameters}
+    return made.assign_attrs(
+        kind="basins",
+        model=system.name or "unnamed",
+        model_parameters=json.dumps({name: float(value) for name, value in used.items()}),
+        fixed=json.dumps(fixed),
+        violated_modes=json.dumps(violated) if (label == VIOLATES).any() else "[]",
+    )

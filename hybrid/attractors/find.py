@@ -1,0 +1,268 @@
+"""From a start to the attractor that its run settles on: its points, its period, its exponents."""
+
+from __future__ import annotations
+
+import math
+
+import attrs
+import numpy as np
+
+from hybrid.accuracy.averages import TaperedMean, standard_error, taper_inflation
+from hybrid.attractors.attractor import UNKNOWN, Attractor
+from hybrid.attractors.runs import Points
+from hybrid.attractors.setup import Setup
+from hybrid.errors import HybridError
+from hybrid.kernels.types import codes
+from hybrid.orbits.factors import fundamental_factors
+from hybrid.orbits.periodic_schur import product_eigenvalues
+from hybrid.orbits.triangles import Triangles
+from hybrid.simulation.ending import status_of
+from hybrid.simulation.simulate import simulate
+from hybrid.system.elements import Guard
+from hybrid.transform.markers import with_section
+
+# Points in which a period is looked for, and after how many without one an attractor has none.
+WINDOW, MOST_POINTS = 1024, 16_384
+# Share of its points that an attractor visits again, near earlier ones, before a sample counts as complete.
+REVISITED = 0.9
+# Intervals from which exponents are averaged at first and at most, and those that show the size of the orbit.
+INTERVALS, MOST_INTERVALS, LOOKED_AT = 400, 1600, 16
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """An attractor with what the search needs: how near is near, per component ``(n,)``."""
+
+    attractor: Attractor
+    radius: np.ndarray
+
+    def distances(self, states: np.ndarray, mode: np.ndarray) -> np.ndarray:
+        """How far states ``(N, n)`` in these modes ``(N,)`` are from the points, in radii."""
+        # SciPy's spatial algorithms take long to import.
+        from scipy.spatial import cKDTree
+
+        far = np.full(len(states), np.inf)
+        for name in np.unique(mode):
+            own, theirs = self.attractor.mode == name, mode == name
+            if own.any():
+                tree = cKDTree(self.attractor.points[own] / self.radius)
+                far[theirs] = tree.query(states[theirs] / self.radius, p=np.inf)[0]
+        return far
+
+
+def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
+    """The attractor that the run from a start settles on; None if the run ends."""
+    points = Points(setup, x0, mode)
+    before, _ = _collected(points, setup.periods)
+    if points.code != codes.DONE:
+        return None
+    extent, share = _extent(np.vstack([x0, before])), math.sqrt(setup.solver.rtol)
+    sample = np.empty((0, len(x0))), np.empty((0, 2), dtype=np.int64)
+    # Chaos may be a long transient of a periodic orbit, so it takes many points to call an attractor chaotic.
+    while len(sample[0]) < MOST_POINTS:
+        window = _collected(points, WINDOW)
+        if points.code != codes.DONE:
+            return None
+        extent = np.maximum(extent, _extent(window[0]))
+        count = _round(window[0], window[1][:, 0], extent, share)
+        if count:
+            return _periodic(setup, points, count, extent, x0)
+        sample = np.vstack([sample[0], window[0]]), np.vstack([sample[1], window[1]])
+    return _wandering(setup, points, *sample, extent, x0)
+
+
+def _collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
+    states, places = points.more(count)
+    if points.code != codes.DONE:
+        # A run that needs a mode which has not been made yet is repeated.
+        status_of(points.trajectory, points.code)
+    return states, places
+
+
+def _extent(states: np.ndarray) -> np.ndarray:
+    """Size of what a run visits ``(n,)``; that of the state itself where a component never changes."""
+    extent, size = np.ptp(states, axis=0), np.abs(states).max(axis=0)
+    return np.where(extent > 0, extent, np.where(size > 0, size, 1.0))
+
+
+def _round(states: np.ndarray, mode: np.ndarray, extent: np.ndarray, share: float) -> int:
+    """The smallest number of points after which a whole round repeats, up to a share of the extent; or 0."""
+    far = np.abs(states[-1] - states[-2::-1]) / extent
+    back = (far <= share).all(axis=1) & (mode[-2::-1] == mode[-1])
+    for count in (np.flatnonzero(back) + 1).tolist():
+        if 2 * count > len(states):
+            break
+        last, earlier = states[-count:], states[-2 * count : -count]
+        if np.all(np.abs(last - earlier) <= share * extent):
+            return int(count)
+    return 0
+
+
+def _periodic(setup: Setup, points: Points, count: int, extent: np.ndarray, x0: np.ndarray) -> Found | None:
+    """A stable periodic orbit of ``count`` points, or equilibrium, at which the run has arrived; or None."""
+    run = points.trajectory
+    origin, mode, begin, jumps, steps = run.x, run.mode, run.t, run.jumps, run.steps
+    states, places = _collected(points, count)
+    if points.code != codes.DONE:
+        return None
+    period = count * setup.interval if setup.forced else run.t - begin
+    jumps = run.jumps - jumps - (count if setup.markers else 0)
+    error = np.full(len(origin), setup.solver.rtol * (run.steps - steps) / period)
+    moved = _orbit(setup, origin, mode, period)
+    rests = jumps == 0 and bool(np.all(moved <= math.sqrt(setup.solver.rtol) * extent))
+    log_moduli = _log_moduli(setup, origin, mode, period)
+    if np.any(log_moduli > math.sqrt(setup.solver.rtol)):
+        # The run has come to rest on the stable manifold of an unstable orbit.
+        return None
+    size = np.where(moved > math.sqrt(setup.solver.rtol) * extent, moved, extent)
+    attractor = Attractor(
+        kind="equilibrium" if rests else "periodic",
+        points=states,
+        mode=np.array(run.system.mode_names)[places[:, 0]],
+        round=count,
+        period=period,
+        jumps=float(jumps),
+        exponents=log_moduli / period,
+        standard_error=error,
+        start=x0,
+    )
+    if rests:
+        attractor = attrs.evolve(attractor, points=states[-1:], mode=attractor.mode[-1:], round=1)
+    return Found(attractor, setup.tolerance * size)
+
+
+def _orbit(setup: Setup, x: np.ndarray, mode: str, time: float) -> np.ndarray:
+    """How far the components move over a time ``(n,)``."""
+    span = (setup.t0, setup.t0 + time)
+    arc = simulate(setup.system, x, span, mode=mode, parameters=setup.parameters, solver=setup.solver)
+    states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], 64 * LOOKED_AT))])
+    return np.asarray(np.ptp(states, axis=0))
+
+
+def _log_moduli(setup: Setup, x: np.ndarray, mode: str, period: float) -> np.ndarray:
+    """Logarithms of the moduli of the multipliers ``(n,)``; nan if they cannot be computed."""
+    n = len(x)
+    try:
+        trajectory = setup.begin(x, mode, tangent=np.eye(n))
+        factors = fundamental_factors(trajectory, trajectory.t + period, np.ones(n))
+    except HybridError:
+        return np.full(n, np.nan)
+    if factors.code != codes.DONE or not all(np.all(np.isfinite(each)) for each in factors.matrices):
+        return np.full(n, np.nan)
+    return product_eigenvalues(factors.matrices, factors.singular).log_moduli
+
+
+def _wandering(
+    setup: Setup, points: Points, states: np.ndarray, places: np.ndarray, extent: np.ndarray, x0: np.ndarray
+) -> Found | None:
+    """An attractor without a period: a sample of its points, dense enough to be met again."""
+    run = points.trajectory
+    origin, mode, begin, jumps = run.x, run.mode, run.t, run.jumps
+    more, more_places = _collected(points, WINDOW)
+    if points.code != codes.DONE:
+        return None
+    # Time and jumps per point.
+    pace = setup.interval if setup.forced else (run.t - begin) / WINDOW
+    rate = (run.jumps - jumps) / WINDOW - (1 if setup.markers else 0)
+    exponents, error = _exponents(setup, origin, mode, pace)
+    moved = np.maximum(_orbit(setup, origin, mode, LOOKED_AT * pace), np.ptp(states, axis=0))
+    names = np.array(run.system.mode_names)
+    attractor = Attractor(
+        kind=_kind(exponents, error, forced=setup.system.period is not None),
+        points=states,
+        mode=names[places[:, 0]],
+        round=0,
+        period=math.nan,
+        jumps=float(rate),
+        exponents=exponents,
+        standard_error=error,
+        start=x0,
+    )
+    whole = Found(attractor, setup.tolerance * np.where(moved > 0, moved, extent))
+    if attractor.kind == "periodic":
+        whole = attrs.evolve(whole, attractor=_closed(setup, attractor, origin, mode))
+    return _thinned(whole, more, names[more_places[:, 0]])
+
+
+def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Attractor:
+    """The attractor with the period and the multipliers of its orbit, if that crosses a plane in rounds.
+
+    Points at equal times do not come back. The plane lies through a point, across the speed there.
+    """
+    extent = np.maximum(_extent(attractor.points), np.finfo(float).tiny)
+    normal = (setup.begin(x, mode).field() / extent / extent).tolist()
+    place = list(enumerate(zip(normal, x.tolist(), strict=True)))
+    plane = Guard(lambda t, x, p: sum(each * (x[i] - at) for i, (each, at) in place), +1)
+    marked = with_section(setup.system, plane)
+    crossed = attrs.evolve(setup, section=plane, marked=marked)
+    points = Points(crossed, x, mode)
+    states, places = _collected(points, WINDOW)
+    count = _round(states, places[:, 0], extent, math.sqrt(setup.solver.rtol)) if len(states) == WINDOW else 0
+    found = _periodic(crossed, points, count, extent, attractor.start) if count else None
+    if found is None:
+        return attractor
+    orbit = found.attractor
+    names = ("period", "jumps", "exponents", "standard_error")
+    return attrs.evolve(attractor, **{name: getattr(orbit, name) for name in names})
+
+
+def _thinned(whole: Found, states: np.ndarray, mode: np.ndarray) -> Found:
+    """The attractor with as many of its points as it takes to be near later ones.
+
+    A sample tells nothing below the distances of its own points, so the radius grows if all are too few.
+    """
+    count = WINDOW
+    while True:
+        attractor = whole.attractor
+        part = attrs.evolve(attractor, points=attractor.points[:count], mode=attractor.mode[:count])
+        found = attrs.evolve(whole, attractor=part)
+        far = float(np.quantile(found.distances(states, mode), REVISITED))
+        if far <= 1.0 or not np.isfinite(far):
+            return found
+        if count >= len(attractor.points):
+            return attrs.evolve(found, radius=found.radius * far)
+        count *= 2
+
+
+def extended(found: Found, states: np.ndarray, mode: np.ndarray) -> Found:
+    """The attractor with more points."""
+    before = found.attractor
+    points, modes = np.vstack([before.points, states]), np.concatenate([before.mode, mode])
+    return attrs.evolve(found, attractor=attrs.evolve(before, points=points, mode=modes))
+
+
+def _exponents(setup: Setup, x: np.ndarray, mode: str, pace: float) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents ``(n,)`` and their standard errors, averaged over intervals of one point each.
+
+    They are averaged for longer while more of them cannot be told from zero than must be zero.
+    """
+    n = len(x)
+    try:
+        trajectory = setup.begin(x, mode, tangent=np.eye(n))
+    except HybridError:
+        return np.full(n, np.nan), np.full(n, np.nan)
+    basis = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))[0]
+    triangles = Triangles(trajectory, pace, basis)
+    growths = np.empty((0, n))
+    while True:
+        count = max(INTERVALS, len(growths))
+        rows = [each.growth / pace for each in triangles.following(count)]
+        growths = np.vstack([growths, *rows])
+        mean = TaperedMean(n)
+        mean.add(growths)
+        values, error = mean.value(), standard_error(growths) * taper_inflation()
+        zeros = int(np.sum(np.abs(values) <= 2 * error)) - (0 if setup.system.period is not None else 1)
+        if zeros <= 0 or len(rows) < count or len(growths) >= MOST_INTERVALS:
+            order = np.argsort(-values, kind="stable")
+            return values[order], error[order]
+
+
+def _kind(exponents: np.ndarray, error: np.ndarray, *, forced: bool) -> str:
+    """The kind of motion by the signs of its exponents; without forcing one of them is that of the flow."""
+    if np.isnan(exponents).any() or np.isnan(error).any():
+        return UNKNOWN
+    zero = np.abs(exponents) <= 2 * error
+    if np.any((exponents > 0) & ~zero):
+        return "chaotic"
+    zeros = int(zero.sum()) - (0 if forced else 1)
+    return "torus" if zeros > 0 else "periodic"

@@ -1,0 +1,242 @@
+"""Shares of starts that lead to each attractor, at one set of parameters or followed along one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.attractors.attractors import as_flag, status_of_search
+from hybrid.attractors.follow import followed
+from hybrid.attractors.runs import CODE, OWNER
+from hybrid.attractors.search import Search
+from hybrid.attractors.setup import Setup, digest, setup_of
+from hybrid.attractors.starts import axes_of, sample_of
+from hybrid.attractors.text import read, written
+from hybrid.errors import ArgumentError
+from hybrid.kernels.types import codes
+from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.labelled import Names, attributes
+from hybrid.solvers import Solver
+from hybrid.status import Status, StatusCode
+from hybrid.sweep.sweep import sweep
+from hybrid.system.elements import Guard
+from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import growing
+from hybrid.system.labels import named
+
+if TYPE_CHECKING:
+    import xarray
+
+WANTED = 'be None, or map one parameter to its values, as {"w": np.linspace(0.8, 1.2, 41)}'
+
+
+@growing
+def basin_fractions(
+    system: HybridSystem,
+    over: Any,
+    *,
+    along: Mapping[str, Any] | None = None,
+    mode: str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    t0: float = 0.0,
+    section: Guard | None = None,
+    interval: float | None = None,
+    starts: int = 1000,
+    seed: int = 0,
+    periods: int = 1000,
+    recurrences: int = 10,
+    tolerance: float = 0.01,
+    solver: Solver | None = None,
+    store: str | PathLike[str] | None = None,
+    executor: Any = None,
+    progress: bool | None = None,
+) -> xarray.Dataset:
+    r"""Shares of random starts that lead to each attractor, with standard errors; also over a parameter.
+
+    A share :math:`f` of :math:`N` independent starts has the standard error
+    :math:`\sqrt{f (1 - f) / N}`.
+
+    Over a parameter, each value has a search of its own, with the same starts. Attractors are then followed
+    from value to value by their own points: the attractor to which a run from a point of the old one leads
+    at the new value has its label. Of two that lead to the same, the nearer keeps its label and the other
+    one dies. An attractor that no start has found, but to which an old one leads, is followed too.
+
+    Parameters
+    ----------
+    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, solver
+        As for :func:`hybrid.attractors`.
+    over
+        For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
+    along
+        None, or one parameter with its values in order, ``{"w": values}``.
+    starts, seed
+        Number of random starts, and of their sequence.
+    store, executor, progress
+        As for :func:`hybrid.sweep`, over the values of the parameter.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the axis ``label`` (-1: violates every mode, 0: no attractor, 1, 2, ...): ``fraction`` and its
+        ``standard_error``, ``kind``, ``round`` and ``jumps`` of the attractors, as in
+        :class:`hybrid.Attractor`. With ``along`` also over the axis of the parameter: there the
+        labels count attractors in the order in which they appear; ``first`` and ``last`` are the values
+        between which each of them lives.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be compiled, or an argument does not fit it (ArgumentError).
+
+    Examples
+    --------
+    >>> import models
+    >>> shares = basin_fractions(models.impact_oscillator(), {"x": (-1.0, 1.0), "v": (-2.0, 2.0)}, starts=50)
+    >>> float(shares.fraction.sel(label=1))
+    1.0
+    """
+    axes = axes_of(system, over)
+    count = arguments.count("starts", starts, 1)
+    origins = sample_of(system, axes, count, arguments.count("seed", seed, 0))
+    name, values = _along(system, along, parameters)
+    given = {
+        "mode": mode,
+        "parameters": parameters,
+        "t0": t0,
+        "section": section,
+        "interval": interval,
+        "periods": periods,
+        "recurrences": recurrences,
+        "tolerance": tolerance,
+        "solver": solver,
+    }
+    first = origins[np.lexsort(origins.T[::-1])[0]]
+    setup = setup_of(system, first, given)
+    task = FractionsAt(setup, origins, name)
+    shown = as_flag(progress)
+    if name is None:
+        with CTRL_C:
+            found = task({})
+            stopped = CTRL_C.is_set()
+        status = interrupted_status("the starts that were decided") if stopped else found["status"]
+        alone = read(found["found"])
+        alone["labels"] = list(range(1, len(alone["found"]) + 1))
+        return _dataset(setup, [alone], None, None, status)
+    swept = sweep(task, {name: values}, store=store, executor=executor, progress=shown)
+    failed = np.flatnonzero(swept.status.values == StatusCode.FAILED)
+    if failed.size == len(values):
+        raise ArgumentError(str(swept.message.values[0]))
+    made = swept["found"].values.tolist() if "found" in swept else [""] * len(values)
+    result = _dataset(setup, followed(task, values, made), name, values, _status(swept))
+    return result.assign_attrs({**swept.attrs, **result.attrs})
+
+
+def _along(
+    system: HybridSystem, along: object, parameters: Mapping[str, float] | None
+) -> tuple[str | None, np.ndarray]:
+    if along is None:
+        return None, np.empty(0)
+    given = arguments.mapping("along", along, WANTED)
+    if len(given) != 1:
+        raise arguments.refusal("along", WANTED, along)
+    [(key, value)] = given.items()
+    name = arguments.known("along: Parameter", key, system.parameters, "Parameters")
+    system.parameter_values(parameters)
+    if name in named("parameters", parameters):
+        raise ArgumentError(f"along: Parameter {name!r} is given twice: in along and in parameters.")
+    values = arguments.numbers(f"along[{name!r}]", getattr(value, "values", value), "be values in order")
+    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+        raise arguments.refusal(f"along[{name!r}]", "be finite values of shape (N,)", value)
+    return name, values
+
+
+def _status(swept: xarray.Dataset) -> Status:
+    bad = np.flatnonzero(swept.status.values != StatusCode.SUCCESS)
+    if not bad.size:
+        return Status(StatusCode.SUCCESS, "Every start is decided at every value.")
+    worst = bad[0]
+    code = StatusCode(int(swept.status.values[worst]))
+    return Status(code, f"{len(bad)} of {len(swept.status)} values: {swept.message.values[worst]}")
+
+
+@attrs.frozen(eq=False)
+class FractionsAt:
+    """The task of a sweep: the attractors at one value of a parameter, and their shares of the starts."""
+
+    setup: Setup
+    origins: np.ndarray
+    name: str | None
+
+    def __call__(self, point: Mapping[str, float]) -> dict[str, Any]:
+        """Attractors with their shares as text, and a status."""
+        search = self.search(point)
+        search.pilot(self.origins)
+        rows = search.decided(self.origins)
+        counts = [int(np.sum(rows[:, OWNER] == i)) for i in range(len(search.found))]
+        beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
+        text = written(search, counts, beyond, len(rows))
+        return {"found": text, "status": status_of_search(rows, self.setup.periods)}
+
+    def search(self, point: Mapping[str, float]) -> Search:
+        """A search at a value of the parameter."""
+        setup = attrs.evolve(self.setup, parameters={**self.setup.parameters, **point})
+        if setup.forced:
+            period = setup.system.forcing_period(setup.parameters)
+            setup = attrs.evolve(setup, interval=float(period or setup.interval))
+        return Search(setup, 1)
+
+    @property
+    def system(self) -> HybridSystem:
+        """The model."""
+        return self.setup.system
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What decides the results."""
+        return {**self.setup.facts(), "starts": digest(self.origins)}
+
+
+def _dataset(
+    setup: Setup, found: list[dict[str, Any] | None], name: str | None, values: Any, status: Status
+) -> xarray.Dataset:
+    """Shares over labels, and over the values of a parameter if there is one."""
+    import xarray
+
+    known = [each for each in found if each is not None]
+    most = max((max(each["labels"], default=0) for each in known), default=0)
+    labels = np.arange(-1, most + 1)
+    shape = len(found), len(labels)
+    fraction, error, jumps = (np.full(shape, np.nan) for _ in range(3))
+    rounds, kind = np.zeros(shape, dtype=np.int64), np.full(shape, "", dtype=object)
+    for i, each in enumerate(found):
+        if each is None:
+            continue
+        counts = dict(zip(each["labels"], each["counts"], strict=True)) | {-1: each["beyond"]}
+        counts[0] = each["starts"] - sum(counts.values())
+        fraction[i] = [counts.get(int(label), 0) / each["starts"] for label in labels]
+        error[i] = np.sqrt(fraction[i] * (1 - fraction[i]) / each["starts"])
+        for label, one in zip(each["labels"], each["found"], strict=True):
+            place = i, label + 1
+            kind[place], rounds[place], jumps[place] = (
+                one.attractor.kind,
+                one.attractor.round,
+                one.attractor.jumps,
+            )
+    columns = {"fraction": fraction, "standard_error": error, "kind": kind, "round": rounds, "jumps": jumps}
+    names = Names(setup.system.state_names, dict(setup.system.units))
+    used = {**setup.system.parameters, **setup.parameters}
+    made_by = attributes("fractions", status, setup.system, used)
+    coords: dict[str, Any] = {"label": labels}
+    if name is None:
+        return xarray.Dataset({key: ("label", each[0]) for key, each in columns.items()}, coords, made_by)
+    coords[name] = (name, values, names.of(name))
+    variables: dict[str, Any] = {key: ((name, "label"), each) for key, each in columns.items()}
+    lives = [values[kind[:, i] != ""] for i in range(len(labels))]
+    for key, end in (("first", 0), ("last", -1)):
+        variables[key] = ("label", np.array([each[end] if len(each) else np.nan for each in lives]))
+    return xarray.Dataset(variables, coords, made_by)
