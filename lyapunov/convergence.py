@@ -80,7 +80,7 @@ def plot_convergence(
             ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white")
     if not any(np.isfinite(history).any() for history in histories.values()):
         # Lines without a point give the axes no length.
-        ax.set_xlim(1.0, 1.0 + max(map(len, histories.values()), default=1))
+        ax.set_xlim(1.0, 1.0 + max([1, *map(len, histories.values())]))
     if points:
         ax.plot([], [], "o", color=INK, markersize=4.5, markerfacecolor="white", label=points_label)
     ax.set_xscale("log")
