@@ -23,7 +23,6 @@ from hybrid.status import StatusCode
 from hybrid.sweep.blocks import run_in_blocks
 from hybrid.system.graph import starting_mode
 
-KERNELS = "hybrid.kernels.events.settle"
 # Columns of what is found of each start: attractor (-1 for none), points until decided, code, mode at start.
 OWNER, POINTS, CODE, MODE = range(4)
 NONE = -1
@@ -49,7 +48,7 @@ class Runs:
         # The kernel does not choose among the parts of one mode.
         self.in_parts = len(parts) > 1
         # Before threads need the same kernels.
-        load_kernels(KERNELS)
+        load_kernels("hybrid.kernels.events.settle")
         self.parts = self.plan.parts
 
     def settle(
@@ -80,7 +79,7 @@ class Runs:
         words = [each for held in memory for each in (held, held.copy())]
         task = trajectory.task(trajectory.no_record())
         section, progress = self.section(phase0, most), self.progress(trajectory)
-        kernel, advance = load_kernels(KERNELS).settle, load_kernels().advance
+        kernel, advance = load_kernels("hybrid.kernels.events.settle").settle, load_kernels().advance
         verdicts = np.zeros(len(self.setup.marked.transitions), dtype=np.int64)
         reached, bursts = np.zeros(1, dtype=np.int64), Bursts([trajectory])
         first, resumed = 0, 0
@@ -147,7 +146,7 @@ class Points:
         """The next states ``(N, n)``, with modes and jumps so far ``(N, 2)``; ``code`` tells why fewer."""
         states = np.empty((count, self.trajectory.model.dimension))
         places = np.zeros((count, 2), dtype=np.int64)
-        kernel, advance = load_kernels(KERNELS).collect, load_kernels().advance
+        kernel, advance = load_kernels("hybrid.kernels.events.settle").collect, load_kernels().advance
         bursts, code = Bursts([self.trajectory]), codes.GO_ON
         self.progress.points = 0
         parts = self.trajectory.plan.parts
