@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import attrs
 import numpy as np
@@ -192,11 +193,8 @@ def located(place: Place, after: Place) -> Change | None:
             far = made[0]
         if number % HALVINGS != HALVINGS - 1:
             continue
-        for key in changed(near.orbit, far.orbit):
-            measure = measure_of(key)
-            found = interpolated_zero(near, lambda each: measure(each.orbit), (0.0, distance(near, far)))  # noqa: B023
-            if found is not None and abs(measure(found.orbit)) <= VANISHED * abs(measure(near.orbit)):
-                return _simplest(Change(found, key, near, _onward(near, found, key)))
+        for found, key in _explained(near, far):
+            return _simplest(Change(found, key, near, _onward(near, found, key)))
     keys = changed(near.orbit, far.orbit)
     # What jumps has no zero: it is between two places that are the same to rounding.
     return Change(near, keys[0], near, _onward(near, near, keys[0])) if keys else None
@@ -216,13 +214,23 @@ def _simplest(change: Change) -> Change:
         made = back.step(np.array([length]))
         if made is None or is_real(made[0].orbit):
             continue
-        for key in changed(back.orbit, made[0].orbit):
-            measure = measure_of(key)
-            found = interpolated_zero(back, lambda each: measure(each.orbit), (0.0, distance(back, made[0])))  # noqa: B023
-            if found is not None and abs(found.value - change.place.value) < CLOSE * float(onward.sizes[0]):
-                exact = Exact(found, key, back)
-                return attrs.evolve(change, exact=exact)
+        for found, key in _explained(back, made[0]):
+            if abs(found.value - change.place.value) < CLOSE * float(onward.sizes[0]):
+                return attrs.evolve(change, exact=Exact(found, key, back))
     return change
+
+
+def _explained(near: Place, far: Place) -> Iterator[tuple[Place, Key]]:
+    """Measures that change their sign between two places, each with the place where it is zero."""
+    for key in changed(near.orbit, far.orbit):
+        measure = partial(_measured, measure_of(key))
+        found = interpolated_zero(near, measure, (0.0, distance(near, far)))
+        if found is not None and abs(measure(found)) <= VANISHED * abs(measure(near)):
+            yield found, key
+
+
+def _measured(measure: Callable[[Pass], float], place: Place) -> float:
+    return measure(place.orbit)
 
 
 def _onward(near: Place, at: Place, key: Key) -> Onward:
