@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cached_property, partial
 
 import attrs
 import numpy as np
@@ -110,7 +110,7 @@ class Change:
         onward = self.onward.place
         return (self.place.family.route, *(() if onward is None else (onward.family.route,)))
 
-    @property
+    @cached_property
     def kind(self) -> str:
         """Kind of the bifurcation."""
         onward, route = self.onward, self.place.family.route
@@ -136,7 +136,7 @@ class Change:
             return "switching-sliding"
         return "grazing" if tangent else "corner"
 
-    @property
+    @cached_property
     def coefficient(self) -> np.ndarray | None:
         """The square-root coefficient ``(n,)`` of a grazing; None where there is none."""
         if self.kind != "grazing":

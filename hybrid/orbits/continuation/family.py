@@ -21,6 +21,8 @@ from hybrid.system.graph import HybridSystem
 from hybrid.transform.extended import extended
 from hybrid.transform.restricted import restricted
 
+# A field is along a surface if its rate through it is this share of its terms.
+ALONG = 1e-10
 # The corrections stop when they are this small.
 CONVERGED = 1e-12
 MOST_CORRECTIONS = 8
@@ -228,6 +230,16 @@ class Family:
     def rate(self, mode: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
         """The field ``(n,)`` of a mode."""
         return self._rate(self.extended.mode_index(mode), t, np.append(x, values))
+
+    def speed_terms(self, name: str, mode: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Terms ``(n + 1,)`` of a guard's speed along the field of a mode: of each state, and of time."""
+        gradient = self.gradient(name, t, x, values)
+        return np.append(gradient[:-1] * self.rate(mode, t, x, values), gradient[-1])
+
+    def is_along(self, name: str, mode: str, t: float, x: np.ndarray, values: np.ndarray) -> bool:
+        """Whether the field of a mode is along the surface of a guard."""
+        terms = self.speed_terms(name, mode, t, x, values)
+        return bool(abs(terms.sum()) <= ALONG * np.abs(terms).sum())
 
     def height(self, name: str, t: float, x: np.ndarray, values: np.ndarray) -> float:
         """The guard of a transition."""

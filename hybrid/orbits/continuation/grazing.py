@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.measures import Key, extremum
@@ -28,45 +29,51 @@ def square_root_coefficient(orbit: Pass, key: Key) -> np.ndarray | None:
     Sound and Vibration 145 (1991) 279; M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth
     Dynamical Systems, Springer 2008, section 6.2.
     """
-    system, share = orbit.family.system, share_of_touch(orbit, key)
-    transition = system.transitions[system.transition_index(key.name)]
-    t, x = moment(orbit, key.stretch, share)
-    found = kick(orbit, key)
-    if transition.target != transition.source or found is None or _jumps(orbit, key, t, x):
+    touch = _touch_of(orbit, key)
+    if touch is None or not touch.stays or touch.kick is None:
         return None
-    return -found * np.sqrt(2.0 / abs(_acceleration(orbit, key, share)))
-
-
-def share_of_touch(orbit: Pass, key: Key) -> float:
-    """Where in its stretch a guard is touched: at an extremum, or at the end."""
-    return extremum(key, orbit)[0] % 1.0 if key.kind == "top" else 1.0
+    return -touch.kick * np.sqrt(2.0 / abs(_acceleration(orbit, key, touch.share)))
 
 
 def kick(orbit: Pass, key: Key) -> np.ndarray | None:
-    """``D_x R f + D_t R - f (n,)`` at a touch, what a jump does to a slow passage; None without a reset."""
-    family, n = orbit.family, orbit.loop.x.shape[1]
+    """``D_x R f + D_t R - f (n,)`` at a touch, what a jump does to a slow passage; None if nothing."""
+    touch = _touch_of(orbit, key)
+    return None if touch is None else touch.kick
+
+
+@attrs.frozen(eq=False)
+class _Touch:
+    """The reset where its guard is touched.
+
+    ``share`` is where in the stretch that is, ``kick (n,)`` what the reset does to a slow passage, None if it
+    is nothing. ``stays`` says whether the mode and the state at the touch are as before.
+    """
+
+    share: float
+    kick: np.ndarray | None
+    stays: bool
+
+
+def _touch_of(orbit: Pass, key: Key) -> _Touch | None:
+    """The reset of a touched transition; None if it has none."""
+    family, values = orbit.family, orbit.loop.values
     system = family.extended
     index = system.transition_index(key.name)
-    reset = reset_function(system.transitions[index], system.state)
+    transition = system.transitions[index]
+    reset = reset_function(transition, system.state)
     if reset is None:
         return None
-    t, x = moment(orbit, key.stretch, share_of_touch(orbit, key))
-    rate = family.rate(system.transitions[index].source, t, x, orbit.loop.values)
-    fixed = system.parameter_values(family.fixed)
-    slopes = family.compiled.derivative(reset, index, t, np.append(x, orbit.loop.values), fixed)[:n]
+    share = extremum(key, orbit)[0] % 1.0 if key.kind == "top" else 1.0
+    t, x = moment(orbit, key.stretch, share)
+    n, state, fixed = len(x), np.append(x, values), system.parameter_values(family.fixed)
+    rate = family.rate(transition.source, t, x, values)
+    slopes = family.compiled.derivative(reset, index, t, state, fixed)[:n]
+    after = family.compiled.value(reset, index, t, state, fixed)[:n]
     found = slopes[:, :n] @ rate + slopes[:, -1] - rate
-    return None if np.all(np.abs(found) <= CONTINUOUS * np.abs(rate).max()) else found
-
-
-def _jumps(orbit: Pass, key: Key, t: float, x: np.ndarray) -> bool:
-    """Whether the reset moves the state at a touch."""
-    family, system = orbit.family, orbit.family.extended
-    index = system.transition_index(key.name)
-    reset = reset_function(system.transitions[index], system.state)
-    assert reset is not None
-    fixed = system.parameter_values(family.fixed)
-    after = family.compiled.value(reset, index, t, np.append(x, orbit.loop.values), fixed)
-    return bool(np.any(np.abs(after[: len(x)] - x) > CONTINUOUS * orbit.scale))
+    nothing = bool(np.all(np.abs(found) <= CONTINUOUS * np.abs(rate).max()))
+    moved = bool(np.any(np.abs(after - x) > CONTINUOUS * orbit.scale))
+    stays = transition.target == transition.source and not moved
+    return _Touch(share, None if nothing else found, stays)
 
 
 def _acceleration(orbit: Pass, key: Key, share: float) -> float:
@@ -75,12 +82,11 @@ def _acceleration(orbit: Pass, key: Key, share: float) -> float:
     begin, end = orbit.loop.times[i : i + 2]
     shares = np.clip(share + WINDOW * np.linspace(-1.0, 1.0, SPEEDS), 0.0, 1.0)
     shares = np.linspace(shares[0], shares[-1], SPEEDS)
-    speeds = []
-    for each in shares:
-        t, x = moment(orbit, i, float(each))
-        *slope, own = family.gradient(key.name, t, x, orbit.loop.values)
-        rate = family.rate(family.route[i].mode, t, x, orbit.loop.values)
-        speeds.append(float(np.array(slope) @ rate + own))
+    mode, values = family.route[i].mode, orbit.loop.values
+    speeds = [
+        float(family.speed_terms(key.name, mode, *moment(orbit, i, float(each)), values).sum())
+        for each in shares
+    ]
     fitted = np.polynomial.Polynomial.fit(shares, speeds, SPEEDS - 1)
     return float(fitted.deriv()(share) / (end - begin))
 

@@ -243,6 +243,5 @@ def changed(before: Pass, after: Pass) -> list[Key]:
             other = there.get(key, np.nan)
         if value * other < 0.0:
             found.append(key)
-    # An extremum that the orbit before has no part of: it came in at an end of the stretch.
     order = ("top", "speed", "rate", "when", "end", "begin", "stay")
     return sorted(found, key=lambda key: order.index(key.kind))

@@ -161,12 +161,11 @@ class Pass:
         for transition in family.system.transitions:
             if transition.target != mode or transition.source == mode:
                 continue
-            gradient = family.gradient(transition.name, t, loop.x[0], loop.values)
+            gradient = family.gradient(transition.name, t, loop.x[0], loop.values)[:n]
             height = family.height(transition.name, t, loop.x[0], loop.values)
-            terms = np.append(gradient[:n] * self.flows[0].first_rate, gradient[-1])
-            near = abs(height) <= CLOSED * float(np.abs(gradient[:n]) @ self.scale)
-            if near and abs(terms.sum()) <= CLOSED * np.abs(terms).sum():
-                across.append(gradient[:n])
+            near = abs(height) <= CLOSED * float(np.abs(gradient) @ self.scale)
+            if near and family.is_along(transition.name, mode, t, loop.x[0], loop.values):
+                across.append(gradient)
         if not across:
             return np.eye(n)
         normals = np.linalg.svd(np.array(across))[2][: np.linalg.matrix_rank(np.array(across))]

@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.family import ROUNDING, Family
-from hybrid.orbits.continuation.passing import Pass
+from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, route_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
@@ -21,9 +21,6 @@ from hybrid.solvers import Solver
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
-# A field is along a surface if its rate through it is this share of its terms. Nearer to the end of a period
-# than this share of it is at the end.
-ALONG = 1e-10
 # A run jumps where the equations say so if the times agree to this share of the period.
 SAME_TIME = 1e-6
 # Stretches are divided anew if errors grow by this much more along one of them than they may.
@@ -305,8 +302,8 @@ def share_of(orbit: Pass, t: float) -> tuple[int, float]:
     """The stretch at a time, whole periods aside, and the share of the stretch before it."""
     times = orbit.loop.times
     after = (t - times[0]) % orbit.loop.period
-    # The end of the last stretch is the begin of the first one.
-    t = times[0] + (after if after < (1.0 - ALONG) * orbit.loop.period else 0.0)
+    # The end of the last stretch is the begin of the first one: what is this near to it is there.
+    t = times[0] + (after if after < (1.0 - CLOSED) * orbit.loop.period else 0.0)
     i = min(max(int(np.searchsorted(times, t, side="right")) - 1, 0), len(times) - 2)
     length = times[i + 1] - times[i]
     return i, float((t - times[i]) / length) if length > 0.0 else 0.0
@@ -327,10 +324,7 @@ def slides(orbit: Pass, i: int) -> bool:
     name = next((fired[0] for fired in before if fired), None)
     if name is None:
         return False
-    t, x = moment(orbit, i, 0.5)
-    *slope, own = family.gradient(name, t, x, orbit.loop.values)
-    terms = np.append(np.array(slope) * family.rate(family.route[i].mode, t, x, orbit.loop.values), own)
-    return bool(abs(terms.sum()) <= ALONG * np.abs(terms).sum())
+    return family.is_along(name, family.route[i].mode, *moment(orbit, i, 0.5), orbit.loop.values)
 
 
 def is_real(orbit: Pass) -> bool:
