@@ -10,10 +10,6 @@ from typing import Any
 from hybrid.accuracy.answer import Answer
 from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
-from hybrid.attractors.attractor import Attractor, Attractors
-from hybrid.attractors.attractors import attractors
-from hybrid.attractors.basins import basins
-from hybrid.attractors.fractions import basin_fractions
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
@@ -34,6 +30,10 @@ from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, RadauIIA, Solver, Taylor, Tsit5
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.attractor import Attractor, Attractors
+from hybrid.sweep.attractors.attractors import attractors
+from hybrid.sweep.attractors.basins import basins
+from hybrid.sweep.attractors.fractions import basin_fractions
 from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open_store
 from hybrid.sweep.sweep import sweep

@@ -45,7 +45,6 @@ ROOMS = (
     "hybrid.plot",
     "hybrid.accuracy",
     "hybrid.sweep",
-    "hybrid.attractors",
     "hybrid.testing",
     "hybrid.__main__",
     "hybrid",

@@ -8,7 +8,7 @@ from matplotlib.collections import PathCollection
 import hybrid
 import hybrid.plot
 import models
-from tests.hybrid.attractors.test_attractors import double_well
+from tests.hybrid.sweep.attractors.test_attractors import double_well
 
 
 @pytest.fixture(autouse=True)

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from hybrid.attractors.attractor import Attractors
-from hybrid.attractors.attractors import as_flag, status_of_search
-from hybrid.attractors.find import Found
-from hybrid.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
-from hybrid.attractors.search import FIRST_POINTS, Search, known_of
-from hybrid.attractors.setup import Setup, digest, setup_of
-from hybrid.attractors.starts import Grid, axes_of, grid_of
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.attractor import Attractors
+from hybrid.sweep.attractors.attractors import as_flag, status_of_search
+from hybrid.sweep.attractors.find import Found
+from hybrid.sweep.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
+from hybrid.sweep.attractors.search import FIRST_POINTS, Search, known_of
+from hybrid.sweep.attractors.setup import Setup, digest, setup_of
+from hybrid.sweep.attractors.starts import Grid, axes_of, grid_of
 from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep

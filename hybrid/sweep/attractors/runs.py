@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.attractors.setup import Setup
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
 from hybrid.display.progress import Progress, silent
@@ -20,6 +19,7 @@ from hybrid.simulation.memory import fresh_run, fresh_work
 from hybrid.simulation.plan import plan_of
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import StatusCode
+from hybrid.sweep.attractors.setup import Setup
 from hybrid.sweep.blocks import run_in_blocks
 from hybrid.system.graph import starting_mode
 

@@ -10,19 +10,19 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.attractors.attractors import as_flag, status_of_search
-from hybrid.attractors.follow import followed
-from hybrid.attractors.runs import CODE, OWNER
-from hybrid.attractors.search import Search
-from hybrid.attractors.setup import Setup, digest, setup_of
-from hybrid.attractors.starts import axes_of, sample_of
-from hybrid.attractors.text import read, written
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.attractors import as_flag, status_of_search
+from hybrid.sweep.attractors.follow import followed
+from hybrid.sweep.attractors.runs import CODE, OWNER
+from hybrid.sweep.attractors.search import Search
+from hybrid.sweep.attractors.setup import Setup, digest, setup_of
+from hybrid.sweep.attractors.starts import axes_of, sample_of
+from hybrid.sweep.attractors.text import read, written
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.attractors.find import Found
-from hybrid.attractors.runs import MODE, OWNER, runs_of
-from hybrid.attractors.search import Search
-from hybrid.attractors.text import read
+from hybrid.sweep.attractors.find import Found
+from hybrid.sweep.attractors.runs import MODE, OWNER, runs_of
+from hybrid.sweep.attractors.search import Search
+from hybrid.sweep.attractors.text import read
 
 
 def followed(task: Any, values: np.ndarray, texts: list[str]) -> list[dict[str, Any] | None]:

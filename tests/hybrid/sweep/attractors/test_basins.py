@@ -11,7 +11,7 @@ import pytest
 import hybrid
 import models
 from hybrid import StatusCode
-from tests.hybrid.attractors.test_attractors import double_well
+from tests.hybrid.sweep.attractors.test_attractors import double_well
 
 TWO = {"parameters": {"w": 2.6}}
 

@@ -8,9 +8,6 @@ import attrs
 import numpy as np
 
 from hybrid.accuracy.averages import TaperedMean, standard_error, taper_inflation
-from hybrid.attractors.attractor import UNKNOWN, Attractor
-from hybrid.attractors.runs import Points
-from hybrid.attractors.setup import Setup
 from hybrid.errors import HybridError
 from hybrid.kernels.types import codes
 from hybrid.orbits.factors import fundamental_factors
@@ -18,6 +15,9 @@ from hybrid.orbits.periodic_schur import product_eigenvalues
 from hybrid.orbits.triangles import Triangles
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.simulate import simulate
+from hybrid.sweep.attractors.attractor import UNKNOWN, Attractor
+from hybrid.sweep.attractors.runs import Points
+from hybrid.sweep.attractors.setup import Setup
 from hybrid.system.elements import Guard
 from hybrid.transform.markers import with_section
 

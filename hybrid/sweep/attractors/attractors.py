@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from hybrid import arguments
-from hybrid.attractors.attractor import Attractors
-from hybrid.attractors.runs import CODE, OWNER
-from hybrid.attractors.search import Search
-from hybrid.attractors.setup import setup_of
-from hybrid.attractors.starts import axes_of, sample_of
 from hybrid.display.progress import progress_bar
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.attractor import Attractors
+from hybrid.sweep.attractors.runs import CODE, OWNER
+from hybrid.sweep.attractors.search import Search
+from hybrid.sweep.attractors.setup import setup_of
+from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.local import cores
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem

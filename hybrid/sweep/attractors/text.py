@@ -8,9 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.attractors.attractor import Attractor
-from hybrid.attractors.find import Found
-from hybrid.attractors.search import Search
+from hybrid.sweep.attractors.attractor import Attractor
+from hybrid.sweep.attractors.find import Found
+from hybrid.sweep.attractors.search import Search
 
 
 def written(search: Search, counts: list[int], beyond: int, starts: int) -> str:

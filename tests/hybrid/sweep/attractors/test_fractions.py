@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.hybrid.attractors.test_attractors import double_well
+from tests.hybrid.sweep.attractors.test_attractors import double_well
 
 FOLD = 2 / (3 * np.sqrt(3))
 

@@ -7,15 +7,15 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.attractors.attractor import KINDS, Attractor
-from hybrid.attractors.find import MOST_POINTS, Found, extended, find
-from hybrid.attractors.runs import CODE, MODE, NONE, OWNER, runs_of
-from hybrid.attractors.setup import Setup
 from hybrid.display.progress import Progress
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C
 from hybrid.status import StatusCode
+from hybrid.sweep.attractors.attractor import KINDS, Attractor
+from hybrid.sweep.attractors.find import MOST_POINTS, Found, extended, find
+from hybrid.sweep.attractors.runs import CODE, MODE, NONE, OWNER, runs_of
+from hybrid.sweep.attractors.setup import Setup
 
 # Starts that are run first, to find attractors before the others run, and points that they may take at first:
 # a start that leads to an attractor which is not known yet wastes these points.
