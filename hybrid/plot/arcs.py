@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,7 +55,7 @@ def plot_arc(
     chosen = range(len(names)) if components is None else _components(names, components)
     axes = axes_for(ax, len(chosen), figsize=figsize)
     labels = Names(names, arc.system.units)
-    lines = _lines(arc)
+    lines = curves(arc)
     for row, i in zip(axes, chosen, strict=True):
         for mode, (t, x) in lines.items():
             row.plot(t, x[:, i], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
@@ -109,7 +107,7 @@ def plot_phase(
     i, j = as_component("x", names, x), as_component("y", names, y)
     (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
     labels = Names(names, arc.system.units)
-    lines = _lines(arc)
+    lines = curves(arc)
     for mode, (_, states) in lines.items():
         ax.plot(states[:, i], states[:, j], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
     if arc.keeps_jumps:
@@ -141,47 +139,51 @@ def _components(names: Sequence[str], components: object) -> list[int]:
     return [as_component("components", names, each) for each in given]
 
 
-def _lines(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Times and states per visited mode; a row of nan separates the visits."""
-    parts: defaultdict[int, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
-    cuts = np.flatnonzero(np.diff(arc.j)) + 1
-    gap = (np.array([np.nan]), np.full((1, arc.system.dimension), np.nan))
-    bounds = [0, *cuts.tolist(), len(arc.t)] if len(arc.t) else [0]
-    for first, last in pairwise(bounds):
-        stay = _refined(arc, arc.t[first:last], arc.x[first:last])
-        parts[arc.system.mode_index(str(arc.mode[first]))] += [stay, gap]
-    return {
-        mode: (np.concatenate([t for t, _ in parts[mode]]), np.concatenate([x for _, x in parts[mode]]))
-        for mode in sorted(parts)
-    }
+def curves(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Times and states per visited mode, fine enough to draw; a row of nan ends each visit."""
+    if not len(arc.t):
+        return {}
+    t, x, visit = _refined(arc)
+    # The point after the last one of each visit is a gap.
+    ends = np.flatnonzero(np.diff(visit, append=visit[-1] + 1)) + 1
+    firsts = np.flatnonzero(np.diff(arc.j, prepend=arc.j[0] - 1))
+    modes = np.array([arc.system.mode_index(str(arc.mode[first])) for first in firsts])[visit]
+    t, x = np.insert(t, ends, np.nan), np.insert(x, ends, np.nan, axis=0)
+    modes = np.insert(modes, ends, modes[ends - 1])
+    return {int(mode): (t[modes == mode], x[modes == mode]) for mode in np.unique(modes)}
 
 
-def _refined(arc: HybridArc, t: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points, with points from the dense output added where it deviates from straight lines."""
-    if arc._pieces is None or len(t) < 2:
-        return t, x
-    part = np.linspace(0, 1, FIRST_PARTS + 1)[:-1]
-    times = np.append((t[:-1, None] + np.diff(t)[:, None] * part).ravel(), t[-1])
-    states = arc(times)
-    # At a jump the dense output gives the state after it, but the last point is the state before it.
-    states[::FIRST_PARTS] = x
+def _refined(arc: HybridArc) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, states and visits (0, 1, ...), with dense output wherever the curve is not straight."""
+    visit = np.cumsum(np.diff(arc.j, prepend=arc.j[0]) != 0)
+    if arc._pieces is None or len(arc.t) < 2:
+        return arc.t, arc.x, visit
+    inside = np.flatnonzero(np.diff(visit) == 0)
+    part = np.arange(1, FIRST_PARTS) / FIRST_PARTS
+    added = (arc.t[inside, None] + (arc.t[inside + 1] - arc.t[inside])[:, None] * part).ravel()
+    after = np.repeat(inside + 1, FIRST_PARTS - 1)
+    # Known points keep their states: at a jump, the dense output has only the state after it.
+    times, states = np.insert(arc.t, after, added), np.insert(arc.x, after, arc(added), axis=0)
+    visit = np.insert(visit, after, visit[after - 1])
     size = np.ptp(arc.x, axis=0)
     size[size == 0.0] = np.inf
-    bent = np.ones(len(times) - 1, dtype=bool)
+    bent = np.diff(visit) == 0
     for _ in range(MOST_HALVINGS):
-        middles = 0.5 * (times[:-1] + times[1:])[bent]
+        pieces = np.flatnonzero(bent)
+        middles = 0.5 * (times[pieces] + times[pieces + 1])
         found = arc(middles)
-        straight = 0.5 * (states[:-1] + states[1:])[bent]
+        straight = 0.5 * (states[pieces] + states[pieces + 1])
         off = np.max(np.abs(found - straight) / size, axis=1) > SMOOTH
-        where = np.flatnonzero(bent)[off]
+        where = pieces[off]
         if not len(where):
             break
         times = np.insert(times, where + 1, middles[off])
         states = np.insert(states, where + 1, found[off], axis=0)
+        visit = np.insert(visit, where + 1, visit[where])
         bent = np.zeros(len(times) - 1, dtype=bool)
         halves = where + np.arange(len(where))
         bent[halves] = bent[halves + 1] = True
-    return times, states
+    return times, states, visit
 
 
 def _with_gaps(before: np.ndarray, after: np.ndarray) -> np.ndarray:

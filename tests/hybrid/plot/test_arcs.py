@@ -1,7 +1,5 @@
 """Lines of arcs over time and in the plane, and orbits and sections as curves and dots."""
 
-from types import SimpleNamespace
-
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -10,8 +8,9 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 
+import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate, stroboscopic_section
-from hybrid.plot import arcs, plot_arc, plot_phase, plot_section
+from hybrid.plot import plot_arc, plot_phase, plot_section
 from hybrid.plot.orbits import second as _second
 from hybrid.plot.style import COLOURS
 
@@ -106,53 +105,20 @@ def test_a_portrait_has_points_between_the_steps(turns):
     assert len(jumps.get_xydata()) == 3 * len(turns.jumps)
 
 
-class TestRefined:
-    def arc(self, function, t, x, extent=1.0):
-        """An arc with this dense output and these points; all of its points span the extent."""
+def test_a_curve_ends_each_visit_with_the_state_before_the_jump():
+    """The dense output has the state after it."""
+    arc = simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.5))
+    _, x = plot_arc(arc, ["v"])[0].lines[0].get_data()
+    ends = np.flatnonzero(np.isnan(x))
+    np.testing.assert_array_equal(x[ends[:-1] - 1], arc.jumps.x_minus[:, 1])
+    np.testing.assert_array_equal(x[ends[:-1] + 1], arc.jumps.x_plus[:, 1])
 
-        class Arc:
-            _pieces = ()
 
-            def __call__(self, t):
-                return np.column_stack([function(t)])
-
-        arc = Arc()
-        arc.x = np.array([[0.0], [extent]])
-        return arcs._refined(arc, np.array(t), np.array(x)[:, None])
-
-    def test_a_straight_step_is_four_parts(self):
-        t, x = self.arc(lambda t: 3 * t, [0.0, 1.0, 3.0], [0.0, 3.0, 9.0])
-        np.testing.assert_allclose(t, [0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0])
-        np.testing.assert_allclose(x[:, 0], 3 * t)
-
-    def test_the_last_point_is_the_state_before_a_jump(self):
-        """The dense output has the state after it."""
-        t, x = self.arc(lambda t: np.where(t < 1.0, t, -5.0), [0.0, 1.0], [0.0, 1.0])
-        assert (t[-1], x[-1, 0]) == (1.0, 1.0)
-        assert x.min() == 0.0
-
-    @pytest.mark.parametrize("extent", [1.0, 1e-3, 1e6])
-    def test_parts_are_halved_until_they_are_smooth(self, extent):
-        """A parabola: the middle of a part of length h is off by h^2/4, at most a thousandth."""
-        t, x = self.arc(lambda t: extent * t**2, [0.0, 1.0], [0.0, extent], extent)
-        np.testing.assert_allclose(x[:, 0], extent * t**2, rtol=1e-12)
-        # Halving by halving: 1/4 and 1/8 and 1/16 are too long, and 1/16 is within.
-        np.testing.assert_allclose(np.diff(t), 1 / 16)
-
-    def test_a_jump_inside_ends_after_eight_halvings(self):
-        t, _ = self.arc(lambda t: np.where(t < 0.3, 0.0, 1.0), [0.0, 1.0], [0.0, 1.0])
-        assert np.diff(t).min() == pytest.approx(0.25 * 2.0**-8)
-        assert len(t) == 5 + 8
-
-    def test_components_that_do_not_move_do_not_count(self):
-        t, _ = self.arc(lambda t: 1e-9 * t**2, [0.0, 1.0], [0.0, 0.0], 0.0)
-        assert len(t) == 5
-
-    def test_samples_and_single_points_stay(self):
-        t, x = np.array([0.5]), np.array([[2.0]])
-        assert arcs._refined(SimpleNamespace(_pieces=()), t, x) == (t, x)
-        t, x = np.array([0.5, 1.0]), np.array([[2.0], [3.0]])
-        assert arcs._refined(SimpleNamespace(_pieces=None), t, x) == (t, x)
+def test_samples_are_drawn_as_they_are():
+    arc = simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 0.4), samples=[0.0, 0.2, 0.4])
+    t, x = plot_arc(arc, ["q"])[0].lines[0].get_data()
+    np.testing.assert_array_equal(t[:-1], arc.t)
+    np.testing.assert_array_equal(x[:-1], arc["q"])
 
 
 @pytest.mark.parametrize(
