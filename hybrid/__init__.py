@@ -101,15 +101,18 @@ __all__ = [
 ]
 
 
-# Modules that are imported when they are first asked for: they need Matplotlib and Hypothesis.
+# Modules that are imported when they are first asked for: they need Matplotlib and Hypothesis. The function
+# explore needs both, and lyapunov.
 ON_DEMAND = ("plot", "testing")
 
 
 def __getattr__(name: str) -> Any:
     if name in ON_DEMAND:
         return import_module(f"hybrid.{name}")
+    if name == "explore":
+        return import_module("hybrid.explorer.explore").explore
     raise AttributeError(f"module 'hybrid' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__", *ON_DEMAND]
+    return [*__all__, "__version__", "explore", *ON_DEMAND]

@@ -1,6 +1,7 @@
-"""``python -m hybrid compile``: compile the kernels in advance, so that the first run does not wait.
+"""Commands: ``python -m hybrid compile`` and ``python -m hybrid explore MODULE:MODEL``.
 
-With ``--portable FOLDER`` they are compiled for all processors of the family, as a wheel contains them.
+``compile`` compiles the kernels in advance, so that the first run does not wait; with ``--portable FOLDER``
+for all processors of the family, as a wheel contains them. ``explore`` opens a page to play with a model.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from hybrid.compiler.cache import second_process, shipped
 from hybrid.compiler.cache.folder import cache_directory
 from hybrid.compiler.cache.loader import ALL_KERNELS, is_kept, is_shipped, portable
 from hybrid.display.progress import progress_bar
+from hybrid.explorer.command import add_options, explore_model
 
 # Seconds between two checks of the progress.
 LOOK = 0.3
@@ -47,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="FOLDER",
         help="compile for all processors of this machine's family, into this folder",
     )
+    add_options(commands.add_parser("explore", help="open a page to play with a model in the browser"))
     return options
 
 
@@ -111,6 +114,8 @@ def _folder(chosen: Path | None) -> Path:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit status."""
     given = parser().parse_args(arguments)
+    if given.command == "explore":
+        return explore_model(given)
     begin = time.perf_counter()
     if given.portable is None:
         failed = compile_kernels(given.processes)

@@ -1,0 +1,178 @@
+"""What has been computed and is shown: figures, words, and the calls that gave them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.display.tables import counted, with_unit
+from hybrid.explorer.calls import Call, script
+from hybrid.explorer.figures.all import Figures
+from hybrid.explorer.pictures import Live, diagram_call, points_of_orbit
+from hybrid.explorer.scene import Scene
+from hybrid.explorer.subject import Subject
+from hybrid.explorer.worker import Outcome
+from hybrid.status import Status, StatusCode
+
+# Order of the pictures in the script.
+PICTURES = ("live", "exponents", "orbit", "branch", "basins", "diagram")
+
+
+@attrs.define(eq=False)
+class Board:
+    """Shows outcomes.
+
+    Attributes
+    ----------
+    live
+        The last section and arc.
+    results, calls, words
+        By picture: what is shown, the calls that gave it, and what is said about it.
+    progress
+        Share of the diagram that is drawn, 0 to 1.
+    """
+
+    subject: Subject
+    figures: Figures
+    live: Live | None = None
+    results: dict[str, Any] = attrs.field(factory=dict)
+    calls: dict[str, tuple[Call, ...]] = attrs.field(factory=dict)
+    words: dict[str, str] = attrs.field(factory=dict)
+    progress: float = 0.0
+
+    def show(self, outcome: Outcome) -> None:
+        """Draw a result, or say why there is none."""
+        picture = outcome.job.picture
+        self.words[picture] = outcome.problem
+        if not outcome.problem:
+            draw: Callable[[Outcome], None] = getattr(self, f"_show_{picture}")
+            draw(outcome)
+
+    def clear(self, picture: str) -> None:
+        """Take away what was switched off."""
+        self.calls.pop(picture, None)
+        self.results.pop(picture, None)
+        self.words.pop(picture, None)
+        if picture == "orbit":
+            self._draw_orbit(None, None, ())
+        elif picture == "branch":
+            self.figures.diagram.show_branch(None)
+        elif picture == "basins":
+            self.figures.section.clear_basins()
+
+    def script(self, scene: Scene) -> str:
+        """Python that computes and draws what is shown."""
+        calls: list[Call] = []
+        for picture in PICTURES:
+            known = [str(each) for each in calls]
+            # A branch begins with the search of its orbit, which may stand there already.
+            calls += [each for each in self.calls.get(picture, ()) if str(each) not in known]
+        return script(self.subject.text, [*calls, "", *_drawing(scene, [each.name for each in calls])])
+
+    def _show_live(self, outcome: Outcome) -> None:
+        live = self.live = outcome.result
+        self.calls["live"] = live.calls
+        start = list(live.scene.x0.values())
+        self.figures.arc.show(live.arc, start)
+        self.figures.section.show(live.points.x, live.points.mode, start)
+        ends = {"Section": live.points.status, "Arc": live.arc.status}
+        self.words["live"] = " ".join(
+            f"{what}: {status}" for what, status in ends.items() if _is_told(status)
+        )
+
+    def _show_exponents(self, outcome: Outcome) -> None:
+        call, spectrum = outcome.result
+        self.calls["exponents"], self.results["exponents"] = (call,), spectrum
+        self.figures.exponents.show(spectrum)
+        self.words["exponents"] = "" if spectrum.status.ok else f"Exponents: {spectrum.status}"
+
+    def _show_orbit(self, outcome: Outcome) -> None:
+        scene, call, orbit, arc = outcome.result
+        self.calls["orbit"], self.results["orbit"] = (call,), orbit
+        if arc is None:
+            self._draw_orbit(None, None, ())
+            self.words["orbit"] = f"Orbit: {orbit.status}"
+            return
+        self._draw_orbit(orbit, arc, points_of_orbit(self.subject, scene, orbit, arc))
+        period = with_unit(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
+        moduli = np.sort(np.abs(orbit.multipliers))[::-1]
+        # An unforced orbit has the multiplier 1 of its phase.
+        largest = moduli[0] if self.subject.is_forced else float(np.delete(moduli, _nearest_one(moduli))[0])
+        kind = "stable" if largest < 1.0 else "not stable"
+        self.words["orbit"] = (
+            f"Orbit of period {period} with {counted(len(orbit.signature), 'jump')}: "
+            f"largest multiplier {largest:.6g}, {kind}."
+        )
+
+    def _draw_orbit(self, orbit: Any, arc: Any, points: Any) -> None:
+        self.figures.arc.show_orbit(arc)
+        self.figures.section.show_orbit(points)
+        self.figures.multipliers.show(orbit)
+
+    def _show_branch(self, outcome: Outcome) -> None:
+        calls, status, branch = outcome.result
+        self.calls["branch"], self.results["branch"] = calls, branch
+        self.figures.diagram.show_branch(branch)
+        if branch is None:
+            self.words["branch"] = f"Branch: there is no orbit to follow. {status}"
+            return
+        found = ", ".join(f"{each.kind} at {each.value:.6g}" for each in branch.bifurcations)
+        ended = "" if branch.status.ok else f" {branch.status}"
+        self.words["branch"] = (
+            f"Branch of {counted(len(branch), 'orbit')}: {found or 'no bifurcation'}.{ended}"
+        )
+
+    def _show_basins(self, outcome: Outcome) -> None:
+        scene, call, found = outcome.result
+        self.calls["basins"], self.results["basins"] = (call,), found
+        label = found.label.transpose(scene.up, scene.across).values
+        self.figures.section.show_basins(label, found[scene.across].values, found[scene.up].values)
+        numbers, kinds = found.attractor.values.tolist(), found.kind.values.tolist()
+        told = ", ".join(f"{number} {kind}" for number, kind in zip(numbers, kinds, strict=True))
+        coming = "" if outcome.is_last else " A finer grid is being computed."
+        self.words["basins"] = f"Basins: {told or 'no attractor was found'}.{coming}"
+
+    def _show_diagram(self, outcome: Outcome) -> None:
+        scene, chart = outcome.result
+        if outcome.part == 0:
+            self.figures.diagram.begin()
+            self.calls["diagram"] = (diagram_call(self.subject, scene),)
+        self.figures.diagram.add(scene.over, chart)
+        self.progress = (outcome.part + 1) / len(outcome.job.parts)
+        failed = int((chart.status.values != StatusCode.SUCCESS).sum())
+        before = 0 if outcome.part == 0 else self.results.get("failed columns", 0)
+        self.results["failed columns"] = before + failed
+        if before + failed:
+            message = next((str(each) for each in chart.message.values if str(each)), "")
+            self.results["why"] = message or self.results.get("why", "")
+            self.words["diagram"] = (
+                f"Diagram: {counted(before + failed, 'column')} ended early. {self.results['why']}"
+            )
+
+
+def _is_told(status: Status) -> bool:
+    """Whether a status is worth a word: not that a section at jumps ended with its last jump."""
+    return not status.ok and status.code != StatusCode.MAX_JUMPS
+
+
+def _nearest_one(moduli: np.ndarray) -> int:
+    return int(np.argmin(np.abs(moduli - 1.0)))
+
+
+def _drawing(scene: Scene, named: list[str]) -> list[str]:
+    """Lines that draw the results of these names."""
+    across, up = scene.across, scene.up
+    draw = {
+        "section": f"hybrid.plot.plot_section(section, {across!r}, {up!r})",
+        "arc": f"hybrid.plot.plot_phase(arc, {across!r}, {up!r})",
+        "spectrum": "hybrid.plot(spectrum)",
+        "orbit": f"hybrid.plot.plot_orbit(orbit, {across!r}, {up!r})",
+        "branch": f"hybrid.plot(branch, {across!r})",
+        "painted": "hybrid.plot(painted)",
+        "diagram": "hybrid.plot(diagram)",
+    }
+    drawn = [text for name, text in draw.items() if name in named]
+    return [*drawn, "plt.show()"] if drawn else []

@@ -1,0 +1,122 @@
+"""The arc in the plane of two components, and one component over time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybrid.explorer.figures.base import HELD, JUMP, ORBIT, START, States, blank, empty, look_at, source
+from hybrid.plot.arcs import curves
+from hybrid.plot.style import colour_of
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.labelled import Names
+from hybrid.system.graph import HybridSystem
+
+
+class ArcFigures:
+    """Phase portrait and time series, one colour per mode.
+
+    Attributes
+    ----------
+    portrait, series
+        The figures.
+    """
+
+    def __init__(self, system: HybridSystem, states: States) -> None:
+        self.system, self.states = system, states
+        self.labels = Names(system.state_names, system.units)
+        self.curves: dict[int, Any] = {}
+        self.held, self.start, self.orbit, self.at = (states.source() for _ in range(4))
+        ends = [f"{end}{i}" for end in ("a", "b") for i in range(len(states.names))]
+        self.jumps = source("t", *ends)
+        self.portrait = blank("Phase portrait", "portrait", 320)
+        self.series = blank("Time series", "series", 240)
+        self.series.xaxis.axis_label = self.labels.label("t")
+        first, second = states.components[0], states.components[-1]
+        point = {"size": 10, "color": "white", "line_color": "black", "line_width": 2}
+        # The renderers that follow the choice of axes.
+        self.in_plane = [
+            self.portrait.line(first, second, source=self.held, color=HELD),
+            self.portrait.line(first, second, source=self.orbit, color=ORBIT, line_width=2.5, alpha=0.75),
+            self.portrait.scatter(first, second, source=self.start, size=9, marker="cross", color=START),
+            self.portrait.scatter(first, second, source=self.at, **point),
+        ]
+        self.over_time = [self.series.scatter("t", first, source=self.at, **point)]
+        self.plane_jumps = self.portrait.segment(
+            "a0", "a0", "b0", "b0", source=self.jumps, color=JUMP, line_dash="dashed"
+        )
+        self.time_jumps = self.series.segment(
+            "t", "a0", "t", "b0", source=self.jumps, color=JUMP, line_dash="dotted"
+        )
+        self.drawn_in_plane: list[Any] = []
+
+    def choose(self, across: str, up: str, component: str) -> None:
+        """Draw these components."""
+        for each in self.in_plane:
+            each.glyph.x, each.glyph.y = self.states.column(across), self.states.column(up)
+        for each in self.over_time:
+            each.glyph.y = self.states.column(component)
+        i, j, k = (self.states.names.index(each) for each in (across, up, component))
+        glyph = self.plane_jumps.glyph
+        glyph.x0, glyph.y0, glyph.x1, glyph.y1 = f"a{i}", f"a{j}", f"b{i}", f"b{j}"
+        self.time_jumps.glyph.y0, self.time_jumps.glyph.y1 = f"a{k}", f"b{k}"
+        self.portrait.xaxis.axis_label = self.labels.label(across)
+        self.portrait.yaxis.axis_label = self.labels.label(up)
+        self.series.yaxis.axis_label = self.labels.label(component)
+
+    def show(self, arc: HybridArc, start: Any) -> None:
+        """Draw an arc, and the start."""
+        drawn = curves(arc)
+        for mode in {*self.curves, *drawn}:
+            t, x = drawn.get(mode, ((), ()))
+            self._curve_of(mode).data = self.states.rows(x, t)
+        jumps = arc.jumps
+        columns = {"t": np.asarray(jumps.t, dtype=float)}
+        for end, x in (("a", jumps.x_minus), ("b", jumps.x_plus)):
+            columns |= {f"{end}{i}": np.ascontiguousarray(x[:, i]) for i in range(len(self.states.names))}
+        self.jumps.data = columns
+        self.start.data = self.states.rows(start)
+
+    def _curve_of(self, mode: int) -> Any:
+        """The source of the parts of the arc in a mode; each has a line in both figures."""
+        if mode not in self.curves:
+            made = self.curves[mode] = self.states.source()
+            options = {"source": made, "color": colour_of(mode), "line_width": 1.6}
+            across, up = self.in_plane[0].glyph.x, self.in_plane[0].glyph.y
+            several = len(self.system.mode_names) > 1
+            legend = {"legend_label": self.system.mode_names[mode]} if several else {}
+            self.drawn_in_plane.append(self.portrait.line(across, up, **options, **legend))
+            self.in_plane.append(self.drawn_in_plane[-1])
+            self.over_time.append(self.series.line("t", self.over_time[0].glyph.y, **options))
+            # The start may be far away from what is shown.
+            look_at(self.portrait, self.drawn_in_plane)
+            if several:
+                legends = self.portrait.legend
+                legends.label_text_font_size, legends.background_fill_alpha = "8pt", 0.6
+                legends.padding = legends.margin = 3
+        return self.curves[mode]
+
+    def hold(self, held: bool) -> None:
+        """Keep what is drawn, in grey, to compare with; or let it go."""
+        if not held:
+            empty(self.held)
+            return
+        parts = [each.data for each in self.curves.values()]
+        self.held.data = {
+            name: np.concatenate([np.asarray(part[name], dtype=float) for part in parts])
+            for name in ("t", *self.states.components)
+        }
+
+    def show_orbit(self, arc: HybridArc | None) -> None:
+        """Draw an orbit on top; None takes it away."""
+        if arc is None:
+            empty(self.orbit)
+            return
+        drawn = list(curves(arc).values())
+        x, t = np.concatenate([x for _, x in drawn]), np.concatenate([t for t, _ in drawn])
+        self.orbit.data = self.states.rows(x, t)
+
+    def show_at(self, t: float, x: Any) -> None:
+        """Move the point that runs along the arc."""
+        self.at.data = self.states.rows(x, [t])

@@ -1,0 +1,108 @@
+"""The section, with the basins below it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bokeh.models import LinearColorMapper
+
+from hybrid.explorer.figures.base import HELD, ORBIT, START, States, blank, empty, look_at, source
+from hybrid.plot.basins import NONE_COLOUR, VIOLATES_COLOUR
+from hybrid.plot.style import COLOURS, colour_of
+from hybrid.simulation.labelled import Names
+from hybrid.system.graph import HybridSystem
+
+
+class SectionFigure:
+    """Points of the section, one colour per mode.
+
+    Attributes
+    ----------
+    made
+        The figure.
+    """
+
+    def __init__(self, system: HybridSystem, states: States) -> None:
+        self.system, self.states = system, states
+        self.labels = Names(system.state_names, system.units)
+        self.points = states.source("mode")
+        self.held, self.start, self.orbit = (states.source() for _ in range(3))
+        self.basins = source("image", "x", "y", "dw", "dh")
+        self.made = blank("Section", "section", 320)
+        palette = [VIOLATES_COLOUR, NONE_COLOUR, *COLOURS]
+        self.made.image(
+            "image", "x", "y", "dw", "dh",
+            source=self.basins,
+            color_mapper=LinearColorMapper(palette=palette, low=-1.5, high=len(COLOURS) + 0.5),
+            alpha=0.45,
+        )  # fmt: skip
+        count = len(system.mode_names) + 1
+        colours = LinearColorMapper(palette=[colour_of(i) for i in range(count)], low=-0.5, high=count - 0.5)
+        first, second = states.components[0], states.components[-1]
+        held = self.made.scatter(first, second, source=self.held, size=2, marker="square", color=HELD)
+        drawn = self.made.scatter(
+            first, second,
+            source=self.points,
+            # The browser draws squares in half the time of discs.
+            marker="square",
+            size=2.5,
+            line_color=None,
+            fill_color={"field": "mode", "transform": colours},
+        )  # fmt: skip
+        cross = {"line_width": 2, "color": ORBIT}
+        self.in_plane = [
+            held,
+            drawn,
+            self.made.scatter(first, second, source=self.orbit, size=12, marker="x", **cross),
+            self.made.scatter(first, second, source=self.start, size=9, marker="cross", color=START),
+        ]
+        look_at(self.made, [drawn])
+
+    def choose(self, across: str, up: str) -> None:
+        """Draw these components."""
+        for each in self.in_plane:
+            each.glyph.x, each.glyph.y = self.states.column(across), self.states.column(up)
+        self.made.xaxis.axis_label, self.made.yaxis.axis_label = map(self.labels.label, (across, up))
+
+    def show(self, x: np.ndarray, mode: np.ndarray, start: Any) -> None:
+        """Draw points ``(N, n)`` with the names of their modes, and the start."""
+        names, place = np.unique(mode, return_inverse=True)
+        numbers = np.array([self.system.mode_index(str(name)) for name in names], dtype=float)
+        column = numbers[place] if len(mode) else np.empty(0)
+        self.points.data = {**self.states.rows(x), "mode": column}
+        self.start.data = self.states.rows(start)
+
+    def hold(self, held: bool) -> None:
+        """Keep what is drawn, in grey, to compare with; or let it go."""
+        if held:
+            self.held.data = {name: self.points.data[name] for name in ("t", *self.states.components)}
+        else:
+            empty(self.held)
+
+    def show_orbit(self, x: Any) -> None:
+        """Mark the points of an orbit; none takes the marks away."""
+        self.orbit.data = self.states.rows(x)
+
+    @property
+    def plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Ranges of the axes, as the browser shows them."""
+        ranges = (self.made.x_range, self.made.y_range)
+        across, up = ((float(each.start), float(each.end)) for each in ranges)
+        return across, up
+
+    def show_basins(self, label: np.ndarray, across: np.ndarray, up: np.ndarray) -> None:
+        """Paint labels ``(rows, columns)`` over the values of both components."""
+        # A cell reaches half way to the next start, also at the edge.
+        dx, dy = across[1] - across[0], up[1] - up[0]
+        self.basins.data = {
+            "image": [np.clip(label, -1, len(COLOURS)).astype(float)],
+            "x": [across[0] - dx / 2],
+            "y": [up[0] - dy / 2],
+            "dw": [len(across) * dx],
+            "dh": [len(up) * dy],
+        }
+
+    def clear_basins(self) -> None:
+        """Take the basins away."""
+        empty(self.basins)

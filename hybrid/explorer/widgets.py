@@ -1,0 +1,246 @@
+"""Everything on the page that can be moved, chosen or pressed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from html import escape
+from io import StringIO
+from typing import Any, Protocol
+
+import panel as pn
+from bokeh.models import NumericInput, Slider
+
+from hybrid.display.tables import with_unit
+from hybrid.explorer.saved import FORMATS, PICTURES
+from hybrid.explorer.scene import BEGIN, SETTLED, Scene, section_names
+from hybrid.explorer.subject import Subject
+
+WIDE = {"sizing_mode": "stretch_width"}
+# Milliseconds between two frames of the moving point.
+FRAME = 50
+
+
+class Acts(Protocol):
+    """What the widgets can have done."""
+
+    def move(self, name: str, value: float) -> None:
+        """Give a parameter a value."""
+
+    def place(self, name: str, value: float) -> None:
+        """Give a component of the start a value."""
+
+    def change(self, **changed: Any) -> None:
+        """Change the scene."""
+
+    def switched(self, picture: str, on: bool) -> None:
+        """Have something shown, or no more."""
+
+    def hold(self, held: bool) -> None:
+        """Keep the pictures to compare with."""
+
+    def step(self, by: int) -> None:
+        """Go to another jump."""
+
+    def tick(self) -> None:
+        """Move the point on."""
+
+    def reset(self) -> None:
+        """Return to the first scene."""
+
+    def shared(self) -> dict[str, str]:
+        """The parts of an address that lead here."""
+        ...
+
+    def script(self) -> str:
+        """The script of what is shown."""
+        ...
+
+    def saved(self, picture: str, suffix: str) -> Any:
+        """A picture as a file."""
+
+
+class Widgets:
+    """The widgets of a page; each tells its change, and follows the scene.
+
+    Attributes
+    ----------
+    sliders, fields, starts
+        By name: sliders of parameters, fields to type their values, fields of the start.
+    choices
+        What else a scene has, by the names of its fields.
+    switches
+        Orbit, branch and basins, which are on or off.
+    """
+
+    def __init__(self, subject: Subject, scene: Scene, acts: Acts) -> None:
+        self.subject, self.acts = subject, acts
+        self.following = False
+        units, names = subject.system.units, list(subject.system.state_names)
+        self.sliders: dict[str, Any] = {}
+        self.fields: dict[str, Any] = {}
+        for name, value in scene.values.items():
+            self._parameter(name, with_unit(name, units.get(name)), value)
+        self.starts = {
+            name: pn.widgets.FloatInput(name=with_unit(name, units.get(name)), value=value, width=130)
+            for name, value in scene.x0.items()
+        }
+        for name, each in self.starts.items():
+            self._when(each, partial(acts.place, name))
+        self.choices = self._choices(names, scene)
+        for name, each in self.choices.items():
+            self._when(each, partial(self._change, name))
+        labels = {"orbit": "Orbit near here", "branch": "Its branch", "basins": "Basins"}
+        self.switches = {name: pn.widgets.Toggle(name=label) for name, label in labels.items()}
+        for name, each in self.switches.items():
+            self._when(each, partial(acts.switched, name))
+        self.held = pn.widgets.Toggle(name="Hold to compare")
+        self._when(self.held, acts.hold)
+        self.back = self._button("Previous jump", lambda: acts.step(-1))
+        self.next = self._button("Next jump", lambda: acts.step(1))
+        self.play = pn.widgets.Toggle(name="Play")
+        self._when(self.play, self._play)
+        self._ticks: Any = None
+        self.start_again = self._button("Reset", acts.reset)
+        self.share = self._button("Share", self._share)
+        self.words = pn.pane.HTML("", **WIDE)
+        self.speed = pn.pane.HTML("")
+        self.event = pn.pane.HTML("", **WIDE)
+        self.script = pn.pane.HTML("", **WIDE)
+        self.progress = pn.indicators.Progress(value=0, max=100, height=6, **WIDE)
+        self.save_script = pn.widgets.FileDownload(
+            callback=lambda: StringIO(acts.script()), filename="explored.py", label="Save the script"
+        )
+        self.picture = pn.widgets.Select(name="picture", options=list(PICTURES), width=130)
+        self.format = pn.widgets.Select(name="format", options=list(FORMATS), width=80)
+        self.save_picture = pn.widgets.FileDownload(
+            callback=self._saved, filename="picture.png", label="Save the picture"
+        )
+        self._when(self.format, lambda value: setattr(self.save_picture, "filename", f"picture.{value}"))
+
+    @property
+    def switched_on(self) -> list[str]:
+        """Which of orbit, branch and basins are wanted."""
+        return [name for name, each in self.switches.items() if each.value]
+
+    def follow(self, scene: Scene) -> None:
+        """Show the values of a scene, without changing it again."""
+        self.following = True
+        try:
+            both = ((scene.values, self.sliders), (scene.values, self.fields), (scene.x0, self.starts))
+            for given, widgets in both:
+                for name, value in given.items():
+                    _put(widgets[name], value)
+            for name, each in self.choices.items():
+                _put(each, getattr(scene, name))
+        finally:
+            self.following = False
+
+    def say(self, words: Mapping[str, str]) -> None:
+        """Show what is said about the pictures."""
+        told = "".join(f"<p>{escape(each)}</p>" for each in words.values() if each)
+        # A reader of the screen reads it when it changes.
+        _show(self.words, f'<div role="status" aria-live="polite">{told}</div>')
+
+    def tell_speed(self, points: int, seconds: float) -> None:
+        """Say how long the last run took."""
+        _show(self.speed, f"{points} points in {1000 * seconds:.0f} ms")
+
+    def show_script(self, text: str) -> None:
+        """Show the script."""
+        _show(self.script, f"<pre>{escape(text)}</pre>")
+
+    def _when(self, widget: Any, act: Callable[[Any], Any]) -> None:
+        def told(event: Any) -> None:
+            if not self.following and event.new is not None:
+                act(event.new)
+
+        widget.param.watch(told, "value")
+
+    def _change(self, field: str, value: Any) -> None:
+        self.acts.change(**{field: value})
+
+    def _parameter(self, name: str, label: str, value: float) -> None:
+        """A slider for a parameter, and a field beside it to type its value.
+
+        They are Bokeh's own: those of Panel wait 50 ms before they tell a change.
+        """
+        low, high = self.subject.ranges[name]
+        low, high = min(low, value), max(high, value)
+        step = (high - low) / 1000
+        slider = Slider(title=label, start=low, end=high, value=value, step=step, show_value=False, **WIDE)
+        field = NumericInput(value=value, mode="float", width=110, title=f"{name} =")
+
+        def moved(attribute: str, old: float, new: float | None) -> None:
+            if not self.following and new is not None:
+                # A value that is typed may lie beyond the ends.
+                slider.start, slider.end = min(slider.start, new), max(slider.end, new)
+                self.acts.move(name, new)
+
+        slider.on_change("value", moved)
+        field.on_change("value", moved)
+        self.sliders[name], self.fields[name] = slider, field
+
+    def _choices(self, names: list[str], scene: Scene) -> dict[str, Any]:
+        modes = dict.fromkeys(each.part_of or each.name for each in self.subject.system.modes)
+        sections = {
+            f"where {each} passes the level" if each in names else each: each
+            for each in section_names(self.subject)
+        }
+        span = "periods shown" if self.subject.is_forced else "typical times shown"
+        kinds: dict[str, Any] = {
+            "mode": ("mode at the start", {"by the guards": "", **{each: each for each in modes}}),
+            "across": ("across", names),
+            "up": ("up", names),
+            "over_time": ("over time", names),
+            "section": ("section", sections),
+            "part": ("portrait of the run", [SETTLED, BEGIN]),
+            "over": ("diagram over", list(scene.values)),
+            "level": ("level of the section", None),
+            "points": ("points of the section", 1),
+            "transient": ("points before", 0),
+            "window": (span, None),
+            "low": ("from", None),
+            "high": ("to", None),
+            "columns": ("columns", 2),
+            "periods": ("periods of the orbit", 1),
+        }
+        made = {}
+        for field, (label, kind) in kinds.items():
+            value = getattr(scene, field)
+            if isinstance(kind, list | dict):
+                if kind:
+                    made[field] = pn.widgets.Select(name=label, options=kind, value=value, width=190)
+            elif isinstance(kind, int):
+                made[field] = pn.widgets.IntInput(name=label, start=kind, value=value, width=130)
+            else:
+                made[field] = pn.widgets.FloatInput(name=label, value=value, width=130)
+        return made
+
+    def _button(self, label: str, act: Callable[[], None]) -> Any:
+        return pn.widgets.Button(name=label, on_click=lambda _: act())
+
+    def _play(self, on: bool) -> None:
+        if on:
+            self._ticks = pn.state.add_periodic_callback(self.acts.tick, period=FRAME)
+        elif self._ticks is not None:
+            self._ticks.stop()
+
+    def _saved(self) -> Any:
+        return self.acts.saved(self.picture.value, self.format.value)
+
+    def _share(self) -> None:
+        location = pn.state.location
+        if location is not None:
+            location.search = ""
+            location.update_query(**self.acts.shared())
+
+
+def _put(widget: Any, value: Any) -> None:
+    if widget.value != value:
+        widget.value = value
+
+
+def _show(pane: Any, text: str) -> None:
+    if pane.object != text:
+        pane.object = text

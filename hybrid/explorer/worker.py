@@ -1,0 +1,159 @@
+"""One thread that computes what a page shows: what was asked last comes first."""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections.abc import Callable, Hashable, Sequence
+from time import perf_counter
+from typing import Any
+
+import attrs
+
+from hybrid.errors import HybridError
+from hybrid.simulation.interrupt import stopped_by
+
+# Seconds after which a part is told to end with what it has, and after which it gives way to a newer job for
+# the same picture. Before that it is shown, so that a picture moves while a slider does.
+LONGEST_PART, PATIENCE = 20.0, 0.1
+
+
+@attrs.frozen(eq=False)
+class Job:
+    """Something to compute.
+
+    Attributes
+    ----------
+    picture
+        Name of what it fills; there is one job per picture at a time.
+    key
+        What the result depends on: a job with the key of the last one is not done again.
+    parts
+        Functions to call one after the other; the page shows the result of each.
+    """
+
+    picture: str
+    key: Hashable
+    parts: Sequence[Callable[[], Any]]
+
+
+@attrs.frozen(eq=False)
+class Outcome:
+    """The result of a part of a job, or the error that ended it."""
+
+    job: Job
+    part: int
+    result: Any
+    problem: str
+    seconds: float
+
+    @property
+    def is_last(self) -> bool:
+        """Whether the job has no further parts."""
+        return self.part + 1 == len(self.job.parts)
+
+
+class Worker:
+    """Does jobs in their order, and leaves those that are no longer wanted.
+
+    Parameters
+    ----------
+    show
+        Called with each :class:`Outcome`, from the thread of the worker; returns when it has been shown.
+    """
+
+    def __init__(self, show: Callable[[Outcome], None]) -> None:
+        self.show = show
+        self.wanted: list[Job] = []
+        # By picture: the key of the last job, and how many of its parts are done.
+        self.done: dict[str, tuple[Hashable, int]] = {}
+        self.current: Job | None = None
+        # Whether the part that is computed is no longer wanted.
+        self.superseded = False
+        self.stop, self.closed = threading.Event(), False
+        self.changed = threading.Condition(threading.RLock())
+        self.thread = threading.Thread(target=self._work, name="hybrid explore", daemon=True)
+        self.thread.start()
+
+    def want(self, jobs: Sequence[Job]) -> None:
+        """Have these jobs done, the first one first; the part that is being computed ends if it must wait."""
+        with self.changed:
+            self.wanted = list(jobs)
+            now, following = self.current, self._next()
+            if now is None:
+                self.changed.notify()
+            elif following is None or following.picture != now.picture:
+                self._give_way(now)
+            elif following.key != now.key:
+                patience = threading.Timer(PATIENCE, self._give_way, [now])
+                patience.daemon = True
+                patience.start()
+
+    def _give_way(self, job: Job) -> None:
+        with self.changed:
+            if self.current is job:
+                self.superseded = True
+                self.stop.set()
+
+    def forget(self, picture: str) -> None:
+        """Do the job of a picture again when it is wanted next."""
+        with self.changed:
+            self.done.pop(picture, None)
+
+    def close(self) -> None:
+        """End the thread."""
+        with self.changed:
+            self.closed = True
+            self.stop.set()
+            self.changed.notify()
+        self.thread.join()
+
+    def _next(self) -> Job | None:
+        """The first job that has parts left."""
+        for job in self.wanted:
+            key, parts = self.done.get(job.picture, (None, 0))
+            if key != job.key or parts < len(job.parts):
+                return job
+        return None
+
+    def _work(self) -> None:
+        while True:
+            with self.changed:
+                self.current = self._next()
+                while self.current is None and not self.closed:
+                    self.changed.wait()
+                    self.current = self._next()
+                if self.closed:
+                    return
+                job = self.current
+                assert job is not None
+                self.stop.clear()
+                self.superseded = False
+                key, part = self.done.get(job.picture, (None, 0))
+                part = part if key == job.key else 0
+            outcome = self._outcome(job, part)
+            with self.changed:
+                if self.closed:
+                    return
+                # A part that was told to end for another job is done again when its turn comes.
+                if self.superseded:
+                    continue
+                self.done[job.picture] = (job.key, len(job.parts) if outcome.problem else part + 1)
+            self.show(outcome)
+
+    def _outcome(self, job: Job, part: int) -> Outcome:
+        late = threading.Timer(LONGEST_PART, self.stop.set)
+        late.daemon = True
+        begin, result, problem = perf_counter(), None, ""
+        late.start()
+        try:
+            with stopped_by(self.stop):
+                result = job.parts[part]()
+        except HybridError as error:
+            problem = str(error)
+        except Exception as error:  # a fault in a user's function must not end the page
+            traceback.print_exc()
+            problem = f"{type(error).__name__}: {error}"
+        finally:
+            late.cancel()
+        return Outcome(job, part, result, problem, perf_counter() - begin)
