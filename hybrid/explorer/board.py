@@ -70,7 +70,26 @@ class Board:
             known = [str(each) for each in calls]
             # A branch begins with the search of its orbit, which may stand there already.
             calls += [each for each in self.calls.get(picture, ()) if str(each) not in known]
-        return script(self.subject.text, [*calls, "", *_drawing(scene, [each.name for each in calls])])
+        return script(self.subject.text, [*calls, "", *self._drawing(scene, [each.name for each in calls])])
+
+    def _drawing(self, scene: Scene, named: list[str]) -> list[str]:
+        """Lines that draw the results of these names."""
+        across, up = scene.across, scene.up
+        draw = {
+            "section": f"hybrid.plot.plot_section(section, {across!r}, {up!r})",
+            "arc": f"hybrid.plot.plot_phase(arc, {across!r}, {up!r})",
+            "spectrum": "hybrid.plot(spectrum)",
+            "orbit": f"hybrid.plot.plot_orbit(orbit, {across!r}, {up!r})",
+            "branch": f"hybrid.plot.plot_branch(branch, {across!r})",
+            "painted": "hybrid.plot(painted)",
+            "diagram": "hybrid.plot(diagram)",
+        }
+        spectrum = self.results.get("exponents")
+        if spectrum is not None and not spectrum.intervals:
+            # A run that ended before its first interval has no history to draw.
+            del draw["spectrum"]
+        drawn = [text for name, text in draw.items() if name in named]
+        return [*drawn, "plt.show()"] if drawn else []
 
     def _show_live(self, outcome: Outcome) -> None:
         live = self.live = outcome.result
@@ -160,19 +179,3 @@ def _is_told(status: Status) -> bool:
 
 def _nearest_one(moduli: np.ndarray) -> int:
     return int(np.argmin(np.abs(moduli - 1.0)))
-
-
-def _drawing(scene: Scene, named: list[str]) -> list[str]:
-    """Lines that draw the results of these names."""
-    across, up = scene.across, scene.up
-    draw = {
-        "section": f"hybrid.plot.plot_section(section, {across!r}, {up!r})",
-        "arc": f"hybrid.plot.plot_phase(arc, {across!r}, {up!r})",
-        "spectrum": "hybrid.plot(spectrum)",
-        "orbit": f"hybrid.plot.plot_orbit(orbit, {across!r}, {up!r})",
-        "branch": f"hybrid.plot(branch, {across!r})",
-        "painted": "hybrid.plot(painted)",
-        "diagram": "hybrid.plot(diagram)",
-    }
-    drawn = [text for name, text in draw.items() if name in named]
-    return [*drawn, "plt.show()"] if drawn else []

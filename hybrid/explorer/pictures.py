@@ -29,6 +29,8 @@ COLUMN_INTERVALS, COLUMN_TRANSIENT, COLUMN_POINTS = 200, 200, 60
 # Columns of the diagram that are computed at once, and sizes of the grids of starts.
 AT_ONCE = 4
 GRIDS = (24, 96)
+# An arc has come back if it is so near, as a share of the distance that it goes away.
+NEAR = 0.1
 
 
 @attrs.frozen(eq=False)
@@ -98,8 +100,8 @@ def points_of(scene: Scene, taken: Section | HybridArc) -> Points:
     if isinstance(taken, Section):
         if not len(taken):
             return Points(taken.x, taken.mode, 0.0, np.empty(0), None, taken.status)
-        t, mode = float(taken.t[-1]), str(taken.mode[-1])
-        return Points(taken.x, taken.mode, t, taken.x[-1], mode, taken.status)
+        end, mode_end = float(taken.t[-1]), str(taken.mode[-1])
+        return Points(taken.x, taken.mode, end, taken.x[-1], mode_end, taken.status)
     jumps = taken.jumps
     names = np.array([each.source for each in taken.system.transitions])
     mode = names[jumps.transition_index[scene.transient :]] if len(jumps) else np.empty(0, dtype=str)
@@ -216,8 +218,9 @@ def orbit_call(subject: Subject, scene: Scene, live: Live) -> Call:
     if subject.is_forced:
         x = points.x_end if len(points.x_end) else np.array(list(scene.x0.values()))
         mode = points.mode_end or scene.mode or None
-        t0 = points.t_end % subject.unit_of_time(scene.values) if len(points.x_end) else 0.0
-        keywords = {**shared, "mode": mode, "t0": t0, "periods": scene.periods}
+        keywords = {**shared, "mode": mode, "periods": scene.periods}
+        if scene.section != PERIOD:
+            keywords["t0"] = points.t_end % subject.unit_of_time(scene.values)
         return Call("orbit", periodic_orbit, (system, tuple(map(float, x))), keywords)
     near, at, period = _recurrence(live.arc)
     return Call("orbit", periodic_orbit, (system, near), {**shared, "mode": at, "period": period})
@@ -249,18 +252,25 @@ def points_of_orbit(subject: Subject, scene: Scene, orbit: PeriodicOrbit, arc: H
 
 
 def _recurrence(arc: HybridArc) -> tuple[tuple[float, ...], str, float]:
-    """A state of the arc, its mode, and the time after which the arc comes back nearest to it.
+    """A state half way along the arc, its mode, and the time after which the arc comes back near to it.
 
-    The last third of the arc is compared with the state at its beginning, after the arc has first moved away.
+    It has come back where it is nearest in its first return to a tenth of the distance that it goes away; if
+    there is none, where it is nearest after it has gone away.
     """
-    begin = int(np.searchsorted(arc.t, arc.t[0] + (arc.t[-1] - arc.t[0]) / 3))
+    begin = int(np.searchsorted(arc.t, arc.t[0] + (arc.t[-1] - arc.t[0]) / 2))
     begin = min(begin, len(arc.t) - 2)
     x, size = arc.x[begin], np.ptp(arc.x, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     times = np.linspace(arc.t[begin], arc.t[-1], 2000)[1:]
     away = np.linalg.norm((arc(times) - x) / size, axis=1)
-    left = int(np.argmax(away > 0.25 * away.max()))
-    nearest = left + int(np.argmin(away[left:]))
+    left = int(np.argmax(away > NEAR * away.max()))
+    near = away[left:] < NEAR * away.max()
+    if near.any():
+        back = left + int(np.argmax(near))
+        again = away[back:] >= NEAR * away.max()
+        nearest = back + int(np.argmin(away[back : back + int(np.argmax(again)) if again.any() else None]))
+    else:
+        nearest = left + int(np.argmin(away[left:]))
     return tuple(map(float, x)), str(arc.mode[begin]), float(times[nearest] - arc.t[begin])
 
 

@@ -17,7 +17,7 @@ from hybrid.testing.case import Case
 from hybrid.testing.starts import start_in
 from hybrid.testing.strategies import default_duration
 
-# Starts that are tried where none is given: rest, then states of a fixed random sequence, small ones first.
+# Starts that are tried where none is given: rest, then states of a fixed random sequence.
 STARTS_TRIED = 24
 # A start is judged over so many times the span of the cases of hybrid.testing: a drive takes its time.
 LONG = 10
@@ -55,8 +55,8 @@ class Subject:
 
     @cached_property
     def typical_time(self) -> float:
-        """Time in which an unforced state moves by about its size."""
-        return default_duration(self.system, self.values) / 10
+        """Time in which an unforced state moves by about its size, to one digit."""
+        return float(f"{default_duration(self.system, self.values) / 10:.1g}")
 
     def unit_of_time(self, values: Mapping[str, float]) -> float:
         """The forcing period with these parameters, or the typical time."""
@@ -101,7 +101,7 @@ def subject(
 def _range(value: float) -> tuple[float, float]:
     if value == 0.0:
         return (-1.0, 1.0)
-    low, high = sorted(((1 - SHARE) * value, (1 + SHARE) * value))
+    low, high = sorted(float(f"{share * value:.9g}") for share in (1 - SHARE, 1 + SHARE))
     return (low, high)
 
 
@@ -112,8 +112,10 @@ def _found_start(
     rng = np.random.default_rng(20240507)
     n, last = system.dimension, LONG * default_duration(system, values)
     modes = [each.name for each in system.modes if mode in (None, each.name, each.part_of)]
-    sizes = np.geomspace(0.02, 2.0, STARTS_TRIED)[:, None]
-    tries = [np.zeros(n), *(sizes * rng.uniform(-1.0, 1.0, (STARTS_TRIED, n)))]
+    # A drive brings a small start to its own size; without a drive, the size stays.
+    ends = (0.02, 2.0) if system.forcing_period(values) is not None else (2.0, 0.02)
+    random = rng.uniform(-1.0, 1.0, (STARTS_TRIED, n)).round(3)
+    tries = [np.zeros(n), *(np.geomspace(*ends, STARTS_TRIED)[:, None] * random)]
     best: tuple[float, tuple[float, ...], str | None] | None = None
     for x in tries:
         for name in modes:

@@ -15,7 +15,7 @@ from hybrid.simulation.interrupt import stopped_by
 
 # Seconds after which a part is told to end with what it has, and after which it gives way to a newer job for
 # the same picture. Before that it is shown, so that a picture moves while a slider does.
-LONGEST_PART, PATIENCE = 20.0, 0.1
+LONGEST_PART, PATIENCE = 60.0, 0.1
 
 
 @attrs.frozen(eq=False)
@@ -81,7 +81,7 @@ class Worker:
             self.wanted = list(jobs)
             now, following = self.current, self._next()
             if now is None:
-                self.changed.notify()
+                self.changed.notify_all()
             elif following is None or following.picture != now.picture:
                 self._give_way(now)
             elif following.key != now.key:
@@ -95,6 +95,11 @@ class Worker:
                 self.superseded = True
                 self.stop.set()
 
+    def wait(self, seconds: float) -> bool:
+        """Wait until all jobs are done and shown; False if they take longer."""
+        with self.changed:
+            return self.changed.wait_for(lambda: self.current is None and self._next() is None, seconds)
+
     def forget(self, picture: str) -> None:
         """Do the job of a picture again when it is wanted next."""
         with self.changed:
@@ -105,7 +110,7 @@ class Worker:
         with self.changed:
             self.closed = True
             self.stop.set()
-            self.changed.notify()
+            self.changed.notify_all()
         self.thread.join()
 
     def _next(self) -> Job | None:
@@ -121,6 +126,7 @@ class Worker:
             with self.changed:
                 self.current = self._next()
                 while self.current is None and not self.closed:
+                    self.changed.notify_all()
                     self.changed.wait()
                     self.current = self._next()
                 if self.closed:

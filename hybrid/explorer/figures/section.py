@@ -86,10 +86,22 @@ class SectionFigure:
 
     @property
     def plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Ranges of the axes, as the browser shows them."""
-        ranges = (self.made.x_range, self.made.y_range)
-        across, up = ((float(each.start), float(each.end)) for each in ranges)
+        """Ranges of the axes: as the browser shows them, or those of the points if none has shown them."""
+        glyph = self.in_plane[1].glyph
+        across, up = (
+            self._ends(axis, column)
+            for axis, column in ((self.made.x_range, glyph.x), (self.made.y_range, glyph.y))
+        )
         return across, up
+
+    def _ends(self, axis: Any, column: str) -> tuple[float, float]:
+        ends = (float(axis.start), float(axis.end))
+        if np.isfinite(ends).all() and ends[0] < ends[1]:
+            return ends
+        found = np.asarray(self.points.data[column], dtype=float)
+        low, high = (float(found.min()), float(found.max())) if len(found) else (-1.0, 1.0)
+        margin = 0.1 * (high - low) or 1.0
+        return low - margin, high + margin
 
     def show_basins(self, label: np.ndarray, across: np.ndarray, up: np.ndarray) -> None:
         """Paint labels ``(rows, columns)`` over the values of both components."""
