@@ -96,7 +96,8 @@ class Board:
         self.calls["live"] = live.calls
         start = list(live.scene.x0.values())
         self.figures.arc.show(live.arc, start)
-        self.figures.section.show(live.points.x, live.points.mode, start)
+        extent = np.ptp(live.arc.x, axis=0)
+        self.figures.section.show(live.points.x, live.points.mode, start, extent)
         ends = {"Section": live.points.status, "Arc": live.arc.status}
         self.words["live"] = " ".join(
             f"{what}: {status}" for what, status in ends.items() if _is_told(status)

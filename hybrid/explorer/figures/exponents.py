@@ -25,6 +25,8 @@ class ExponentsFigure:
         self.values = source("index", "value", "low", "high", "text")
         self.made = blank("Lyapunov exponents", "exponents", 240)
         self.made.add_layout(zero_line())
+        # The axis holds zero, since the sign counts.
+        self.made.scatter([1], [0.0], alpha=0.0)
         self.made.scatter("index", "value", source=self.values, size=8, color=COLOURS[0])
         self.made.add_layout(Whisker(base="index", lower="low", upper="high", source=self.values))
         self.made.add_tools(HoverTool(tooltips=[("exponent", "@text")]))

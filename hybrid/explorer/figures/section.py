@@ -14,6 +14,10 @@ from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 
 
+# The axes show at least this share of the extent of the arc.
+LEAST = 0.02
+
+
 class SectionFigure:
     """Points of the section, one colour per mode.
 
@@ -57,7 +61,10 @@ class SectionFigure:
             self.made.scatter(first, second, source=self.orbit, size=12, marker="x", **cross),
             self.made.scatter(first, second, source=self.start, size=9, marker="cross", color=START),
         ]
-        look_at(self.made, [drawn])
+        # Two points that nobody sees keep the axes from looking at the rounding of a periodic orbit.
+        self.least = states.source()
+        self.in_plane.append(self.made.scatter(first, second, source=self.least, alpha=0.0))
+        look_at(self.made, [drawn, self.in_plane[-1]])
 
     def choose(self, across: str, up: str) -> None:
         """Draw these components."""
@@ -65,13 +72,19 @@ class SectionFigure:
             each.glyph.x, each.glyph.y = self.states.column(across), self.states.column(up)
         self.made.xaxis.axis_label, self.made.yaxis.axis_label = map(self.labels.label, (across, up))
 
-    def show(self, x: np.ndarray, mode: np.ndarray, start: Any) -> None:
-        """Draw points ``(N, n)`` with the names of their modes, and the start."""
+    def show(self, x: np.ndarray, mode: np.ndarray, start: Any, extent: np.ndarray) -> None:
+        """Draw points ``(N, n)`` with the names of their modes, and the start.
+
+        The axes show at least a share of the ``extent (n,)`` of the arc.
+        """
         names, place = np.unique(mode, return_inverse=True)
         numbers = np.array([self.system.mode_index(str(name)) for name in names], dtype=float)
         column = numbers[place] if len(mode) else np.empty(0)
         self.points.data = {**self.states.rows(x), "mode": column}
         self.start.data = self.states.rows(start)
+        if len(x):
+            middle, half = (x.min(axis=0) + x.max(axis=0)) / 2, LEAST * extent / 2
+            self.least.data = self.states.rows([middle - half, middle + half])
 
     def hold(self, held: bool) -> None:
         """Keep what is drawn, in grey, to compare with; or let it go."""
