@@ -65,11 +65,7 @@ class Board:
 
     def script(self, scene: Scene) -> str:
         """Python that computes and draws what is shown."""
-        calls: list[Call] = []
-        for picture in PICTURES:
-            known = [str(each) for each in calls]
-            # A branch begins with the search of its orbit, which may stand there already.
-            calls += [each for each in self.calls.get(picture, ()) if str(each) not in known]
+        calls = [each for picture in PICTURES for each in self.calls.get(picture, ())]
         return script(self.subject.text, [*calls, "", *self._drawing(scene, [each.name for each in calls])])
 
     def _drawing(self, scene: Scene, named: list[str]) -> list[str]:

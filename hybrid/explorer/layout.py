@@ -94,6 +94,6 @@ def _folded(title: str, *inside: Any) -> Any:
 
 
 def _copy_button(script: Any) -> Any:
-    made = pn.widgets.Button(name="Copy the script")
+    made = pn.widgets.Button(label="Copy the script")
     made.js_on_click(args={"script": script}, code=COPY)
     return made

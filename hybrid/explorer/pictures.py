@@ -274,21 +274,16 @@ def _recurrence(arc: HybridArc) -> tuple[tuple[float, ...], str, float]:
     return tuple(map(float, x)), str(arc.mode[begin]), float(times[nearest] - arc.t[begin])
 
 
-def branch_call(scene: Scene, orbit: PeriodicOrbit) -> Call:
-    """The call that follows an orbit over the parameter of the diagram."""
-    ends = tuple(sorted((scene.low, scene.high)))
-    return Call("branch", continue_orbit, (Written(orbit, "orbit"), scene.over, ends))
-
-
 def branch_job(subject: Subject, scene: Scene, last: Callable[[], Live]) -> Job:
     """The branch of the orbit near the end of the section."""
 
     def followed() -> Any:
-        first = orbit_call(subject, scene, last())
+        # The orbit that is shown moves on with the parameter, and the branch stays.
+        first = attrs.evolve(orbit_call(subject, scene, last()), name="first")
         orbit = first.result()
         if not orbit.status.ok:
             return (first,), orbit.status, None
-        call = branch_call(scene, orbit)
+        call = Call("branch", continue_orbit, (Written(orbit, "first"), scene.over, (scene.low, scene.high)))
         return (first, call), None, call.result()
 
     return Job("branch", values_key(scene, "periods"), (followed,))

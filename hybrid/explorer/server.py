@@ -12,6 +12,13 @@ from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
 from hybrid.explorer.subject import Subject
 
+# A telephone shows a page without this line as if it were 980 pixels wide.
+TEMPLATE = """
+{% extends base %}
+{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}
+{% block contents %}{{ embed(roots.page) }}{% endblock %}
+"""
+
 
 class Server:
     """A server in a thread of its own."""
@@ -56,7 +63,9 @@ def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
             made.close()
 
         document.on_session_destroyed(closed)
-        return made.view
+        framed = pn.Template(TEMPLATE)
+        framed.add_panel("page", made.view)
+        return framed
 
     title = subject.system.name or "Hybrid system"
     thread = pn.serve(

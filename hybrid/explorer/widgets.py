@@ -82,7 +82,7 @@ class Widgets:
         for name, value in scene.values.items():
             self._parameter(name, with_unit(name, units.get(name)), value)
         self.starts = {
-            name: pn.widgets.FloatInput(name=with_unit(name, units.get(name)), value=value, width=130)
+            name: pn.widgets.FloatInput(label=with_unit(name, units.get(name)), value=value, width=130)
             for name, value in scene.x0.items()
         }
         for name, each in self.starts.items():
@@ -91,14 +91,14 @@ class Widgets:
         for name, each in self.choices.items():
             self._when(each, partial(self._change, name))
         labels = {"orbit": "Orbit near here", "branch": "Its branch", "basins": "Basins"}
-        self.switches = {name: pn.widgets.Toggle(name=label) for name, label in labels.items()}
+        self.switches = {name: pn.widgets.Toggle(label=label) for name, label in labels.items()}
         for name, each in self.switches.items():
             self._when(each, partial(acts.switched, name))
-        self.held = pn.widgets.Toggle(name="Hold to compare")
+        self.held = pn.widgets.Toggle(label="Hold to compare")
         self._when(self.held, acts.hold)
         self.back = self._button("Previous jump", lambda: acts.step(-1))
         self.next = self._button("Next jump", lambda: acts.step(1))
-        self.play = pn.widgets.Toggle(name="Play")
+        self.play = pn.widgets.Toggle(label="Play")
         self._when(self.play, self._play)
         self._ticks: Any = None
         self.start_again = self._button("Reset", acts.reset)
@@ -111,8 +111,8 @@ class Widgets:
         self.save_script = pn.widgets.FileDownload(
             callback=lambda: StringIO(acts.script()), filename="explored.py", label="Save the script"
         )
-        self.picture = pn.widgets.Select(name="picture", options=list(PICTURES), width=130)
-        self.format = pn.widgets.Select(name="format", options=list(FORMATS), width=80)
+        self.picture = pn.widgets.Select(label="picture", options=list(PICTURES), width=130)
+        self.format = pn.widgets.Select(label="format", options=list(FORMATS), width=80)
         self.save_picture = pn.widgets.FileDownload(
             callback=self._saved, filename="picture.png", label="Save the picture"
         )
@@ -210,15 +210,15 @@ class Widgets:
             value = getattr(scene, field)
             if isinstance(kind, list | dict):
                 if kind:
-                    made[field] = pn.widgets.Select(name=label, options=kind, value=value, width=190)
+                    made[field] = pn.widgets.Select(label=label, options=kind, value=value, width=190)
             elif isinstance(kind, int):
-                made[field] = pn.widgets.IntInput(name=label, start=kind, value=value, width=130)
+                made[field] = pn.widgets.IntInput(label=label, start=kind, value=value, width=130)
             else:
-                made[field] = pn.widgets.FloatInput(name=label, value=value, width=130)
+                made[field] = pn.widgets.FloatInput(label=label, value=value, width=130)
         return made
 
     def _button(self, label: str, act: Callable[[], None]) -> Any:
-        return pn.widgets.Button(name=label, on_click=lambda _: act())
+        return pn.widgets.Button(label=label, on_click=lambda _: act())
 
     def _play(self, on: bool) -> None:
         if on:

@@ -13,7 +13,6 @@ from hybrid.plot.style import COLOURS, colour_of
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 
-
 # The axes show at least this share of the extent of the arc.
 LEAST = 0.02
 

@@ -1,0 +1,268 @@
+"""The page without a browser: what is shown, what is said, and the script that gives the same."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+
+import models
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid.errors import ArgumentError
+from hybrid.explorer.page import Page
+from hybrid.explorer.subject import subject
+
+IMPORTS = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n\n"
+
+
+def page_of(factory, *, query=None, **options):
+    text = f"{IMPORTS}from models import {factory.__name__}\n\nsystem = {factory.__name__}()\n"
+    page = Page(subject(factory(), text, **options), {"columns": "12", **(query or {})}, lambda act: act())
+    assert page.worker.wait(120)
+    return page
+
+
+def run(script):
+    made = {}
+    exec(compile(script, "explored.py", "exec"), made)
+    plt.close("all")
+    return made
+
+
+@pytest.fixture
+def opened(request):
+    pages = []
+
+    def make(*arguments, **options):
+        pages.append(page_of(*arguments, **options))
+        return pages[-1]
+
+    yield make
+    for page in pages:
+        page.close()
+
+
+@pytest.mark.parametrize("name", models.__all__)
+def test_every_model_opens(opened, name):
+    page = opened(getattr(models, name))
+    assert page.board.live is not None
+    assert len(page.board.live.arc.t) > 1
+    assert "diagram" in page.board.calls or not page.scene.over
+
+
+def test_the_script_gives_what_is_shown(opened):
+    page = opened(models.impact_oscillator, ranges={"w": (0.6, 2.0)})
+    for switch in ("orbit", "branch", "basins"):
+        page.widgets.switches[switch].value = True
+        assert page.worker.wait(120)
+    page.move("w", 0.9)
+    assert page.worker.wait(120)
+    found, board = run(page.script()), page.board
+    np.testing.assert_array_equal(found["section"].x, board.live.points.x)
+    np.testing.assert_array_equal(found["arc"].x, board.live.arc.x)
+    np.testing.assert_array_equal(found["spectrum"].exponents, board.results["exponents"].exponents)
+    np.testing.assert_array_equal(found["orbit"].x0, board.results["orbit"].x0)
+    np.testing.assert_array_equal(found["branch"].parameter, board.results["branch"].parameter)
+    np.testing.assert_array_equal(found["painted"].label, board.results["basins"].label)
+    drawn = board.figures.diagram.largest.data
+    order = np.argsort(drawn["parameter"])
+    np.testing.assert_array_equal(found["diagram"].exponents.values[:, 0], np.array(drawn["value"])[order])
+
+
+@pytest.mark.parametrize(
+    "query", [{"section": "at each jump"}, {"section": "v", "level": "0.1", "part": "from the start"}]
+)
+def test_the_script_of_other_sections(opened, query):
+    page = opened(models.impact_oscillator, query={"points": "50", **query})
+    found = run(page.script())
+    points = found["section"].x if "section" in found else found["run"].jumps.x_minus[200:]
+    np.testing.assert_array_equal(points, page.board.live.points.x)
+    np.testing.assert_array_equal(found["arc"].x, page.board.live.arc.x)
+    assert 40 < len(points) <= 50
+
+
+def test_the_branch_has_its_bifurcations(opened):
+    page = opened(models.impact_oscillator, ranges={"w": (0.8, 2.0)})
+    page.widgets.switches["branch"].value = True
+    assert page.worker.wait(120)
+    marks = page.board.figures.diagram.bifurcations.data
+    # The fold of the closed form, and the grazing at w^2 = 2 - c^2.
+    assert marks["kind"] == ["fold", "grazing"]
+    np.testing.assert_allclose(marks["parameter"], [1.750142624, np.sqrt(1.99)], rtol=1e-8)
+    assert "fold at 1.75014" in page.board.words["branch"]
+    page.widgets.switches["branch"].value = False
+    assert len(page.board.figures.diagram.bifurcations.data["kind"]) == 0
+
+
+def test_an_unforced_orbit_is_judged_without_its_phase(opened):
+    page = opened(models.rimless_wheel, x0=(0.1, 0.6))
+    page.widgets.switches["orbit"].value = True
+    assert page.worker.wait(120)
+    assert "stable" in page.board.words["orbit"]
+    assert "not stable" not in page.board.words["orbit"]
+    # The speed after an impact is cos(2 alpha) of that before: the multiplier of the wheel.
+    ratio = np.cos(2 * page.scene.values["alpha"]) ** 2
+    assert f"largest multiplier {ratio:.6g}" in page.board.words["orbit"]
+
+
+def test_a_click_starts_there(opened):
+    page = opened(models.bouncing_ball, x0=(1.0, 0.0))
+    page.start_here(0.5, 2.0)
+    assert page.worker.wait(60)
+    assert page.scene.x0 == {"q": 0.5, "v": 2.0}
+    np.testing.assert_array_equal(page.board.live.arc.x[0], [0.5, 2.0])
+
+
+def test_a_click_beyond_a_wall_is_answered(opened):
+    page = opened(models.impact_oscillator)
+    page.start_here(5.0, 0.0)
+    assert page.worker.wait(60)
+    assert page.board.live is not None
+
+
+def test_a_click_where_modes_overlap_takes_the_nearest(opened):
+    """A relay with hysteresis: both modes allow -0.5 < q < 0.5."""
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode("up", lambda t, x, p: (1.0,)), Mode("down", lambda t, x, p: (-1.0,))],
+        transitions=[
+            Transition("up", "down", Guard(lambda t, x, p: x.q - 0.5, +1)),
+            Transition("down", "up", Guard(lambda t, x, p: x.q + 0.5, -1)),
+        ],
+    )
+    page = Page(subject(system, "", (0.0,), mode="down"), {}, lambda act: act())
+    assert page.worker.wait(60)
+    page.start_here(0.2, 0.2)
+    assert page.worker.wait(60)
+    assert page.scene.mode in ("up", "down")
+    assert page.board.live.arc.status.ok
+    page.close()
+
+
+def test_jumps_are_stepped_through(opened):
+    page = opened(models.bouncing_ball, x0=(1.0, 0.0))
+    page.step(1)
+    first = page.board.live.arc.jumps[0]
+    assert "Jump 1 of" in page.widgets.event.object
+    assert f"{first.transversality:.6g}" in page.widgets.event.object
+    assert f"{first.saltation[1, 0]:.6g}" in page.widgets.event.object
+    assert page.board.figures.arc.at.data["t"][0] == first.t
+    page.step(1)
+    assert "Jump 2 of" in page.widgets.event.object
+    page.step(-5)
+    assert "Jump 1 of" in page.widgets.event.object
+
+
+def test_the_point_runs_along_the_arc(opened):
+    page = opened(models.bouncing_ball, x0=(1.0, 0.0))
+    for _ in range(40):
+        page.tick()
+    data = page.board.figures.arc.at.data
+    arc = page.board.live.arc
+    np.testing.assert_allclose([data["x0"][0], data["x1"][0]], arc(data["t"][0]))
+    assert "Jump" in page.widgets.event.object
+
+
+def test_what_ends_early_is_said(opened):
+    page = opened(models.bouncing_ball, x0=(1.0, 0.0))
+    assert "ACCUMULATION" in page.widgets.words.object
+    assert "accumulates_to" in page.widgets.words.object
+
+
+def test_a_parameter_that_cannot_be_is_said_and_the_page_lives(opened):
+    page = opened(models.impact_oscillator)
+    page.move("w", 0.0)
+    assert page.worker.wait(60)
+    assert "period" in page.widgets.words.object
+    page.move("w", 1.0)
+    assert page.worker.wait(60)
+    assert page.board.words["live"] == ""
+
+
+def test_hold_and_let_go(opened):
+    page = opened(models.impact_oscillator)
+    page.hold(True)
+    np.testing.assert_array_equal(page.board.figures.section.held.data["x0"], page.board.live.points.x[:, 0])
+    page.move("w", 1.2)
+    assert page.worker.wait(60)
+    assert page.board.figures.section.held.data["x0"][0] != page.board.live.points.x[0, 0]
+    page.hold(False)
+    assert len(page.board.figures.section.held.data["x0"]) == 0
+
+
+def test_a_shared_address_opens_the_same_page(opened):
+    page = opened(models.impact_oscillator)
+    page.move("w", 0.9)
+    page.change(points=100, up="x")
+    assert page.worker.wait(60)
+    again = opened(models.impact_oscillator, query=page.shared())
+    np.testing.assert_array_equal(again.board.live.points.x, page.board.live.points.x)
+    again.reset()
+    assert again.worker.wait(60)
+    assert again.scene.values["w"] == 1.0
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg"])
+def test_pictures_are_saved(opened, suffix):
+    page = opened(models.impact_oscillator)
+    for picture in ("portrait", "section", "time series", "exponents"):
+        file = page.saved(picture, suffix).read()
+        assert file[:4] == b"\x89PNG" if suffix == "png" else b"<svg" in file
+    with pytest.raises(ArgumentError, match="there is no orbit yet"):
+        page.saved("orbit", suffix)
+    assert "there is no orbit yet" in page.widgets.words.object
+
+
+def test_the_diagram_keeps_while_its_parameter_moves(opened):
+    page = opened(models.impact_oscillator)
+    before = list(page.board.figures.diagram.points.data["parameter"])
+    page.move("w", 1.1)
+    assert page.worker.wait(60)
+    assert list(page.board.figures.diagram.points.data["parameter"]) == before
+    page.move("c", 0.11)
+    assert page.worker.wait(60)
+    assert len(page.board.figures.diagram.largest.data["parameter"]) == 12
+
+
+def test_a_system_without_parameters_or_jumps(opened):
+    system = HybridSystem(state=("x", "v"), modes=[Mode("free", lambda t, x, p: (x.v, -x.x))])
+    page = Page(subject(system, "", (1.0, 0.0)), {}, lambda act: act())
+    assert page.worker.wait(60)
+    assert page.scene.section == "x"
+    page.step(1)
+    assert "no jumps" in page.widgets.event.object
+    page.close()
+
+
+def test_starts_lie_on_the_near_side_of_guards():
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("flight", lambda t, x, p: (x.v, -9.81))],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q - 30.0, -1),
+                Reset(lambda t, x, p: (30.0, -0.5 * x.v)),
+            )
+        ],
+    )
+    with pytest.raises(ArgumentError, match="No start was found"):
+        subject(system, "")
+    assert subject(system, "", (31.0, 0.0)).x0 == {"q": 31.0, "v": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("ranges", "said"),
+    [
+        ({"wrong": (0.0, 1.0)}, "ranges: Parameter 'wrong' does not exist"),
+        ({"w": (2.0, 1.0)}, "ranges: Range of 'w'"),
+        ({"w": (1.0, 1.0)}, "must be (low, high) with low < high"),
+    ],
+)
+def test_ranges_are_checked(ranges, said):
+    with pytest.raises(ArgumentError) as raised:
+        subject(models.impact_oscillator(), "", ranges=ranges)
+    assert said in str(raised.value)
