@@ -62,6 +62,16 @@ class PeriodicOrbit:
         Names of the transitions in the order they fire.
     status
         Whether Newton's method converged, and how far it got if not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> round(orbit.period, 6), np.abs(orbit.multipliers).round(4)
+    (6.283185, array([0.5843, 0.5843]))
+    >>> bool(orbit.residual < 1e-10), orbit.signature
+    (True, ('flight', 'flight'))
     """
 
     system: HybridSystem

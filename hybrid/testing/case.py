@@ -48,7 +48,24 @@ def as_case(case: object) -> Case:
 
 
 class Engine:
-    """Computes runs and derivatives: with the library, unless a subclass tests something else."""
+    """Computes runs and derivatives: with the library, unless a subclass tests something else.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid.testing import Case, Engine, check_saltation
+    >>> class Forgetful(Engine):
+    ...     def saltation_matrix(self, system, transition, t, x, parameters):
+    ...         return np.eye(len(x))
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6, engine=Forgetful())
+    >>> try:
+    ...     check_saltation(case)
+    ... except AssertionError:
+    ...     print("a fault")
+    a fault
+    """
 
     def simulate(
         self, system: HybridSystem, x0: Any, t_span: tuple[float, float], **options: Any
@@ -106,6 +123,15 @@ class Run:
         Sizes of the components along the run, ``(n,)``, each in its own unit.
     cut
         Why the run ends before that of the case does; empty if it does not.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case
+    >>> ball = models.bouncing_ball()
+    >>> run = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6).run
+    >>> len(run.arc.jumps), run.cut
+    (1, '')
     """
 
     arc: HybridArc
@@ -145,6 +171,15 @@ class Case:
         Computes the runs.
     laws
         What the author knows; by default the laws that the system carries.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> len(case.run.arc.jumps), case.field("flight", 0.0, (1.0, 0.0))
+    (1, array([ 0.  , -9.81]))
     """
 
     system: HybridSystem

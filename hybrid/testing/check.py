@@ -139,6 +139,7 @@ def check_system(
     Examples
     --------
     >>> import models
+    >>> from hybrid.testing import check_system
     >>> report = check_system(models.bouncing_ball(), examples=5)
     >>> report.unchecked
     ('The saltation matrix is the identity ...', 'An elastic ...')
