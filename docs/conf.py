@@ -35,6 +35,7 @@ numpydoc_show_class_members = False
 # docs/make_site.py writes the pages of the names.
 autosummary_generate = False
 add_module_names = False
+toc_object_entries_show_parents = "hide"
 
 # `make docs ARGS=--links`; publishers that refuse programs are shown as broken.
 linkcheck_timeout = 20
@@ -54,3 +55,12 @@ html_theme_options = {
 }
 # A part without pages of its own needs no list of pages beside it.
 html_sidebars = {"i-want-to": [], "gallery": []}
+
+
+def readable_defaults(app, what, name, thing, options, signature, returned):
+    """A default that is made anew for each object is shown as dots."""
+    return (signature or "").replace("=NOTHING", "=...") or signature, returned
+
+
+def setup(app):
+    app.connect("autodoc-process-signature", readable_defaults)

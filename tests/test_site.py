@@ -59,6 +59,15 @@ def test_every_page_is_listed_once(site):
     assert sorted(listed) == sorted(pages - {"index"})
 
 
+def test_tutorials_are_notebooks_on_the_site(maker, site):
+    for name in maker.EXECUTED:
+        page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        text = (site / name).read_text(encoding="utf-8")
+        assert text.startswith("---\nfile_format: mystnb\n")
+        assert text.count("```{code-cell} python\n") == page.count("```python\n") > 0
+        assert "```python" not in text
+
+
 def test_a_value_without_a_comment_is_refused(maker):
     with pytest.raises(SystemExit, match=r"hybrid\.nothing has no comment that says what it is"):
         maker.comment_above(importlib.import_module("hybrid"), "nothing")
