@@ -10,7 +10,8 @@ import models
 ROOT = Path(__file__).parents[1]
 NAMES = [name for name in vars(models) if callable(getattr(models, name))]
 # A model with what is known of it.
-MAX_LINES = 170
+# With an example for each of its models.
+MAX_LINES = 185
 
 every_model = pytest.mark.parametrize("name", NAMES)
 

@@ -10,13 +10,9 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.compiler.agreement import compiled_value
-from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
-from hybrid.simulation.saltation import saltation_matrix
-from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, Solver
 from hybrid.status import StatusCode
 from hybrid.system.derivatives import evaluate
@@ -25,6 +21,7 @@ from hybrid.system.functions import ModelFunction, reset_function
 from hybrid.system.graph import HybridSystem, laws_of
 from hybrid.system.laws import Laws
 from hybrid.system.variables import named_values
+from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.reads import is_passed
 from hybrid.testing.sizes import sizes_along
@@ -45,66 +42,6 @@ SENSITIVE = 1e-6
 def as_case(case: object) -> Case:
     """Return a case, or raise an ArgumentError."""
     return arguments.instance("case", case, Case, "Draw one with hybrid.testing.cases.")
-
-
-class Engine:
-    """Computes runs and derivatives: with the library, unless a subclass tests something else.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import models
-    >>> from hybrid.testing import Case, Engine, check_saltation
-    >>> class Forgetful(Engine):
-    ...     def saltation_matrix(self, system, transition, t, x, parameters):
-    ...         return np.eye(len(x))
-    >>> ball = models.bouncing_ball()
-    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6, engine=Forgetful())
-    >>> try:
-    ...     check_saltation(case)
-    ... except AssertionError:
-    ...     print("a fault")
-    a fault
-    """
-
-    def simulate(
-        self, system: HybridSystem, x0: Any, t_span: tuple[float, float], **options: Any
-    ) -> HybridArc:
-        """As :func:`hybrid.simulate`."""
-        return simulate(system, x0, t_span, **options)
-
-    def saltation_matrix(
-        self, system: HybridSystem, transition: str, t: float, x: Any, parameters: Mapping[str, float]
-    ) -> np.ndarray:
-        """As :func:`hybrid.saltation_matrix`."""
-        return saltation_matrix(system, transition, t, x, parameters=parameters)
-
-    def derivative(
-        self,
-        system: HybridSystem,
-        function: ModelFunction,
-        index: int,
-        t: float,
-        x: np.ndarray,
-        parameters: np.ndarray,
-    ) -> np.ndarray:
-        """The derivative ``(rows, n + 1)`` of a field, guard or reset, as runs use it."""
-        return compile_system(system).derivative(function, index, t, x, parameters)
-
-    def value(
-        self,
-        compiled: CompiledSystem,
-        function: ModelFunction,
-        index: int,
-        t: float,
-        x: np.ndarray,
-        parameters: np.ndarray,
-    ) -> np.ndarray:
-        """The values ``(rows,)`` of a field, guard, condition or reset, as runs use them."""
-        return compiled_value(compiled, function, index, t, x, parameters)
-
-
-LIBRARY = Engine()
 
 
 @attrs.frozen(eq=False)

@@ -19,7 +19,8 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.graph import HybridSystem, as_system, check_mode, laws_of
 from hybrid.system.labels import named
 from hybrid.system.laws import Laws
-from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine
+from hybrid.testing.case import TIGHT, Case
+from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.starts import start_in
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
