@@ -18,6 +18,8 @@ extensions = [
     "sphinx_design",
 ]
 source_suffix = {".md": "myst-nb"}
+# For download.
+exclude_patterns = ["notebooks"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 # Links to headings have the same form as where the pages are read without the site.
 myst_heading_anchors = 4

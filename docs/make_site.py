@@ -10,6 +10,7 @@ import argparse
 import enum
 import importlib
 import inspect
+import json
 import os
 import posixpath
 import re
@@ -37,7 +38,7 @@ EXECUTED = ("newcomer.md", "notebook.md", "plain-equations.md")
 NOTEBOOK = """---
 file_format: mystnb
 kernelspec:
-  name: python3
+  name: site
 ---
 
 """
@@ -61,6 +62,8 @@ def main() -> None:
     command += ["--builder", kind, "--doctree-dir", str(output / f"doctrees-{kind}")]
     # A notebook draws into its page, whatever this process draws into.
     environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
+    environment["JUPYTER_PATH"] = str(output / "jupyter")
+    write_kernel(output / "jupyter")
     done = subprocess.run([*command, str(source), str(output / kind)], check=False, env=environment)
     if done.returncode:
         sys.exit(done.returncode)
@@ -75,7 +78,11 @@ def write_pages(source: Path) -> None:
     shutil.copy(HERE / "site.css", source / "_static")
     for page in [*HERE.rglob("*.md"), *map(ROOT.joinpath, OUTSIDE)]:
         text = with_links(page)
-        write(source / place(page), as_notebook(text) if page.name in EXECUTED else text)
+        if page.name in EXECUTED:
+            file = f"notebooks/{page.stem}.ipynb"
+            write(source / file, json.dumps(notebook(text), indent=1))
+            text = f"{as_notebook(text)}\n{{download}}`This page as a notebook <{file}>`\n"
+        write(source / place(page), text)
     for picture in [*HERE.rglob("*.png"), *(ROOT / "benchmarks").glob("*.png")]:
         (source / place(picture)).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(picture, source / place(picture))
@@ -111,8 +118,28 @@ def with_links(page: Path) -> str:
 
 
 def as_notebook(text: str) -> str:
-    """A page as a notebook, whose Python blocks are its cells."""
+    """A page whose Python blocks are cells, which the extension of the site executes."""
     return NOTEBOOK + re.sub(r"^```python$", "```{code-cell} python", text, flags=re.MULTILINE)
+
+
+def notebook(text: str) -> dict[str, object]:
+    """The same cells as a file that Jupyter opens, not executed."""
+    cells: list[dict[str, object]] = []
+    for i, part in enumerate(re.split(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)):
+        cell: dict[str, object] = {"id": f"cell-{i}", "metadata": {}, "source": part.strip()}
+        if i % 2:
+            cells.append({"cell_type": "code", **cell, "execution_count": None, "outputs": []})
+        elif part.strip():
+            cells.append({"cell_type": "markdown", **cell})
+    python = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    return {"nbformat": 4, "nbformat_minor": 5, "metadata": {"kernelspec": python}, "cells": cells}
+
+
+def write_kernel(folder: Path) -> None:
+    """Say which Python executes the pages: this one, and only errors are reported."""
+    start = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
+    kernel = {"argv": [*start, "--IPKernelApp.log_level=ERROR"], "display_name": "site", "language": "python"}
+    write(folder / "kernels" / "site" / "kernel.json", json.dumps(kernel))
 
 
 def write_models(source: Path) -> None:

@@ -1,6 +1,7 @@
 """What the site is made of: a page per public name and per model, and links that lead somewhere."""
 
 import importlib
+import json
 import re
 from pathlib import Path
 
@@ -66,6 +67,10 @@ def test_tutorials_are_notebooks_on_the_site(maker, site):
         assert text.startswith("---\nfile_format: mystnb\n")
         assert text.count("```{code-cell} python\n") == page.count("```python\n") > 0
         assert "```python" not in text
+        cells = json.loads((site / "notebooks" / name).with_suffix(".ipynb").read_text(encoding="utf-8"))[
+            "cells"
+        ]
+        assert [cell["cell_type"] for cell in cells].count("code") == page.count("```python\n")
 
 
 def test_a_value_without_a_comment_is_refused(maker):
