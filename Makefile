@@ -1,6 +1,7 @@
 # Needs nothing but make and Python 3.11 or newer; everything else goes into $(VENV).
 #   make demo ARGS="--help"            options of the demo
 #   make test ARGS="-k statistics"     options of pytest
+#   make docs ARGS=--links             ask the sites that the documentation links to
 PYTHON ?= python3
 VENV ?= .venv
 ARGS ?=

@@ -7,7 +7,8 @@ author = "The hybrid-systems developers"
 version = release = hybrid.__version__
 
 extensions = [
-    "myst_parser",
+    # The parser of MyST pages, which executes those that make_site.py makes notebooks of.
+    "myst_nb",
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
@@ -16,10 +17,19 @@ extensions = [
     "sphinx-mathjax-offline",
     "sphinx_design",
 ]
-source_suffix = {".md": "markdown"}
+source_suffix = {".md": "myst-nb"}
+# For download.
+exclude_patterns = ["notebooks"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 # Links to headings have the same form as where the pages are read without the site.
 myst_heading_anchors = 4
+
+nb_execution_mode = "force"
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+# Progress bars and the note of a first compilation.
+nb_output_stderr = "remove"
+nb_merge_streams = True
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
@@ -27,9 +37,17 @@ numpydoc_show_class_members = False
 # docs/make_site.py writes the pages of the names.
 autosummary_generate = False
 add_module_names = False
+toc_object_entries_show_parents = "hide"
+
+# `make docs ARGS=--links`; publishers that refuse programs are shown as broken.
+linkcheck_timeout = 20
+linkcheck_retries = 2
+linkcheck_anchors = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "hybrid"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "show_prev_next": False,
@@ -39,3 +57,12 @@ html_theme_options = {
 }
 # A part without pages of its own needs no list of pages beside it.
 html_sidebars = {"i-want-to": [], "gallery": []}
+
+
+def readable_defaults(app, what, name, thing, options, signature, returned):
+    """A default that is made anew for each object is shown as dots."""
+    return (signature or "").replace("=NOTHING", "=...") or signature, returned
+
+
+def setup(app):
+    app.connect("autodoc-process-signature", readable_defaults)

@@ -16,6 +16,7 @@ HERE = Path(__file__).parent
 COMMANDS = {
     "pictures": [str(HERE / "make_pictures.py")],
     "basins": [str(HERE / "make_basins.py")],
+    "theory": [str(HERE / "make_theory.py")],
     "gallery": [str(HERE / "make_gallery.py")],
     "architecture": [str(HERE / "make_architecture.py")],
     "founding_chart": [str(HERE / "make_founding_chart.py")],

@@ -1,4 +1,4 @@
-"""Build the site: ``make docs``, or ``python docs/make_site.py``.
+"""Build the site: ``make docs``, or ``python docs/make_site.py``; ``--links`` asks the linked sites instead.
 
 The pages of this folder, and those that are made from the sources (one per public name, one per model), go to
 ``build/site/source``. Sphinx makes ``build/site/html`` of them. A warning is an error.
@@ -10,6 +10,8 @@ import argparse
 import enum
 import importlib
 import inspect
+import json
+import os
 import posixpath
 import re
 import shutil
@@ -31,30 +33,56 @@ OUTSIDE = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
 }
+# Pages whose blocks are executed when the site is built, with what a notebook shows below them.
+EXECUTED = ("newcomer.md", "notebook.md", "plain-equations.md")
+NOTEBOOK = """---
+file_format: mystnb
+kernelspec:
+  name: site
+---
+
+"""
 LINK = re.compile(r"\]\((?!https?://|#)([^)#\s]+)(#[^)\s]*)?\)")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=ROOT / "build" / "site", help="folder of the site")
-    output = parser.parse_args().output
+    parser.add_argument("--links", action="store_true", help="ask every linked site, in place of building")
+    given = parser.parse_args()
+    output = given.output
     source = output / "source"
     shutil.rmtree(source, ignore_errors=True)
     write_pages(source)
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet"]
-    command += ["--builder", "html", "--doctree-dir", str(output / "doctrees")]
-    done = subprocess.run([*command, str(source), str(output / "html")], check=False)
+    if given.links:
+        # No page has to be executed for its links.
+        command += ["--define", "nb_execution_mode=off"]
+    kind = "linkcheck" if given.links else "html"
+    command += ["--builder", kind, "--doctree-dir", str(output / f"doctrees-{kind}")]
+    # A notebook draws into its page, whatever this process draws into.
+    environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
+    environment["JUPYTER_PATH"] = str(output / "jupyter")
+    write_kernel(output / "jupyter")
+    done = subprocess.run([*command, str(source), str(output / kind)], check=False, env=environment)
     if done.returncode:
         sys.exit(done.returncode)
-    print(f"Open {output / 'html' / 'index.html'}")
+    print("All links are answered." if given.links else f"Open {output / kind / 'index.html'}")
 
 
 def write_pages(source: Path) -> None:
     """Everything that Sphinx reads."""
     source.mkdir(parents=True)
     shutil.copy(HERE / "conf.py", source)
+    (source / "_static").mkdir()
+    shutil.copy(HERE / "site.css", source / "_static")
     for page in [*HERE.rglob("*.md"), *map(ROOT.joinpath, OUTSIDE)]:
-        write(source / place(page), with_links(page))
+        text = with_links(page)
+        if page.name in EXECUTED:
+            file = f"notebooks/{page.stem}.ipynb"
+            write(source / file, json.dumps(notebook(text), indent=1))
+            text = f"{as_notebook(text)}\n{{download}}`This page as a notebook <{file}>`\n"
+        write(source / place(page), text)
     for picture in [*HERE.rglob("*.png"), *(ROOT / "benchmarks").glob("*.png")]:
         (source / place(picture)).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(picture, source / place(picture))
@@ -87,6 +115,31 @@ def with_links(page: Path) -> str:
         return f"]({posixpath.relpath(place(target).as_posix(), here)}{link[2] or ''})"
 
     return LINK.sub(moved, page.read_text(encoding="utf-8"))
+
+
+def as_notebook(text: str) -> str:
+    """A page whose Python blocks are cells, which the extension of the site executes."""
+    return NOTEBOOK + re.sub(r"^```python$", "```{code-cell} python", text, flags=re.MULTILINE)
+
+
+def notebook(text: str) -> dict[str, object]:
+    """The same cells as a file that Jupyter opens, not executed."""
+    cells: list[dict[str, object]] = []
+    for i, part in enumerate(re.split(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)):
+        cell: dict[str, object] = {"id": f"cell-{i}", "metadata": {}, "source": part.strip()}
+        if i % 2:
+            cells.append({"cell_type": "code", **cell, "execution_count": None, "outputs": []})
+        elif part.strip():
+            cells.append({"cell_type": "markdown", **cell})
+    python = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    return {"nbformat": 4, "nbformat_minor": 5, "metadata": {"kernelspec": python}, "cells": cells}
+
+
+def write_kernel(folder: Path) -> None:
+    """Say which Python executes the pages: this one, and only errors are reported."""
+    start = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
+    kernel = {"argv": [*start, "--IPKernelApp.log_level=ERROR"], "display_name": "site", "language": "python"}
+    write(folder / "kernels" / "site" / "kernel.json", json.dumps(kernel))
 
 
 def write_models(source: Path) -> None:

@@ -24,15 +24,45 @@ _short.maxstring = _short.maxother = 100
 
 
 class HybridError(Exception):
-    """Base of every error this library raises on purpose."""
+    """Base of every error this library raises on purpose.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> try:
+    ...     hybrid.simulate(models.bouncing_ball(), (1.0,), (0.0, 1.0))
+    ... except hybrid.HybridError as error:
+    ...     print(type(error).__name__)
+    ArgumentError
+    """
 
 
 class ModelError(HybridError, ValueError):
-    """A model, or a call that uses it, is invalid; the text says how to fix it."""
+    """A model, or a call that uses it, is invalid; the text says how to fix it.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> try:
+    ...     hybrid.Guard(lambda t, x, p: x.q, direction=2)
+    ... except hybrid.ModelError as error:
+    ...     print(error)
+    Guard: direction must be -1 (falling), 0 (both) or +1 (rising); got 2.
+    """
 
 
 class ArgumentError(ModelError):
-    """An argument of a call is out of range or of the wrong shape for the model it is used with."""
+    """An argument of a call is out of range or of the wrong shape for the model it is used with.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> try:
+    ...     hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), parameters={"E": 0.5})
+    ... except hybrid.ArgumentError as error:
+    ...     print(error)
+    parameters: Parameter 'E' does not exist. Parameters: g, e.
+    """
 
 
 def shown(value: object) -> str:

@@ -17,7 +17,17 @@ PLAIN = "Reached the end."
 
 
 class StatusCode(IntEnum):
-    """Why a run ended."""
+    """Why a run ended.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 5.0))
+    >>> arc.status.code == hybrid.StatusCode.ACCUMULATION
+    True
+    >>> hybrid.StatusCode(0).name
+    'SUCCESS'
+    """
 
     SUCCESS = codes.DONE
     MAX_STEPS = codes.MAX_STEPS
@@ -47,6 +57,15 @@ class Status:
     ``status.ok`` is true for ``SUCCESS`` alone: the result is complete and valid. It is false for
     ``TERMINAL``, also where the model plans this end. If a run ended early, the result holds everything that
     was computed before.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> status = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 3.0), max_jumps=2).status
+    >>> status.ok, status.code.name
+    (False, 'MAX_JUMPS')
+    >>> print(status.message)
+    The limit of jumps was reached at t = 1.75191172702 in mode 'flight'.
     """
 
     code: StatusCode

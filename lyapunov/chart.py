@@ -109,6 +109,7 @@ def chart(
     Examples
     --------
     >>> import models
+    >>> from lyapunov import chart
     >>> damping = chart(models.impact_oscillator(), {"c": [0.1, 0.2, 0.4]}, (0.0, 0.0), intervals=200)
     >>> dict(damping.exponents.sizes)
     {'c': 3, 'exponent': 1}

@@ -30,6 +30,18 @@ class ModelComparison:
         Name of the model that the others are compared with.
     points
         Parameter values, by name.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import compare_models
+    >>> from models.contact import Hertz, Rigid, hertz_stiffness
+    >>> laws = {"rigid": Rigid(e=1.0), "Hertz": Hertz(hertz_stiffness())}
+    >>> systems = {name: models.vibroimpact(law) for name, law in laws.items()}
+    >>> start = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
+    >>> found = compare_models(systems, start, reference="Hertz", intervals=50)
+    >>> found.cheapest(tolerance=0.02), len(found.spectra["rigid"])
+    ('rigid', 1)
     """
 
     spectra: Mapping[str, tuple[LyapunovSpectrum, ...]]
@@ -156,6 +168,7 @@ def compare_models(
     Examples
     --------
     >>> import models
+    >>> from lyapunov import compare_models
     >>> from models.contact import Hertz, Rigid, hertz_stiffness
     >>> laws = {"rigid": Rigid(e=1.0), "Hertz": Hertz(hertz_stiffness())}
     >>> found = compare_models(

@@ -54,6 +54,14 @@ def plot_convergence(
         Axes to draw into; by default those of a new figure.
     figsize
         Width and height of a new figure in inches.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lyapunov.plot import plot_convergence
+    >>> ax = plot_convergence({"one": 1.0 + 1.0 / np.arange(1, 100)}, truth=1.0)
+    >>> [line.get_label() for line in ax.lines]
+    ['exact', 'one']
     """
     histories = {
         label: numbers(f"estimates[{arguments.shown(label)}]", estimate, 1)
@@ -110,6 +118,15 @@ def plot_spectrum(
     ------
     ArgumentError
         If the spectrum has no history.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import lyapunov_spectrum
+    >>> from lyapunov.plot import plot_spectrum
+    >>> spectrum = lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=300)
+    >>> plot_spectrum(spectrum).get_xlabel()
+    'intervals $M$'
     """
     arguments.instance("spectrum", spectrum, LyapunovSpectrum, "Make one with lyapunov.lyapunov_spectrum.")
     if not len(spectrum.growths):
@@ -160,6 +177,15 @@ def plot_two_orbits(
         Axes to draw into; by default those of a new figure.
     figsize
         Width and height of a new figure in inches.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import two_orbit_exponents
+    >>> from lyapunov.plot import plot_two_orbits
+    >>> result = two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), intervals=300)
+    >>> len(plot_two_orbits(result).lines)
+    4
     """
     arguments.instance("result", result, TwoOrbitExponents, "Make one with lyapunov.two_orbit_exponents.")
     histories = {

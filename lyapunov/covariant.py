@@ -50,6 +50,17 @@ class CovariantVectors:
         How the run ended.
     names
         Names of the state's components, and units where the system has them.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from lyapunov import covariant_vectors
+    >>> found = covariant_vectors(models.solvable_oscillator(), (0.3, 0.0), interval=1.0, intervals=50)
+    >>> found.exponents.round(3), found.vectors.shape
+    (array([ 0.5  , -0.002]), (50, 2, 2))
+    >>> bool(np.allclose(np.linalg.norm(found.vectors, axis=1), 1.0))
+    True
     """
 
     vectors: np.ndarray
@@ -159,6 +170,7 @@ def covariant_vectors(
     Examples
     --------
     >>> import models
+    >>> from lyapunov import covariant_vectors
     >>> found = covariant_vectors(models.solvable_oscillator(), (0.3, 0.0), interval=1.0, intervals=50)
     >>> found.vectors.shape
     (50, 2, 2)

@@ -39,6 +39,8 @@ def kaplan_yorke_dimension(exponents: ArrayLike) -> float:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from lyapunov import kaplan_yorke_dimension
     >>> kaplan_yorke_dimension([0.5, 0.0, -2.0])
     2.25
     >>> kaplan_yorke_dimension([0.5, 0.0, -np.inf])

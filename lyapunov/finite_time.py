@@ -72,6 +72,7 @@ def finite_time_exponents(
     Examples
     --------
     >>> import models
+    >>> from lyapunov import finite_time_exponents
     >>> finite_time_exponents(models.bouncing_ball(), (1.0, 0.0), interval=0.1).round(3)
     array([ 0.5, -0.5])
     """

@@ -32,6 +32,7 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     Examples
     --------
     >>> import hybrid, models
+    >>> from lyapunov import floquet_exponents
     >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (1.0, 1.0))
     >>> floquet_exponents(orbit).round(5)
     array([-0.08551, -0.08551])

@@ -61,6 +61,16 @@ def kinds(chart: xarray.Dataset) -> xarray.DataArray:
     ----------
     chart
         From :func:`lyapunov.chart`, over any axes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import chart
+    >>> from lyapunov.maps import KINDS
+    >>> from lyapunov.plot import kinds
+    >>> swept = chart(models.impact_oscillator(), {"c": [0.1, 0.2]}, (0.0, 0.0), k=2, intervals=1000)
+    >>> [KINDS[int(kind)] for kind in kinds(swept)]
+    ['periodic', 'periodic']
     """
     values = settled(as_chart(chart))
     known = np.isfinite(values[..., 0]) | np.isneginf(values[..., 0])
@@ -104,6 +114,16 @@ def plot_map(
     ------
     ArgumentError
         If the chart is not over two axes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import chart
+    >>> from lyapunov.plot import plot_map
+    >>> over = {"c": [0.1, 0.2], "r": [0.7, 0.8]}
+    >>> ax = plot_map(chart(models.impact_oscillator(), over, (0.0, 0.0), intervals=200))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('r', 'c')
     """
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
@@ -150,6 +170,16 @@ def plot_kinds(
     ------
     ArgumentError
         If the chart is not over two axes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import chart
+    >>> from lyapunov.plot import plot_kinds
+    >>> over = {"c": [0.1, 0.2], "r": [0.7, 0.8]}
+    >>> ax = plot_kinds(chart(models.impact_oscillator(), over, (0.0, 0.0), k=2, intervals=200))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('r', 'c')
     """
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch

@@ -78,7 +78,16 @@ POINTS_OF_A_PORTRAIT = 40_000
 
 
 def style() -> AbstractContextManager[None]:
-    """Matplotlib settings for these charts: ``with style(): ...``."""
+    """Matplotlib settings for these charts: ``with style(): ...``.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from lyapunov.plot import plot_phase_portrait, style
+    >>> arc = hybrid.simulate(models.impact_oscillator(), (0.0, 0.0), (0.0, 50.0))
+    >>> with style():
+    ...     ax = plot_phase_portrait(arc, "x", "v")
+    """
     import matplotlib
 
     return matplotlib.rc_context(STYLE)
@@ -113,6 +122,14 @@ def plot_phase_portrait(
         Width and height of a new figure in inches.
     size
         Diameter of the dots of the section in points.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from lyapunov.plot import plot_phase_portrait
+    >>> arc = hybrid.simulate(models.impact_oscillator(), (0.0, 0.0), (0.0, 50.0))
+    >>> plot_phase_portrait(arc, "x", "v", labels=("position", "speed")).get_xlabel()
+    'position'
     """
     system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
     i, j = as_component("x", system.state_names, x), as_component("y", system.state_names, y)
@@ -174,6 +191,15 @@ def plot_exponents(
         Width and height of a new figure in inches.
     size
         Size in points of the marks of failed rows; those of minus infinity have half of it.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import chart
+    >>> from lyapunov.plot import plot_exponents
+    >>> swept = chart(models.impact_oscillator(), {"c": [0.1, 0.2, 0.4]}, (0.0, 0.0), intervals=100)
+    >>> plot_exponents(swept).get_xlabel()
+    'c'
     """
     name, values = _only_axis(as_chart(chart))
     exponents, errors = chart.exponents.values, chart.standard_error.values
@@ -226,6 +252,18 @@ def plot_bifurcation(
     ------
     ArgumentError
         If the chart is over two axes or has no section.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import chart
+    >>> from lyapunov.plot import plot_bifurcation
+    >>> swept = chart(
+    ...     models.impact_oscillator(), {"w": [0.9, 1.0]}, (0.0, 0.0), intervals=100, section=20
+    ... )
+    >>> ax = plot_bifurcation(swept, "x")
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('w', 'x')
     """
     name, values = _only_axis(as_chart(chart))
     points = chart.sizes.get("sample", 0)
@@ -279,6 +317,16 @@ def plot_chart(
     ------
     ArgumentError
         If the chart is over more than two axes; the text says how to take a plane.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import chart
+    >>> from lyapunov.plot import plot_chart
+    >>> swept = chart(models.impact_oscillator(), {"w": [0.9, 1.0]}, (0.0, 0.0), intervals=100)
+    >>> (ax,) = plot_chart(swept)
+    >>> ax.get_xlabel()
+    'w'
     """
     if size is not None:
         dot_area(1, size)
@@ -343,6 +391,19 @@ def plot_comparison(
         Axes to draw into; by default those of a new figure.
     figsize
         Width and height of a new figure in inches.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import compare_models
+    >>> from lyapunov.plot import plot_comparison
+    >>> from models.contact import Hertz, Rigid, hertz_stiffness
+    >>> laws = {"rigid": Rigid(e=1.0), "Hertz": Hertz(hertz_stiffness())}
+    >>> systems = {name: models.vibroimpact(law) for name, law in laws.items()}
+    >>> start = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
+    >>> ax = plot_comparison(compare_models(systems, start, reference="Hertz", intervals=50))
+    >>> ax.get_yscale()
+    'log'
     """
     arguments.instance("result", result, ModelComparison, "Make one with lyapunov.compare_models.")
     (ax,) = axes_for(ax, 1, FIGURE, figsize)

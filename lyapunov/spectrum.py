@@ -71,6 +71,16 @@ class LyapunovSpectrum:
         How the run ended.
     names
         Names of the state's components, and units where the system has them.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import lyapunov_spectrum
+    >>> spectrum = lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=500)
+    >>> spectrum.exponents.shape, spectrum.growths.shape
+    ((2,), (500, 2))
+    >>> round(spectrum.sum_rule, 4), spectrum.status.ok
+    (-0.171, True)
     """
 
     exponents: np.ndarray
@@ -204,6 +214,7 @@ def lyapunov_spectrum(
     Examples
     --------
     >>> import models
+    >>> from lyapunov import lyapunov_spectrum
     >>> spectrum = lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=500)
     >>> bool(abs(spectrum.sum_defect) < 1e-9)
     True

@@ -78,6 +78,14 @@ class TwoOrbitExponents:
        nonlinear nonsmooth discontinuous vibroimpact system", 2017.
     .. [2] G. Benettin, L. Galgani, J.-M. Strelcyn, "Kolmogorov entropy and numerical experiments", Phys.
        Rev. A 14 (1976) 2338, doi:10.1103/PhysRevA.14.2338.
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import two_orbit_exponents
+    >>> result = two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), intervals=400, transient=100)
+    >>> result.single_piece.shape, round(result.renormalised_exponent, 2)
+    ((400,), -0.09)
     """
 
     distances: np.ndarray
@@ -185,7 +193,9 @@ def two_orbit_exponents(
 
     Examples
     --------
+    >>> import numpy as np
     >>> import models
+    >>> from lyapunov import two_orbit_exponents
     >>> result = two_orbit_exponents(models.impact_oscillator(), (0.0, 0.0), intervals=400, transient=100)
     >>> bool(np.allclose(result.telescoped, result.single_piece))
     True

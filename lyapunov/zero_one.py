@@ -26,6 +26,14 @@ class ZeroOneTest:
         Median of the growth rates: near 1 for a chaotic series, near 0 for a regular one.
     frequencies, growth
         The frequencies ``c (M,)``, and the growth rate ``K_c (M,)`` at each, between -1 and 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from lyapunov import zero_one_test
+    >>> result = zero_one_test(np.cos(np.arange(2000.0)))
+    >>> bool(abs(result.K) < 0.05), result.growth.shape == result.frequencies.shape
+    (True, True)
     """
 
     K: float
@@ -82,6 +90,8 @@ def zero_one_test(series: ArrayLike, *, frequencies: int = 100) -> ZeroOneTest:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from lyapunov import zero_one_test
     >>> x = [0.3]
     >>> for _ in range(2000):
     ...     x.append(4.0 * x[-1] * (1.0 - x[-1]))

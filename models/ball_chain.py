@@ -37,6 +37,14 @@ def ball_chain() -> HybridSystem:
     ----------
     S. McNamara, W. R. Young, "Inelastic collapse and clumping in a one-dimensional granular medium",
     Physics of Fluids A 4, 496-504, 1992. doi:10.1063/1.858323
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.ball_chain(), (-1.0, 0.0, 1.0, 1.0, 0.0, 0.0), (0.0, 3.0))
+    >>> [jump.transition for jump in arc.jumps], arc.x[-1, 3:].round(9)
+    (['left', 'right'], array([0., 0., 1.]))
     """
     return HybridSystem(
         name="three balls in a line",

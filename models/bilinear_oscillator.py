@@ -36,6 +36,16 @@ def bilinear_oscillator() -> HybridSystem:
     ----------
     S. W. Shaw, P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and
     Vibration 90(1), 129-155, 1983. doi:10.1016/0022-460X(83)90407-8
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import simulate
+    >>> free = {"A": 0.0, "c": 0.0}
+    >>> arc = simulate(models.bilinear_oscillator(), (0.0, 1.0), (0.0, 10.0), mode="stiff", parameters=free)
+    >>> bool(np.isclose(arc.jumps[1].t, np.pi / np.sqrt(10.0) + np.pi))
+    True
     """
     return HybridSystem(
         name="bilinear oscillator",

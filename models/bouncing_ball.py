@@ -31,6 +31,16 @@ def bouncing_ball() -> HybridSystem:
     ----------
     R. Goebel, R. G. Sanfelice, A. R. Teel, "Hybrid dynamical systems", IEEE Control Systems Magazine
     29(2), 28-93, 2009, example 1. doi:10.1109/MCS.2008.931718
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 5.0))
+    >>> round(arc.jumps[0].t, 6), round((2 / 9.81) ** 0.5, 6)
+    (0.451524, 0.451524)
+    >>> float(arc.t[-1].round(6)), round((2 / 9.81) ** 0.5 * 1.8 / 0.2, 6)
+    (4.063713, 4.063713)
     """
     return HybridSystem(
         name="bouncing ball",

@@ -42,6 +42,15 @@ def bouncing_table() -> HybridSystem:
     P. J. Holmes, "The dynamics of repeated impacts with a sinusoidally vibrating table", Journal of Sound and
     Vibration 84(2), 173-189, 1982. J. M. Luck, A. Mehta, "Bouncing ball with a finite restitution:
     Chattering, locking, and chaos", Physical Review E 48(5), 3988-3997, 1993. doi:10.1103/PhysRevE.48.3988
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> still = {"A": 0.005}
+    >>> arc = simulate(models.bouncing_table(), (0.001, 0.0), (0.0, 1.0), mode="flight", parameters=still)
+    >>> str(arc.mode[-1]), abs(float(arc["q"][-1])) < 1e-12
+    ('rest', True)
     """
     return HybridSystem(
         name="bouncing ball on a vibrating table",

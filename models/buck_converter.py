@@ -39,6 +39,18 @@ def buck_converter() -> HybridSystem:
     ----------
     E. Fossas, G. Olivar, "Study of chaos in the buck converter", IEEE Transactions on Circuits and Systems I
     43(1), 13-25, 1996. doi:10.1109/81.481457
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import periodic_orbit, simulate
+    >>> low = {"E": 20.0}
+    >>> arc = simulate(models.buck_converter(), (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters=low)
+    >>> orbit = periodic_orbit(
+    ...     models.buck_converter(), arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, parameters=low
+    ... )
+    >>> orbit.status.ok, round(orbit.period, 9)
+    (True, 0.0004)
     """
     above = Guard(_ramp_end, direction=+1, when=_above_start)
     below = Guard(_ramp_end, direction=+1, when=_below_start)

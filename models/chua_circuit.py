@@ -41,6 +41,14 @@ def chua_circuit() -> HybridSystem:
     T. Matsumoto, L. O. Chua, M. Komuro, "The double scroll", IEEE Transactions on Circuits and Systems
     32(8), 797-818, 1985. doi:10.1109/TCS.1985.1085791; J. C. Sprott, Chaos and Time-Series Analysis, Oxford
     University Press 2003, appendix A.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.chua_circuit(), (0.7, 0.0, 0.0), (0.0, 50.0))
+    >>> sorted(set(arc.mode.tolist()))
+    ['inner', 'left', 'right']
     """
     return HybridSystem(
         name="Chua's circuit",

@@ -40,6 +40,18 @@ def dry_friction_oscillator() -> HybridSystem:
     53, 107-115, 1931.
     S. W. Shaw, "On the dynamic response of a system with dry friction", Journal of Sound and Vibration
     108(2), 305-325, 1986. doi:10.1016/S0022-460X(86)80058-X
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import simulate
+    >>> from models.dry_friction_oscillator import den_hartog_amplitude
+    >>> system = models.dry_friction_oscillator()
+    >>> arc = simulate(system, (1.0, 0.0), (0.0, 200 * system.forcing_period()), mode="above")
+    >>> late = arc.t > 190 * system.forcing_period()
+    >>> bool(np.isclose(arc["x"][late].max(), den_hartog_amplitude(f=0.5, A=1.0, w=0.8), rtol=1e-6))
+    True
     """
     return filippov(
         name="dry-friction oscillator",

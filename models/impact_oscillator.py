@@ -34,6 +34,18 @@ def impact_oscillator() -> HybridSystem:
     ----------
     S. W. Shaw, P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and
     Vibration 90(1), 129-155, 1983. doi:10.1016/0022-460X(83)90407-8
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import periodic_orbit
+    >>> from models.one_impact import one_impact_orbits
+    >>> system = models.impact_oscillator()
+    >>> orbit = periodic_orbit(system, (0.9, 1.0))
+    >>> (exact, *_) = one_impact_orbits(**system.parameters)
+    >>> bool(np.allclose(np.abs(orbit.multipliers), np.abs(exact.multipliers)))
+    True
     """
     return HybridSystem(
         name="impact oscillator",

@@ -42,6 +42,14 @@ def impact_pair() -> HybridSystem:
     ----------
     C. N. Bapat, N. Popplewell, K. McLachlan, "Stable periodic motions of an impact-pair", Journal of Sound
     and Vibration 87(1), 19-40, 1983.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.impact_pair(), (0.0, 1.0), (0.0, 50.0))
+    >>> sorted({jump.transition for jump in arc.jumps})
+    ['left', 'right']
     """
     rebound = Reset(_rebound)
     return HybridSystem(

@@ -40,6 +40,15 @@ def rimless_wheel() -> HybridSystem:
     ----------
     T. McGeer, "Passive dynamic walking", International Journal of Robotics Research 9(2), 62-82, 1990.
     doi:10.1177/027836499000900206
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import periodic_orbit
+    >>> gait = periodic_orbit(models.rimless_wheel(), (0.0, 0.6), period=1.0)
+    >>> np.abs(gait.multipliers).round(6)
+    array([1. , 0.5])
     """
     onto_a_foot = {"both feet on the ground": _both_feet, "angular momentum about the new foot": _momentum}
     return HybridSystem(

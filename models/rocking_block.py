@@ -45,6 +45,16 @@ def rocking_block() -> HybridSystem:
     Seismological Society of America 53(2), 403-417, 1963. P. D. Spanos, A.-S. Koh, "Rocking of rigid blocks
     due to harmonic shaking", Journal of Engineering Mechanics 110(11), 1627-1642, 1984.
     doi:10.1061/(ASCE)0733-9399(1984)110:11(1627)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.rocking_block(), (0.1, 0.0), (0.0, 3.0))
+    >>> first = arc.jumps[0]
+    >>> bool(np.isclose(first.x_plus[1], 0.9 * first.x_minus[1]))
+    True
     """
     loss = Reset(_impact)
     return HybridSystem(

@@ -47,6 +47,16 @@ def simplest_walker() -> HybridSystem:
     M. Garcia, A. Chatterjee, A. Ruina, M. Coleman, "The simplest walking model: stability, complexity, and
     scaling", Journal of Biomechanical Engineering 120(2), 281-288, 1998, equations 1 to 4.
     doi:10.1115/1.2798313
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import periodic_orbit
+    >>> start = (0.2003, 0.4006, -0.1998, -0.0158)
+    >>> gait = periodic_orbit(models.simplest_walker(), start, mode="behind", period=3.9)
+    >>> np.abs(gait.multipliers[:3]).round(4)
+    array([1.    , 0.5891, 0.5891])
     """
     return HybridSystem(
         name="simplest walker",

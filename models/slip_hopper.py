@@ -42,6 +42,14 @@ def slip_hopper() -> HybridSystem:
     doi:10.1016/0021-9290(89)90224-8
     A. Seyfarth, H. Geyer, M. Günther, R. Blickhan, "A movement criterion for running", Journal of
     Biomechanics 35(5), 649-655, 2002. doi:10.1016/S0021-9290(01)00245-7
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.slip_hopper(), (0.0, 0.95, 5.1, 0.0), (0.0, 1.0), mode="descent")
+    >>> [jump.transition for jump in arc.jumps][:3]
+    ['touchdown', 'takeoff', 'apex']
     """
     return HybridSystem(
         name="SLIP hopper",

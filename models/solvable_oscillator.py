@@ -40,6 +40,14 @@ def solvable_oscillator() -> HybridSystem:
     ----------
     N. J. Corron, J. N. Blakely, M. T. Stahl, "A matched filter for chaos", Chaos 20, 023123, 2010.
     doi:10.1063/1.3432557
+
+    Examples
+    --------
+    >>> import models
+    >>> from lyapunov import lyapunov_spectrum
+    >>> found = lyapunov_spectrum(models.solvable_oscillator(), (0.3, 0.0), mode="plus", interval=1.0)
+    >>> bool(abs(found.exponents[0] - 0.5) < 1e-6)
+    True
     """
     return HybridSystem(
         name="solvable chaotic oscillator",

@@ -34,6 +34,13 @@ def stick_slip() -> HybridSystem:
     ----------
     R. I. Leine, D. H. van Campen, A. de Kraker, L. van den Steen, "Stick-slip vibrations induced by alternate
     friction models", Nonlinear Dynamics 16(1), 41-54, 1998. doi:10.1023/A:1008289604683
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import periodic_orbit
+    >>> round(periodic_orbit(models.stick_slip(), (0.5, 0.2), period=12.0).period, 5)
+    12.00103
     """
     return filippov(
         name="stick-slip",
@@ -81,6 +88,14 @@ def coulomb_stick_slip() -> HybridSystem:
     References
     ----------
     As for :func:`stick_slip`.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.coulomb_stick_slip(), (0.5, 0.2), (0.0, 10.0), mode="stick")
+    >>> arc.jumps[0].transition, round(float(arc.jumps[0].x_minus[0]), 9)
+    ('release', 1.0)
     """
     return HybridSystem(
         name="stick-slip with Coulomb's friction",

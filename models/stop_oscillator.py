@@ -48,6 +48,17 @@ def stop_oscillator() -> HybridSystem:
     ----------
     S. W. Shaw, P. J. Holmes, "A periodically forced piecewise linear oscillator", Journal of Sound and
     Vibration 90(1), 129-155, 1983. doi:10.1016/0022-460X(83)90407-8
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import simulate
+    >>> preloaded = {"F0": 2.0}
+    >>> arc = simulate(models.stop_oscillator(), (0.1, 1.0), (0.0, 20.0), parameters=preloaded)
+    >>> touch = arc.jumps[0]
+    >>> bool(np.isclose(touch.saltation[1, 0], -2.0 / abs(touch.x_minus[1])))
+    True
     """
     return HybridSystem(
         name="stop oscillator",

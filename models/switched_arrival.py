@@ -44,6 +44,15 @@ def switched_arrival() -> HybridSystem:
     C. Chase, J. Serrano, P. J. Ramadge, "Periodicity and chaos from switched flow systems: contrasting
     examples of discretely controlled continuous systems", IEEE Transactions on Automatic Control 38(1),
     70-83, 1993. doi:10.1109/9.186313
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import simulate
+    >>> arc = simulate(models.switched_arrival(), (0.0, 0.314, 0.686), (0.0, 40.0), mode="fill1")
+    >>> bool(np.allclose(arc.x.sum(axis=1), 1.0))
+    True
     """
     return HybridSystem(
         name="switched arrival system",

@@ -40,6 +40,16 @@ def three_disk_billiard() -> HybridSystem:
     ----------
     P. Gaspard, S. A. Rice, "Scattering from a classically chaotic repellor", Journal of Chemical Physics 90,
     2225-2241, 1989. doi:10.1063/1.456017
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import models
+    >>> from hybrid import simulate
+    >>> closed = {"R": 1.9}
+    >>> arc = simulate(models.three_disk_billiard(), (0.0, 0.0, 1.0, 0.3), (0.0, 10.0), parameters=closed)
+    >>> bool(np.allclose(np.hypot(arc["vx"], arc["vy"]), np.hypot(1.0, 0.3)))
+    True
     """
     return HybridSystem(
         name="three-disk billiard",

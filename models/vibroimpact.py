@@ -61,6 +61,15 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
     ----------
     V. A. Bazhenov, O. S. Pogorelova, T. G. Postnikova, "Lyapunov exponents estimation for strongly nonlinear
     nonsmooth discontinuous vibroimpact system", 2017.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid import periodic_orbit
+    >>> from lyapunov import floquet_exponents
+    >>> start = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
+    >>> floquet_exponents(periodic_orbit(models.vibroimpact(), start)).round(5)
+    array([-0.05489, -0.05489, -0.39488, -0.39488])
     """
     contact = Hertz(hertz_stiffness()) if contact is None else contact
     if isinstance(contact, type) or not isinstance(contact, ContactLaw) or not callable(contact.modes):

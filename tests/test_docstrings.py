@@ -1,9 +1,11 @@
-"""The examples in the docstrings run."""
+"""Every public name has an example in its docstring, and the examples run."""
 
 import doctest
 import importlib
+import inspect
 import pkgutil
 
+import matplotlib.pyplot as plt
 import pytest
 
 MODULES = [
@@ -12,6 +14,8 @@ MODULES = [
     for module in pkgutil.walk_packages(importlib.import_module(package).__path__, package + ".")
     if not module.name.endswith("__main__")
 ]
+# The packages whose names have a page on the site.
+PACKAGES = ("hybrid", "lyapunov", "models", "hybrid.testing", "hybrid.plot", "lyapunov.plot")
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -21,4 +25,27 @@ def test_examples(name):
         # Each run looks at all source files, also where a docstring has no example.
         if test.examples:
             runner.run(test)
+            plt.close("all")
+    assert runner.failures == 0
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_has_an_example_that_runs_where_it_is_pasted(package):
+    """With nothing but what the example itself imports."""
+    module = importlib.import_module(package)
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    finder = doctest.DocTestFinder(recurse=False)
+    without = []
+    for name in module.__all__:
+        thing = getattr(module, name)
+        if not (inspect.isclass(thing) or inspect.isroutine(thing)):
+            continue
+        _, heading, example = (inspect.getdoc(thing) or "").partition("\nExamples\n--------\n")
+        if not heading or ">>> " not in example:
+            without.append(name)
+        for test in finder.find(thing, f"{package}.{name}", module=False, globs={"__name__": "example"}):
+            if test.examples:
+                runner.run(test)
+                plt.close("all")
+    assert not without, f"Write an Examples section for: {', '.join(without)}."
     assert runner.failures == 0

@@ -9,8 +9,8 @@ import models
 
 ROOT = Path(__file__).parents[1]
 NAMES = [name for name in vars(models) if callable(getattr(models, name))]
-# A model with what is known of it.
-MAX_LINES = 170
+# A model with what is known of it, and an example.
+MAX_LINES = 185
 
 every_model = pytest.mark.parametrize("name", NAMES)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
+import xarray
 
 mpl.use("Agg")
 
@@ -61,7 +62,7 @@ def numbers_of(value):
     """All numbers of a value: of an array its shape too, of other objects those that they print."""
     if isinstance(value, (list, tuple)):
         return [len(value), *(number for item in value for number in numbers_of(item))]
-    array = np.asarray(value)
+    array = np.asarray(None if isinstance(value, xarray.Dataset) else value)
     if array.dtype.kind in "iufc":
         return [*array.shape, *array.real.ravel().tolist(), *array.imag.ravel().tolist()]
     return [float(number) for number in NUMBER.findall(repr(value))]

@@ -50,6 +50,10 @@ def test_a_spectrum_without_intervals_says_why_and_what_to_do():
         (lambda: hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.2)).jumps, ["<td>bounce</td>", "<th>kind</th>"]),
         (lambda: hybrid.simulate(BALL, (1.0, 0.0), (0.0, 4.06)).jumps, ["more</p>"]),
         (
+            lambda: hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0)),
+            ["<th>modulus</th>", "<td>-0.584295 +0.0056", "at t = 0: x = "],
+        ),
+        (
             lambda: lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), intervals=5),
             ["<td>sum rule</td>", "5 intervals of 6.28319. SUCCESS"],
         ),

@@ -1,6 +1,7 @@
 """What the site is made of: a page per public name and per model, and links that lead somewhere."""
 
 import importlib
+import json
 import re
 from pathlib import Path
 
@@ -57,6 +58,19 @@ def test_every_page_is_listed_once(site):
             listed += [(page.parent / entry).relative_to(site).as_posix() for entry in entries]
     pages = {page.relative_to(site).with_suffix("").as_posix() for page in site.rglob("*.md")}
     assert sorted(listed) == sorted(pages - {"index"})
+
+
+def test_tutorials_are_notebooks_on_the_site(maker, site):
+    for name in maker.EXECUTED:
+        page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+        text = (site / name).read_text(encoding="utf-8")
+        assert text.startswith("---\nfile_format: mystnb\n")
+        assert text.count("```{code-cell} python\n") == page.count("```python\n") > 0
+        assert "```python" not in text
+        cells = json.loads((site / "notebooks" / name).with_suffix(".ipynb").read_text(encoding="utf-8"))[
+            "cells"
+        ]
+        assert [cell["cell_type"] for cell in cells].count("code") == page.count("```python\n")
 
 
 def test_a_value_without_a_comment_is_refused(maker):

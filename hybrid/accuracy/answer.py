@@ -38,6 +38,17 @@ class Answer:
         Steps of the method.
     seconds
         Time of the run, if the method measures it itself, for instance because it is another process.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> ball, height = models.bouncing_ball(), 1.0
+    >>> exact = hybrid.Answer((height - 9.81 * 0.3**2 / 2, -9.81 * 0.3), times=())
+    >>> found = hybrid.work_precision(
+    ...     ball, (height, 0.0), (0.0, 0.3), tolerances=[1e-8], reference=exact, repeats=1
+    ... )
+    >>> bool(found.error["state"].max() < 1e-7)
+    True
     """
 
     state: np.ndarray = attrs.field()

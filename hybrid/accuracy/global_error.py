@@ -48,6 +48,13 @@ class GlobalError:
         That of the arc, which says if a pulse may have been stepped over: the bounds do not cover that. Or
         ``NOT_CONVERGED`` if tighter runs jump differently: then the tolerances do not decide which events
         occur.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> found = hybrid.global_error(models.impact_oscillator(), (0.0, 0.0), (0.0, 20.0))
+    >>> found.status.ok, bool(found.x.max() < 1e-6), len(found.jumps) == len(found.arc.jumps)
+    (True, True, True)
     """
 
     arc: HybridArc
@@ -117,6 +124,7 @@ def global_error(
     Examples
     --------
     >>> import models
+    >>> from hybrid import global_error
     >>> found = global_error(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
     >>> exact = (2 * 1.0 / 9.81) ** 0.5
     >>> bool(abs(found.arc.jumps[0].t - exact) <= found.jumps[0] < 1e-13)

@@ -59,6 +59,17 @@ class WorkPrecision:
         ``"SUCCESS"``, the name of another status code, or the first line of an exception, ``(rows,)``.
     reference_error
         Error of the reference itself, by quantity. Errors below it are not resolved.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> found = hybrid.work_precision(
+    ...     models.impact_oscillator(), (0.0, 0.0), (0.0, 10.0), tolerances=[1e-5, 1e-8], repeats=1
+    ... )
+    >>> found.methods, found.error["state"].shape
+    (('Taylor', 'DOP853', 'Tsit5'), (6,))
+    >>> bool(found.seconds_at("DOP853", 1e-3) > 0)
+    True
     """
 
     method: np.ndarray
@@ -234,6 +245,7 @@ def work_precision(
     Examples
     --------
     >>> import models
+    >>> from hybrid import work_precision
     >>> found = work_precision(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), tolerances=[1e-6], repeats=1)
     >>> found.methods
     ('Taylor', 'DOP853', 'Tsit5')

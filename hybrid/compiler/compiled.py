@@ -60,6 +60,14 @@ class CompiledSystem:
         What runs by one solver have in common, kept here by those who make runs.
     periodic_at
         Parameter vectors at which the declared period was found to be one, where that is not proved.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> print(hybrid.compile_system(models.bouncing_ball()))
+    CompiledSystem of bouncing ball: 2 states
+      mode flight: exact (polynomials of degree 2)
+      transition bounce: affine guard, its crossings are isolated on each step
     """
 
     system: HybridSystem
@@ -370,6 +378,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     Examples
     --------
     >>> import models
+    >>> from hybrid import compile_system
     >>> print(compile_system(models.bouncing_ball()))
     CompiledSystem of ...: 2 states
       mode flight: exact (polynomials of degree 2)...

@@ -1,11 +1,13 @@
-"""A periodic orbit as a dataset, and in one line."""
+"""A periodic orbit as a dataset, in one line, and as a table for a notebook."""
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybrid.display.tables import html_table, with_unit
 from hybrid.simulation.labelled import Names, attributes
 
 if TYPE_CHECKING:
@@ -45,3 +47,18 @@ def described_orbit(orbit: Any) -> str:
         f"<PeriodicOrbit period {orbit.period:.9g} from {orbit.mode!r}{through}, largest multiplier "
         f"{largest.real:.6g}{pair}, residual {orbit.residual:.1e}, {orbit.status.brief}>"
     )
+
+
+def tabled_orbit(orbit: Any) -> str:
+    """A :class:`hybrid.PeriodicOrbit` as HTML: its line, its point by name, and one row per multiplier."""
+    units = orbit.system.units
+    point = ", ".join(
+        f"{with_unit(name, units.get(name))} = {value:.9g}"
+        for name, value in zip(orbit.system.state_names, orbit.x0, strict=True)
+    )
+    rows = [
+        [f"{value.real:.6g}" + (f" {value.imag:+.6g}i" if value.imag else ""), f"{abs(value):.6g}"]
+        for value in np.asarray(orbit.multipliers, dtype=complex)
+    ]
+    said = f"<p>{escape(repr(orbit))}</p>\n<p>{escape(f'at t = {orbit.t0:.6g}: {point}')}</p>"
+    return f"{said}\n{html_table(('multiplier', 'modulus'), rows)}"

@@ -13,7 +13,7 @@ from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.orbits.closing import ROUNDING_OF_TIME
 from hybrid.orbits.continuation.place import place_on
-from hybrid.orbits.labelled import described_orbit, labelled_orbit
+from hybrid.orbits.labelled import described_orbit, labelled_orbit, tabled_orbit
 from hybrid.orbits.sensitivity import OrbitSensitivity, sensitivity_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.plan import check_solver
@@ -62,6 +62,16 @@ class PeriodicOrbit:
         Names of the transitions in the order they fire.
     status
         Whether Newton's method converged, and how far it got if not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> round(orbit.period, 6), np.abs(orbit.multipliers).round(4)
+    (6.283185, array([0.5843, 0.5843]))
+    >>> bool(orbit.residual < 1e-10), orbit.signature
+    (True, ('flight', 'flight'))
     """
 
     system: HybridSystem
@@ -81,6 +91,10 @@ class PeriodicOrbit:
 
     def __repr__(self) -> str:
         return described_orbit(self)
+
+    def _repr_html_(self) -> str:
+        """The orbit for a notebook."""
+        return tabled_orbit(self)
 
     def to_xarray(self) -> xarray.Dataset:
         """The numbers of the orbit. Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot."""

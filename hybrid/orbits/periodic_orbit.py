@@ -121,6 +121,7 @@ def periodic_orbit(
     Examples
     --------
     >>> import models
+    >>> from hybrid import periodic_orbit
     >>> orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
     >>> orbit.status.ok
     True

@@ -55,6 +55,13 @@ class Section:
         How the run ended.
     units
         Units by name, where the system has them.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> section = hybrid.stroboscopic_section(models.impact_oscillator(), (0.0, 0.0), periods=50)
+    >>> section.x.shape, section.jumps.shape
+    ((50, 2), (50,))
     """
 
     state_names: tuple[str, ...]
@@ -123,6 +130,7 @@ def stroboscopic_section(
     Examples
     --------
     >>> import models
+    >>> from hybrid import stroboscopic_section
     >>> section = stroboscopic_section(models.impact_oscillator(), (0.0, 0.0), periods=10)
     >>> section.x.shape
     (10, 2)
@@ -243,6 +251,7 @@ def poincare_section(
     Examples
     --------
     >>> import models
+    >>> from hybrid import Guard, poincare_section
     >>> apex = Guard(lambda t, x, p: x.v, direction=-1)
     >>> section = poincare_section(models.bouncing_ball(), (1.0, 0.0), apex, points=3)
     >>> [round(float(q), 4) for q in section.x[:, 0]]

@@ -55,7 +55,22 @@ DATASETS: dict[str, Callable[..., Any]] = {}
 
 @singledispatch
 def drawn(result: Any, **options: Any) -> Any:
-    """The plot of a result; register the function that draws a class of results, as below."""
+    """The plot of a result; register the function that draws a class of results, as below.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> from hybrid.plot import drawn, plot
+    >>> class Reading:
+    ...     values = [1.0, 3.0, 2.0]
+    >>> def plot_reading(reading, **options):
+    ...     ax = plt.figure().gca()
+    ...     ax.plot(reading.values)
+    ...     return ax
+    >>> draw = drawn.register(Reading, plot_reading)
+    >>> len(plot(Reading()).lines)
+    1
+    """
     for name, draw in DATASETS.items():
         if name in getattr(result, "data_vars", ()):
             return draw(result, **options)
@@ -110,6 +125,13 @@ def plot(result: Any, **options: Any) -> Any:
     ------
     ArgumentError
         If there is no plot for this type of object.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
+    >>> [ax.get_ylabel() for ax in hybrid.plot(arc)]
+    ['q (m)', 'v (m/s)']
     """
     return drawn(result, **options)
 

@@ -50,6 +50,15 @@ def plot_arc(
     ------
     ArgumentError
         If a component does not exist, or the number of axes differs from the number of components.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_arc
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
+    >>> (ax,) = plot_arc(arc, ["q"])
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('t (s)', 'q (m)')
     """
     names = _as_arc(arc).system.state_names
     chosen = range(len(names)) if components is None else _components(names, components)
@@ -102,6 +111,15 @@ def plot_phase(
     ------
     ArgumentError
         If a component does not exist.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_phase
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
+    >>> ax = plot_phase(arc, "q", "v")
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('q (m)', 'v (m/s)')
     """
     names = _as_arc(arc).system.state_names
     i, j = as_component("x", names, x), as_component("y", names, y)

@@ -51,6 +51,16 @@ def plot_basins(
     ------
     ArgumentError
         If the basins are over other than one or two axes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_basins
+    >>> over = {"x": np.linspace(-1.0, 0.9, 20), "v": np.linspace(-2.0, 2.0, 20)}
+    >>> ax = plot_basins(hybrid.basins(models.impact_oscillator(), over))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('x', 'v')
     """
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
@@ -152,6 +162,15 @@ def plot_fractions(
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_fractions
+    >>> ranges = {"x": (-1.0, 0.9), "v": (-2.0, 2.0)}
+    >>> found = hybrid.basin_fractions(models.impact_oscillator(), ranges, starts=50)
+    >>> plot_fractions(found).get_ylabel()
+    'share of the starts'
     """
     if not {"fraction", "standard_error"} <= set(getattr(fractions, "data_vars", ())):
         raise arguments.refusal("fractions", "be a dataset made with hybrid.basin_fractions", fractions)

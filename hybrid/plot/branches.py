@@ -68,6 +68,15 @@ def plot_branch(
     ------
     ArgumentError
         If a component does not exist, or the chart has no points over the parameter.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_branch
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> ax = plot_branch(hybrid.continue_orbit(orbit, "w", (0.9, 1.1)), "x")
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('w', 'x')
     """
     arguments.instance("branch", branch, Branch, "Make one with hybrid.continue_orbit.")
     system = branch.system
@@ -117,6 +126,16 @@ def plot_curve(
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_curve
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> fold = hybrid.continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[0]
+    >>> ax = plot_curve(hybrid.continue_bifurcation(fold, {"w": (1.7, 1.8), "r": (0.75, 0.85)}))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('w', 'r')
     """
     arguments.instance("curve", curve, BifurcationCurve, "Make one with hybrid.continue_bifurcation.")
     (ax,) = axes_for(ax, 1, (5.4, 4.2), figsize)

@@ -54,6 +54,16 @@ def plot_ends(
     ------
     ArgumentError
         If a component does not exist.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_ends
+    >>> starts = np.column_stack([np.linspace(-1.0, 0.9, 20), np.zeros(20)])
+    >>> ax = plot_ends(hybrid.simulate_many(models.impact_oscillator(), starts, (0.0, 10.0)))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('x', 'v')
     """
     if not {"x0", "x_end", "mode_end", "status"} <= set(getattr(ends, "data_vars", ())):
         raise arguments.refusal("ends", "be a dataset made with hybrid.simulate_many", ends)
@@ -109,6 +119,17 @@ def plot_sweep(
     ------
     ArgumentError
         If the sweep is over other than one or two axes, or no result is one real number per point.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_sweep
+    >>> ball = models.bouncing_ball()
+    >>> def task(point):
+    ...     return {"jumps": len(hybrid.simulate(ball, (1.0, 0.0), (0.0, 2.0), parameters=point).jumps)}
+    >>> (ax,) = plot_sweep(hybrid.sweep(task, {"e": [0.5, 0.6, 0.7]}))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('e', 'jumps')
     """
     if not {"status", "message"} <= set(getattr(swept, "data_vars", ())):
         raise arguments.refusal("swept", "be a dataset made with hybrid.sweep", swept)

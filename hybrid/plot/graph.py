@@ -52,6 +52,14 @@ def plot_graph(
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.plot import plot_graph
+    >>> ax = plot_graph(models.stick_slip())
+    >>> [text.get_text() for text in ax.texts[:3]]
+    ['below', 'above', 'sliding']
     """
     graph = as_system("system", system).graph
     crowd = len(graph)

@@ -55,6 +55,15 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
     Returns
     -------
     matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_jumps
+    >>> arc = hybrid.simulate(models.vibroimpact(), (0.0, 0.02, 0.0, 0.0), (0.0, 10.0))
+    >>> ax = plot_jumps(arc.jumps)
+    >>> [label.get_text() for label in ax.get_yticklabels()]
+    ['impact', 'release']
     """
     arguments.instance("jumps", jumps, Jumps, "Take those of an arc: arc.jumps.")
     fired = [name for name in jumps.system.transition_names if np.any(jumps.transition == name)]
@@ -97,6 +106,14 @@ def plot_global_error(
     -------
     numpy.ndarray
         The axes; ``.figure`` is their figure.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_global_error
+    >>> found = hybrid.global_error(models.impact_oscillator(), (0.0, 0.0), (0.0, 20.0))
+    >>> len(plot_global_error(found))
+    2
     """
     if not isinstance(getattr(result, "arc", None), HybridArc):
         raise arguments.refusal("result", "be a GlobalError, from hybrid.global_error", result)

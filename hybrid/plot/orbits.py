@@ -50,6 +50,15 @@ def plot_section(
     ------
     ArgumentError
         If a component does not exist.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_section
+    >>> section = hybrid.stroboscopic_section(models.impact_oscillator(), (0.0, 0.0), periods=50)
+    >>> ax = plot_section(section)
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('x', 'v')
     """
     arguments.instance("section", section, Section, "Make one with hybrid.stroboscopic_section.")
     names = section.state_names
@@ -101,6 +110,15 @@ def plot_orbit(
     ------
     ArgumentError
         If a component does not exist.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_orbit
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> ax = plot_orbit(orbit, "x", "v")
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('x', 'v')
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
     names = orbit.system.state_names

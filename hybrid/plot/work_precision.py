@@ -75,6 +75,17 @@ def plot_work_precision(
     ------
     ArgumentError
         If the quantity was not measured.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.plot import plot_work_precision
+    >>> found = hybrid.work_precision(
+    ...     models.impact_oscillator(), (0.0, 0.0), (0.0, 10.0), tolerances=[1e-5, 1e-8], repeats=1
+    ... )
+    >>> ax = plot_work_precision(found)
+    >>> ax.get_xscale(), ax.get_yscale()
+    ('log', 'log')
     """
     if not hasattr(result, "error_of"):
         raise arguments.refusal("result", "be a WorkPrecision, from hybrid.work_precision", result)

@@ -107,6 +107,17 @@ class HybridArc:
         every mode is exact, a crossing can only be missed if rounding hides it.
     steps, rejected
         Number of attempted steps, and how many of them the error control rejected.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), tangent=True)
+    >>> len(arc.jumps), arc.status.ok
+    (1, True)
+    >>> arc(0.3).round(4), arc["q"].shape == arc.t.shape
+    (array([ 0.5586, -2.943 ]), True)
+    >>> arc.fundamental.shape
+    (2, 2)
     """
 
     system: HybridSystem

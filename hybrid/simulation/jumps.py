@@ -46,6 +46,17 @@ class Jump:
     kind
         ``"transverse"``, ``"grazing"`` for a crossing so shallow that the tolerances cannot tell it from a
         touch, ``"limit"`` for the end of a chatter.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0))
+    >>> jump = arc.jumps[0]
+    >>> jump.transition, round(jump.t, 4), jump.kind
+    ('bounce', 0.4515, 'transverse')
+    >>> jump.saltation.round(3)
+    array([[-0.8  ,  0.   ],
+           [ 3.987, -0.8  ]])
     """
 
     t: float
@@ -84,6 +95,20 @@ class Grazing:
         State ``(n,)``.
     value, acceleration
         The guard and its second derivative along the flow there; its speed is zero.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> ceiling = hybrid.Guard(lambda t, x, p: x.q, direction=+1)
+    >>> toss = hybrid.HybridSystem(
+    ...     state=("q", "v"),
+    ...     modes=[hybrid.Mode("flight", lambda t, x, p: (x.v, -1.0))],
+    ...     transitions=[hybrid.Transition("flight", None, ceiling, name="ceiling")],
+    ... )
+    >>> arc = hybrid.simulate(toss, (-0.5, 1.0), (0.0, 2.0))
+    >>> touch = arc.grazings[0]
+    >>> touch.transition, round(touch.t, 6), round(touch.acceleration, 6), len(arc.jumps)
+    ('ceiling', 1.0, -1.0, 0)
     """
 
     t: float

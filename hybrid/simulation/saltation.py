@@ -65,6 +65,7 @@ def saltation_matrix(
     Examples
     --------
     >>> import models
+    >>> from hybrid import saltation_matrix
     >>> matrix = saltation_matrix(models.bouncing_ball(), "bounce", 0.0, (0.0, -2.0), parameters={"e": 0.5})
     >>> matrix.diagonal().tolist()
     [-0.5, -0.5]

@@ -93,6 +93,7 @@ def simulate(
     Examples
     --------
     >>> import models
+    >>> from hybrid import simulate
     >>> arc = simulate(models.bouncing_ball(), x0=(1.0, 0.0), t_span=(0.0, 1.0))
     >>> round(arc.jumps[0].t, 4)
     0.4515

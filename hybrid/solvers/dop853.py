@@ -233,6 +233,14 @@ class DOP853(Solver):
     ----------
     E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer 1993,
     sections II.5, II.6 and II.10, doi:10.1007/978-3-540-78862-1.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> solver = hybrid.DOP853(rtol=1e-8, atol=1e-10)
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), solver=solver)
+    >>> round(arc.jumps[0].t, 6)
+    0.451524
     """
 
     tableau: ClassVar[Tableau] = Tableau(

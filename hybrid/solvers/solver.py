@@ -46,6 +46,13 @@ class Solver:
     ------
     ArgumentError
         If a value is not positive, ``rtol`` is below 1e-15 or above 1, or ``max_steps`` is not an integer.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> solver = hybrid.DOP853(rtol=1e-9, max_step=0.1)
+    >>> isinstance(solver, hybrid.Solver), solver.rtol, solver.max_step
+    (True, 1e-09, 0.1)
     """
 
     # Coefficients, error estimate and interpolant.

@@ -39,6 +39,14 @@ class Taylor(Solver):
     ----------
     A. Jorba, M. Zou, "A software package for the numerical integration of ODEs by means of high-order Taylor
     methods", Experimental Mathematics 14(1), 99-117, 2005, doi:10.1080/10586458.2005.10128904.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> solver = hybrid.Taylor(rtol=1e-12, atol=1e-14)
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), solver=solver)
+    >>> arc.propagators, round(arc.jumps[0].t, 6)
+    ({'flight': 'exact'}, 0.451524)
     """
 
     tableau: ClassVar[Tableau] = DOP853.tableau

@@ -63,6 +63,14 @@ class Tsit5(Solver):
     ----------
     Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption,
     Computers and Mathematics with Applications 62 (2011) 770-775, doi:10.1016/j.camwa.2011.06.002.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> solver = hybrid.Tsit5(rtol=1e-5, atol=1e-7)
+    >>> arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), solver=solver)
+    >>> round(arc.jumps[0].t, 4)
+    0.4515
     """
 
     tableau: ClassVar[Tableau] = Tableau(

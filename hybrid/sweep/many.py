@@ -88,6 +88,7 @@ def simulate_many(
     Examples
     --------
     >>> import models
+    >>> from hybrid import simulate_many
     >>> drops = simulate_many(models.bouncing_ball(), {"q": [1.0, 2.0, 3.0], "v": 0.0}, (0.0, 1.0))
     >>> drops.jumps.values.tolist()
     [1, 1, 1]

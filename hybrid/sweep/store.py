@@ -218,6 +218,7 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
     Examples
     --------
     >>> import tempfile, hybrid
+    >>> from hybrid import open_store
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     squares = hybrid.sweep(lambda point: {"square": point["a"] ** 2}, {"a": [1.0, 2.0, 3.0]})
     ...     squares.to_netcdf(f"{folder}/squares.nc")

@@ -65,6 +65,14 @@ class Guard(Portable):
     ModelError
         If a given function is not callable, ``direction`` is not -1, 0 or +1, or ``at_start`` is not a bool
         or is True while ``direction`` is 0.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> ground = hybrid.Guard(lambda t, x, p: x.q, direction=-1)
+    >>> ground.direction
+    -1
+    >>> hard = hybrid.Guard(lambda t, x, p: x.q, direction=-1, when=lambda t, x, p: x.v < -1.0)
     """
 
     function: Function = attrs.field(validator=_callable)
@@ -109,6 +117,12 @@ class Reset(Portable):
     ------
     ModelError
         If a given function is not callable.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> bounce = hybrid.Reset(lambda t, x, p: {"v": -p.e * x.v})
+    >>> both = hybrid.Reset(lambda t, x, p: (0.0, -p.e * x.v))
     """
 
     function: Function = attrs.field(validator=_callable)
@@ -135,6 +149,13 @@ class Mode(Portable):
     ------
     ModelError
         If the name is empty or a given function is not callable.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> flight = hybrid.Mode("flight", lambda t, x, p: (x.v, -p.g))
+    >>> flight.name
+    'flight'
     """
 
     name: str = attrs.field(validator=_nonempty_name)
@@ -190,6 +211,16 @@ class Transition(Portable):
     ModelError
         If guard or reset are of the wrong type, a name is empty, there is a reset but no target, or
         ``accumulates_to`` is the mode that the transition leads from and back to.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> ground = hybrid.Guard(lambda t, x, p: x.q, direction=-1)
+    >>> rebound = hybrid.Reset(lambda t, x, p: {"v": -p.e * x.v})
+    >>> bounce = hybrid.Transition("flight", "flight", ground, rebound, name="bounce")
+    >>> landing = hybrid.Transition("flight", "rest", ground)
+    >>> bounce.name, landing.name, landing.is_marker
+    ('bounce', 'flight->rest', False)
     """
 
     source: str = attrs.field(validator=_nonempty_name)

@@ -113,6 +113,26 @@ class HybridSystem(Portable):
     ModelError
         If names clash or do not exist, a mode cannot be reached, a function has the wrong arity or the
         wrong number of values, is not pure, or does not have the declared period.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> ball = hybrid.HybridSystem(
+    ...     state=("q", "v"),
+    ...     parameters={"g": 9.81, "e": 0.8},
+    ...     modes=[hybrid.Mode("flight", lambda t, x, p: (x.v, -p.g))],
+    ...     transitions=[
+    ...         hybrid.Transition(
+    ...             "flight",
+    ...             "flight",
+    ...             hybrid.Guard(lambda t, x, p: x.q, direction=-1),
+    ...             hybrid.Reset(lambda t, x, p: {"v": -p.e * x.v}),
+    ...             name="bounce",
+    ...         )
+    ...     ],
+    ... )
+    >>> len(hybrid.simulate(ball, (1.0, 0.0), (0.0, 3.0)).jumps)
+    6
     """
 
     state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=as_state)

@@ -159,6 +159,16 @@ class Laws(Portable):
     ------
     ArgumentError
         If a law is not a function, or no pair of them where a pair is needed.
+
+    Examples
+    --------
+    >>> import attrs, hybrid, models
+    >>> from hybrid.testing import check_system
+    >>> energy = lambda t, x, p: x.v**2 / 2 + p.g * x.q
+    >>> laws = hybrid.Laws(invariant={"height": lambda t, x, p: x.q}, dissipated={"energy": energy})
+    >>> ball = attrs.evolve(models.bouncing_ball(), laws=laws)
+    >>> check_system(ball, examples=5).never_seen
+    ()
     """
 
     invariant: tuple[Law, ...] = attrs.field(default=(), converter=_invariant)

@@ -4,12 +4,13 @@
 own tests with ``@given(cases(system))``.
 """
 
-from hybrid.testing.case import Case, Engine, Run
+from hybrid.testing.case import Case, Run
 from hybrid.testing.check import check_system
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.dimensions import check_dimensions
 from hybrid.testing.ends import check_ends, check_sides_after
+from hybrid.testing.engine import Engine
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.events import check_jumps, check_sides
 from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields

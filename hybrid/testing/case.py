@@ -10,13 +10,9 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.compiler.agreement import compiled_value
-from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
-from hybrid.simulation.saltation import saltation_matrix
-from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, Solver
 from hybrid.status import StatusCode
 from hybrid.system.derivatives import evaluate
@@ -25,6 +21,7 @@ from hybrid.system.functions import ModelFunction, reset_function
 from hybrid.system.graph import HybridSystem, laws_of
 from hybrid.system.laws import Laws
 from hybrid.system.variables import named_values
+from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.reads import is_passed
 from hybrid.testing.sizes import sizes_along
@@ -47,49 +44,6 @@ def as_case(case: object) -> Case:
     return arguments.instance("case", case, Case, "Draw one with hybrid.testing.cases.")
 
 
-class Engine:
-    """Computes runs and derivatives: with the library, unless a subclass tests something else."""
-
-    def simulate(
-        self, system: HybridSystem, x0: Any, t_span: tuple[float, float], **options: Any
-    ) -> HybridArc:
-        """As :func:`hybrid.simulate`."""
-        return simulate(system, x0, t_span, **options)
-
-    def saltation_matrix(
-        self, system: HybridSystem, transition: str, t: float, x: Any, parameters: Mapping[str, float]
-    ) -> np.ndarray:
-        """As :func:`hybrid.saltation_matrix`."""
-        return saltation_matrix(system, transition, t, x, parameters=parameters)
-
-    def derivative(
-        self,
-        system: HybridSystem,
-        function: ModelFunction,
-        index: int,
-        t: float,
-        x: np.ndarray,
-        parameters: np.ndarray,
-    ) -> np.ndarray:
-        """The derivative ``(rows, n + 1)`` of a field, guard or reset, as runs use it."""
-        return compile_system(system).derivative(function, index, t, x, parameters)
-
-    def value(
-        self,
-        compiled: CompiledSystem,
-        function: ModelFunction,
-        index: int,
-        t: float,
-        x: np.ndarray,
-        parameters: np.ndarray,
-    ) -> np.ndarray:
-        """The values ``(rows,)`` of a field, guard, condition or reset, as runs use them."""
-        return compiled_value(compiled, function, index, t, x, parameters)
-
-
-LIBRARY = Engine()
-
-
 @attrs.frozen(eq=False)
 class Run:
     """A run that properties can be judged on.
@@ -106,6 +60,15 @@ class Run:
         Sizes of the components along the run, ``(n,)``, each in its own unit.
     cut
         Why the run ends before that of the case does; empty if it does not.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case
+    >>> ball = models.bouncing_ball()
+    >>> run = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6).run
+    >>> len(run.arc.jumps), run.cut
+    (1, '')
     """
 
     arc: HybridArc
@@ -145,6 +108,15 @@ class Case:
         Computes the runs.
     laws
         What the author knows; by default the laws that the system carries.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> len(case.run.arc.jumps), case.field("flight", 0.0, (1.0, 0.0))
+    (1, array([ 0.  , -9.81]))
     """
 
     system: HybridSystem

@@ -20,12 +20,13 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.laws import Elastic, Laws
-from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine
+from hybrid.testing.case import TIGHT, Case
 from hybrid.testing.coverage import FIRES, Coverage
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
 from hybrid.testing.dimensions import DIMENSIONS, check_dimensions
 from hybrid.testing.ends import ENDS, SIDES_AFTER, check_ends, check_sides_after
+from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.errors import PropertyError
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
 from hybrid.testing.functions import (
@@ -139,6 +140,7 @@ def check_system(
     Examples
     --------
     >>> import models
+    >>> from hybrid.testing import check_system
     >>> report = check_system(models.bouncing_ball(), examples=5)
     >>> report.unchecked
     ('The saltation matrix is the identity ...', 'An elastic ...')

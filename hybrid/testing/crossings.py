@@ -25,6 +25,14 @@ def check_crossings(case: Case) -> None:
     ------
     PropertyError
         If a crossing does not fire or fires twice.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_crossings
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_crossings(case)
     """
     as_case(case)
     run = case.run

@@ -26,6 +26,14 @@ def check_derivatives(case: Case) -> None:
     ------
     PropertyError
         If an entry is wrong.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_derivatives
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_derivatives(case)
     """
     as_case(case)
     compile_system(case.system)

@@ -199,6 +199,12 @@ def check_dimensions(system: HybridSystem) -> None:
     ------
     PropertyError
         If units do not fit.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import check_dimensions
+    >>> check_dimensions(models.bouncing_ball())
     """
     as_system("system", system)
     missing = [name for name in (*system.state_names, "t") if name not in system.units]

@@ -38,6 +38,14 @@ def check_ends(case: Case) -> None:
     ------
     PropertyError
         If the run ends in ``STUCK``, ``NON_FINITE`` or ``STEP_TOO_SMALL``.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_ends
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_ends(case)
     """
     arc = whole_run(case)
     if arc.status.code not in BROKEN:
@@ -61,6 +69,14 @@ def check_sides_after(case: Case) -> None:
     ------
     PropertyError
         If a reset lands beyond a guard.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_sides_after
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_sides_after(case)
     """
     arc = whole_run(case)
     jumps = list(arc.jumps)

@@ -14,6 +14,17 @@ class PropertyError(AssertionError):
     ----------
     time
         The time on the run at which it fails; None if it is not known.
+
+    Examples
+    --------
+    >>> import attrs, models
+    >>> from hybrid.testing import PropertyError, check_reads
+    >>> unread = attrs.evolve(models.bouncing_ball(), parameters={"g": 9.81, "e": 0.8, "mass": 1.0})
+    >>> try:
+    ...     check_reads(unread)
+    ... except PropertyError as error:
+    ...     print(str(error).splitlines()[1].strip())
+    no function reads parameter 'mass'
     """
 
     def __init__(self, text: str, time: float | None = None) -> None:
@@ -22,5 +33,14 @@ class PropertyError(AssertionError):
 
 
 def discard(reason: str) -> NoReturn:
-    """Discard an example that cannot be judged; Hypothesis then draws another one."""
+    """Discard an example that cannot be judged; Hypothesis then draws another one.
+
+    Examples
+    --------
+    >>> from hybrid.testing import Case, discard
+    >>> def rises_at_first(case: Case) -> None:
+    ...     if case.x0[1] <= 0.0:
+    ...         discard("the ball does not start upwards")
+    ...     assert case.run.arc["q"].max() > case.x0[0]
+    """
     raise UnsatisfiedAssumption(reason)

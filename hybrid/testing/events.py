@@ -23,6 +23,14 @@ def check_jumps(case: Case) -> None:
     ------
     PropertyError
         If a jump violates one of these.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_jumps
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_jumps(case)
     """
     as_case(case)
     run = case.run
@@ -87,6 +95,14 @@ def check_sides(case: Case) -> None:
     ------
     PropertyError
         If a mode continues beyond a guard that ends it.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_sides
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_sides(case)
     """
     arc = as_case(case).whole
     walls = [each for each in case.system.transitions if case.is_wall(each)]

@@ -35,6 +35,24 @@ class PiecewiseAffineField:
         The vectors ``a (m, n)`` and the levels ``(m,)``.
     jumps
         The vectors ``c (m, n)``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid
+    >>> from hybrid.testing import PiecewiseAffineField
+    >>> friction = PiecewiseAffineField(
+    ...     matrix=np.array([[0.0, 1.0], [-1.0, 0.0]]),
+    ...     constant=np.zeros(2),
+    ...     forms=("sign",),
+    ...     normals=np.array([[0.0, 1.0]]),
+    ...     levels=np.zeros(1),
+    ...     jumps=np.array([[0.0, -0.5]]),
+    ... )
+    >>> [float(rate) for rate in friction(0.0, (0.0, 2.0), None)]
+    [2.0, -0.5]
+    >>> len(hybrid.from_equations(friction, state=("x", "v")).modes)
+    3
     """
 
     matrix: np.ndarray

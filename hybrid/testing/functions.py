@@ -36,6 +36,14 @@ def check_compiled(case: Case) -> None:
     ------
     PropertyError
         If a value of a field, guard, condition, reset or given derivative differs.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_compiled
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_compiled(case)
     """
     as_case(case)
     compiled = compile_system(case.system)
@@ -58,6 +66,14 @@ def check_period(case: Case) -> None:
     ------
     PropertyError
         If a value differs.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_period
+    >>> system = models.impact_oscillator()
+    >>> case = Case(system, system.parameters, "flight", (0.0, 0.0), 0.0, 20.0)
+    >>> check_period(case)
     """
     as_case(case)
     system, x = case.system, np.array(case.x0)

@@ -37,6 +37,14 @@ def check_cut(case: Case) -> None:
     ------
     PropertyError
         If the run changes, or a saltation matrix at the plane is not the identity.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_cut
+    >>> system = models.impact_oscillator()
+    >>> case = Case(system, system.parameters, "flight", (0.0, 0.0), 0.0, 20.0)
+    >>> check_cut(case)
     """
     as_case(case)
     if any(case.is_passed(each) for each in case.system.transitions):
@@ -92,6 +100,14 @@ def check_names(case: Case) -> None:
     ------
     PropertyError
         If the run changes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_names
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_names(case)
     """
     as_case(case)
     run, system = case.run, renamed(case.system)
@@ -109,6 +125,14 @@ def check_order(case: Case) -> None:
     ------
     PropertyError
         If the run changes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_order
+    >>> circuit = models.chua_circuit()
+    >>> case = Case(circuit, circuit.parameters, "inner", (0.5, 0.0, 0.0), 0.0, 5.0)
+    >>> check_order(case)
     """
     as_case(case)
     if len(case.system.transitions) < 2:
@@ -137,6 +161,14 @@ def check_scale(case: Case) -> None:
     ------
     PropertyError
         If the run changes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_scale
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_scale(case)
     """
     as_case(case)
     variant = altered(case.system)
@@ -158,6 +190,14 @@ def check_split(case: Case) -> None:
     ------
     PropertyError
         If an event is lost or fires twice, or the end changes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_split
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_split(case)
     """
     as_case(case)
     run = case.run
@@ -196,6 +236,14 @@ def check_samples(case: Case) -> None:
     ------
     PropertyError
         If an event or the end changes, or if a sample is wrong.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_samples
+    >>> system = models.impact_oscillator()
+    >>> case = Case(system, system.parameters, "flight", (0.0, 0.0), 0.0, 20.0)
+    >>> check_samples(case)
     """
     as_case(case)
     run = case.run
@@ -231,6 +279,14 @@ def check_elastic(case: Case, flip: Iterable[str] | Callable[[np.ndarray], np.nd
         If the run does not come back.
     ArgumentError
         If a name in ``flip`` is no component of the state.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_elastic
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, {"g": 9.81, "e": 1.0}, "flight", (1.0, 0.0), 0.0, 2.0)
+    >>> check_elastic(case, flip=("v",))
     """
     turn = turned("flip", as_case(case).system, flip)
     if not all(compile_system(case.system).emitted.autonomous):

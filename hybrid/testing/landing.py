@@ -32,6 +32,14 @@ def check_landings(case: Case) -> None:
     ------
     PropertyError
         If a reset gives other values at a neighbouring floating-point number.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_landings
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_landings(case)
     """
     as_case(case)
     jumps, seen, previous = case.run.arc.jumps, False, -np.inf
@@ -68,6 +76,15 @@ def check_limits(case: Case) -> None:
     ------
     PropertyError
         If the mode leaves the guard at once, or a run that starts there has another mode or state at its end.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_limits
+    >>> table = models.bouncing_table()
+    >>> still = {**table.parameters, "A": 0.005}
+    >>> case = Case(table, still, "flight", (0.001, 0.0), 0.0, 1.0)
+    >>> check_limits(case)
     """
     arc = as_case(case).whole
     limits = [] if arc is None else [jump for jump in arc.jumps if jump.kind == "limit" and jump.target]

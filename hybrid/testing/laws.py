@@ -42,6 +42,14 @@ def check_laws(case: Case) -> None:
     ------
     PropertyError
         If a law does not hold.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_laws
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_laws(case)
     """
     for check in law_checks(as_case(case).laws).values():
         check(case)

@@ -69,6 +69,12 @@ def check_reads(system: HybridSystem) -> None:
     ------
     PropertyError
         If a parameter is not read, or a number read from elsewhere has its name.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import check_reads
+    >>> check_reads(models.bouncing_ball())
     """
     numbers = numbers_read(as_system("system", system))
     letters = {name.casefold(): name for name in system.parameters}

@@ -25,6 +25,15 @@ class PropertyReport:
         Number of examples on which the property was checked and held.
     discarded
         Number of examples that could not be judged, by reason.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import check_system
+    >>> report = check_system(models.bouncing_ball(), examples=5)
+    >>> one = report.properties[0]
+    >>> one.name, one.checked
+    ('Given, traced and numerical derivatives agree', True)
     """
 
     name: str
@@ -76,6 +85,14 @@ class SystemReport:
         Numbers that the model functions read from modules and closures, by name.
     discontinuities
         Where the field of a mode is discontinuous, by mode: tangent vectors are not valid beyond.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import check_system
+    >>> report = check_system(models.bouncing_ball(), examples=5)
+    >>> report.never_seen, report.visits["flight"] > 0
+    ((), True)
     """
 
     name: str

@@ -33,6 +33,14 @@ def check_saltation(case: Case) -> None:
     ------
     PropertyError
         If an entry is wrong.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_saltation
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_saltation(case)
     """
     as_case(case)
     jump = case.the_jump()
@@ -78,6 +86,14 @@ def check_extension(case: Case) -> None:
     ------
     PropertyError
         If a saltation matrix changes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_extension
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_extension(case)
     """
     as_case(case)
     jump = case.the_jump()
@@ -126,6 +142,14 @@ def check_continuity(case: Case) -> None:
     ------
     PropertyError
         If a saltation matrix there is not the identity.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_continuity
+    >>> circuit = models.chua_circuit()
+    >>> case = Case(circuit, circuit.parameters, "inner", (0.5, 0.0, 0.0), 0.0, 5.0)
+    >>> check_continuity(case)
     """
     as_case(case)
     looked_at = 0
@@ -157,6 +181,14 @@ def check_flow_direction(case: Case) -> None:
     ------
     PropertyError
         If the two sides differ.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_flow_direction
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_flow_direction(case)
     """
     as_case(case)
     looked_at = 0
@@ -198,6 +230,14 @@ def check_sum_rule(case: Case) -> None:
     ------
     PropertyError
         If the two sides differ.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_sum_rule
+    >>> system = models.impact_oscillator()
+    >>> case = Case(system, system.parameters, "flight", (0.0, 0.0), 0.0, 20.0)
+    >>> check_sum_rule(case)
     """
     as_case(case)
     run = case.run

@@ -30,6 +30,14 @@ def small_systems() -> SearchStrategy[HybridSystem]:
     :math:`F_k` and no :math:`m`.
 
     All coefficients are parameters of the system, and systems of one shape share their compiled code.
+
+    Examples
+    --------
+    >>> from hybrid.testing import cases, check_jumps, small_systems
+    >>> from hypothesis import given, strategies as st
+    >>> @given(st.data())
+    ... def test_jumps_of_many_systems(data):
+    ...     check_jumps(data.draw(cases(data.draw(small_systems()))))
     """
 
     @st.composite

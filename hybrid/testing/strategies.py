@@ -19,7 +19,8 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.graph import HybridSystem, as_system, check_mode, laws_of
 from hybrid.system.labels import named
 from hybrid.system.laws import Laws
-from hybrid.testing.case import LIBRARY, TIGHT, Case, Engine
+from hybrid.testing.case import TIGHT, Case
+from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.starts import start_in
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
@@ -57,6 +58,16 @@ def states(
     ------
     ArgumentError
         If a component does not exist, or a range is invalid.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import states
+    >>> from hypothesis import given
+    >>> @given(states(models.bouncing_ball(), {"q": (0.0, 2.0), "v": 0.0}))
+    ... def test_ranges(x):
+    ...     assert 0.0 <= x[0] <= 2.0 and x[1] == 0.0
+    >>> test_ranges()
     """
     return _states("ranges", system, ranges)
 
@@ -92,6 +103,17 @@ def parameters(
     ------
     ArgumentError
         If a parameter does not exist, or a range is invalid.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import parameters
+    >>> from hypothesis import given
+    >>> ball = models.bouncing_ball()
+    >>> @given(parameters(ball, {"e": (0.5, 0.9), "g": 9.81}))
+    ... def test_ranges(values):
+    ...     assert 0.5 <= values["e"] <= 0.9 and values["g"] == 9.81
+    >>> test_ranges()
     """
     return _parameters("ranges", system, ranges)
 
@@ -154,6 +176,16 @@ def cases(
     ------
     ArgumentError
         If a name does not exist, or a range or the span is invalid.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import cases, check_jumps, run_settings
+    >>> from hypothesis import given
+    >>> @given(cases(models.bouncing_ball(), states={"q": (0.1, 2.0), "v": (-3.0, 3.0)}))
+    ... @run_settings
+    ... def test_jumps(case):
+    ...     check_jumps(case)
     """
     if mode is not None:
         check_mode(as_system("system", system), mode)

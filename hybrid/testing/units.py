@@ -66,6 +66,14 @@ def check_units(case: Case) -> None:
     ------
     PropertyError
         If the run changes.
+
+    Examples
+    --------
+    >>> import models
+    >>> from hybrid.testing import Case, check_units
+    >>> ball = models.bouncing_ball()
+    >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
+    >>> check_units(case)
     """
     as_case(case)
     if compile_system(case.system).emitted.opaque:

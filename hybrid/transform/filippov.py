@@ -91,6 +91,7 @@ def filippov(
     --------
     A block on a belt, with dry friction. The belt carries the block along until the spring pulls it loose.
 
+    >>> from hybrid import filippov, simulate
     >>> block = filippov(
     ...     state=("x", "v"),
     ...     parameters={"belt": 0.2, "friction": 1.0},
@@ -98,7 +99,6 @@ def filippov(
     ...     above=lambda t, x, p: (x.v, -p.friction - x.x),
     ...     switching=lambda t, x, p: x.v - p.belt,
     ... )
-    >>> from hybrid import simulate
     >>> arc = simulate(block, x0=(0.5, 0.2), t_span=(0.0, 3.0))
     >>> str(arc.mode[0]), arc.jumps[0].transition, round(arc.jumps[0].t, 12)
     ('sliding', 'sliding->below', 2.5)

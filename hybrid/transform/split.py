@@ -135,7 +135,7 @@ def split(system: HybridSystem) -> HybridSystem:
     Examples
     --------
     >>> import numpy as np
-    >>> from hybrid import HybridSystem, Mode
+    >>> from hybrid import HybridSystem, Mode, split
     >>> block = Mode("block", lambda t, x, p: (x.v, -x.q - 0.3 * np.sign(x.v)))
     >>> split(HybridSystem(state=("q", "v"), modes=[block])).mode_names
     ('v<0', 'v>0', 'v=0')

@@ -49,6 +49,14 @@ class Bifurcation:
         Of a grazing with a jump of finite size, the vector ``C (n,)`` of the zero-time discontinuity map: an
         orbit that would go beyond the guard by ``H`` is moved by ``C sqrt(H)`` where it would be farthest
         (Nordmark 1991). None for other kinds.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> fold = hybrid.continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[0]
+    >>> fold.kind, fold.parameter, round(fold.value, 6)
+    ('fold', 'w', 1.750143)
     """
 
     kind: str
@@ -88,6 +96,16 @@ class Branch:
         Each :class:`Bifurcation`, in order along the branch.
     status
         Why the branch ends where it does.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> branch = hybrid.continue_orbit(orbit, "w", (0.9, 1.1))
+    >>> bool(branch.stable.all()), branch.bifurcations
+    (True, ())
+    >>> branch.x0.shape == (len(branch.parameter), 2)
+    True
     """
 
     system: HybridSystem

@@ -55,6 +55,15 @@ class CodimensionTwo:
         The two parameters by name.
     orbit, message
         The orbit there, and what happens, in words.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> fold = hybrid.continue_orbit(orbit, "w", (0.68, 1.0)).bifurcations[0]
+    >>> curve = hybrid.continue_bifurcation(fold, {"w": (0.6, 1.0), "r": (0.3, 0.9)})
+    >>> [(each.kind, round(each.values["r"], 4)) for each in curve.points]
+    [('fold at a change', 0.355)]
     """
 
     kind: str
@@ -83,6 +92,17 @@ class BifurcationCurve:
         Each :class:`hybrid.CodimensionTwo` on the curve, in order.
     status
         Why the curve ends where it does.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> grazing = hybrid.continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[-1]
+    >>> curve = hybrid.continue_bifurcation(grazing, {"w": (1.3, 1.5), "A": (0.9, 1.1)})
+    >>> w, A = curve["w"], curve["A"]
+    >>> bool(np.allclose((1 - w**2) ** 2 + (0.1 * w) ** 2, A**2))
+    True
     """
 
     system: HybridSystem
@@ -181,7 +201,7 @@ def continue_bifurcation(
     Examples
     --------
     >>> import models
-    >>> from hybrid import continue_orbit, periodic_orbit
+    >>> from hybrid import continue_bifurcation, continue_orbit, periodic_orbit
     >>> orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
     >>> fold = continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[0]
     >>> fold.kind

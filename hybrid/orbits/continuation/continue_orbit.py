@@ -81,7 +81,7 @@ def continue_orbit(
     Examples
     --------
     >>> import models
-    >>> from hybrid import periodic_orbit
+    >>> from hybrid import continue_orbit, periodic_orbit
     >>> orbit = periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
     >>> branch = continue_orbit(orbit, "w", (0.9, 1.1))
     >>> branch.status.ok

@@ -43,6 +43,16 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
     ------
     ArgumentError
         If it is no branch, or one of another system.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> system = models.impact_oscillator()
+    >>> branch = hybrid.continue_orbit(hybrid.periodic_orbit(system, (0.9, 1.0)), "w", (0.9, 1.1))
+    >>> again = hybrid.open_branch(system, branch.to_xarray())
+    >>> bool(np.all(again.x0 == branch.x0))
+    True
     """
     import xarray
 

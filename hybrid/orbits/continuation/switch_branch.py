@@ -46,6 +46,15 @@ def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> 
     References
     ----------
     R. Seydel, Practical Bifurcation and Stability Analysis, 3rd ed., Springer 2010, section 5.6.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
+    >>> grazing = hybrid.continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[-1]
+    >>> free = hybrid.switch_branch(grazing)
+    >>> free.status.ok, len(free.arc().jumps)
+    (True, 0)
     """
     arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)

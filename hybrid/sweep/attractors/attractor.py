@@ -44,6 +44,15 @@ class Attractor:
         periodic orbit are the logarithms of its multipliers over the period.
     start
         A state that leads to it ``(n,)``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import hybrid, models
+    >>> found = hybrid.attractors(models.impact_oscillator(), {"x": (-1.0, 1.0), "v": (-2.0, 2.0)})
+    >>> one = found[1]
+    >>> one.kind, round(one.period / (2 * np.pi), 6), one.points.shape
+    ('periodic', 1.0, (1, 2))
     """
 
     kind: str
@@ -72,6 +81,13 @@ class Attractors(Mapping[int, Attractor]):
     ----------
     status
         How the search ended.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> found = hybrid.attractors(models.impact_oscillator(), {"x": (-1.0, 1.0), "v": (-2.0, 2.0)})
+    >>> list(found), found[1].kind
+    ([1], 'periodic')
     """
 
     def __init__(self, found: tuple[Attractor, ...], status: Status, names: Names) -> None:

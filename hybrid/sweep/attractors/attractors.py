@@ -103,6 +103,7 @@ def attractors(
     Examples
     --------
     >>> import models
+    >>> from hybrid import attractors
     >>> found = attractors(models.impact_oscillator(), {"x": (-1.0, 1.0), "v": (-2.0, 2.0)})
     >>> found[1].kind, found[1].jumps
     ('periodic', 1.0)

@@ -92,7 +92,9 @@ def basins(
 
     Examples
     --------
+    >>> import numpy as np
     >>> import models
+    >>> from hybrid import basins
     >>> found = basins(models.impact_oscillator(), {"x": np.linspace(-1, 1.5, 6), "v": [-1.0, 1.0]})
     >>> found.label.values.tolist()
     [[1, 1], [1, 1], [1, 1], [1, 1], [1, 1], [-1, -1]]

@@ -96,6 +96,7 @@ def basin_fractions(
     Examples
     --------
     >>> import models
+    >>> from hybrid import basin_fractions
     >>> shares = basin_fractions(models.impact_oscillator(), {"x": (-1.0, 1.0), "v": (-2.0, 2.0)}, starts=50)
     >>> float(shares.fraction.sel(label=1))
     1.0

@@ -7,7 +7,7 @@ import pytest
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.testing import Case, PropertyError, check_landings, check_limits, check_system
-from hybrid.testing.case import Engine
+from hybrid.testing.engine import Engine
 from hybrid.testing.landing import LIMITS
 
 

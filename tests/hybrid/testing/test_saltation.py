@@ -17,7 +17,8 @@ from hybrid.testing import (
     check_sum_rule,
 )
 from hybrid.testing import saltation as module
-from hybrid.testing.case import Case, Engine
+from hybrid.testing.case import Case
+from hybrid.testing.engine import Engine
 from tests.hybrid.testing.test_planted_faults import Saltation, reset_only
 
 G, E, C = 9.81, 0.8, 0.3

@@ -7,7 +7,7 @@ import pytest
 import hybrid
 from hybrid.system.derivatives import evaluate
 from hybrid.testing import Case, units
-from hybrid.testing.case import Engine
+from hybrid.testing.engine import Engine
 
 
 def swing(state):
