@@ -17,6 +17,7 @@ COMMANDS = {
     "pictures": [str(HERE / "make_pictures.py")],
     "basins": [str(HERE / "make_basins.py")],
     "theory": [str(HERE / "make_theory.py")],
+    "explore": [str(HERE / "make_explore.py")],
     "gallery": [str(HERE / "make_gallery.py")],
     "architecture": [str(HERE / "make_architecture.py")],
     "founding_chart": [str(HERE / "make_founding_chart.py")],

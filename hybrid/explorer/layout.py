@@ -68,7 +68,7 @@ def _pictures(widgets: Widgets, figures: Figures) -> Any:
             _card(figures.section.made),
             _card(figures.arc.series),
             _card(figures.exponents.made),
-            _card(diagram.above, widgets.progress, diagram.below),
+            _card(diagram.above, diagram.pointer, widgets.progress, diagram.below),
             _card(figures.multipliers.made),
         ),
         _line(widgets.back, widgets.play, widgets.next),

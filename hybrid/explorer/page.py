@@ -228,16 +228,15 @@ class Page:
         self.board.show(outcome)
         self.widgets.say(self.board.words)
         self.widgets.follow(self.scene)
+        if self.scene.over:
+            self.board.figures.diagram.show_here(self.scene.values[self.scene.over])
         if picture == "live":
             self.jump, self.frame = -1, 0
             if self.board.live is not None:
                 self.widgets.tell_speed(len(self.board.live.points.x), outcome.seconds)
             return
-        # The script and the mark in the diagram take the browser longer to draw than a drag may take.
         self.widgets.show_script(self.script())
         self.widgets.progress.value = round(100 * self.board.progress)
-        if self.scene.over:
-            self.board.figures.diagram.show_here(self.scene.values[self.scene.over])
 
     def say(self, picture: str, text: str) -> None:
         """Say something about a picture, or nothing more."""

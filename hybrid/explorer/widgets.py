@@ -79,8 +79,9 @@ class Widgets:
         units, names = subject.system.units, list(subject.system.state_names)
         self.sliders: dict[str, Any] = {}
         self.fields: dict[str, Any] = {}
-        for name, value in scene.values.items():
-            self._parameter(name, with_unit(name, units.get(name)), value)
+        # The parameter that the diagram is over comes first.
+        for name in sorted(scene.values, key=lambda each: each != scene.over):
+            self._parameter(name, with_unit(name, units.get(name)), scene.values[name])
         self.starts = {
             name: pn.widgets.FloatInput(label=with_unit(name, units.get(name)), value=value, width=130)
             for name, value in scene.x0.items()

@@ -16,6 +16,9 @@ from hybrid.simulation.interrupt import stopped_by
 # Seconds after which a part is told to end with what it has, and after which it gives way to a newer job for
 # the same picture. Before that it is shown, so that a picture moves while a slider does.
 LONGEST_PART, PATIENCE = 60.0, 0.1
+# The jobs behind the first one begin when nothing new has been wanted for so many seconds: a slider that is
+# dragged tells its next value sooner.
+QUIET = 0.05
 
 
 @attrs.frozen(eq=False)
@@ -65,6 +68,7 @@ class Worker:
     def __init__(self, show: Callable[[Outcome], None]) -> None:
         self.show = show
         self.wanted: list[Job] = []
+        self.asked = 0.0
         # By picture: the key of the last job, and how many of its parts are done.
         self.done: dict[str, tuple[Hashable, int]] = {}
         self.current: Job | None = None
@@ -78,7 +82,7 @@ class Worker:
     def want(self, jobs: Sequence[Job]) -> None:
         """Have these jobs done, the first one first; the part that is being computed ends if it must wait."""
         with self.changed:
-            self.wanted = list(jobs)
+            self.wanted, self.asked = list(jobs), perf_counter()
             now, following = self.current, self._next()
             if now is None:
                 self.changed.notify_all()
@@ -121,18 +125,25 @@ class Worker:
                 return job
         return None
 
+    def _awaited(self) -> Job | None:
+        """The next job, as soon as its turn has come; None when the worker is closed."""
+        while not self.closed:
+            job = self._next()
+            quiet = perf_counter() - self.asked
+            if job is not None and (job is self.wanted[0] or quiet >= QUIET):
+                return job
+            self.current = None
+            self.changed.notify_all()
+            self.changed.wait(None if job is None else QUIET - quiet)
+        return None
+
     def _work(self) -> None:
         while True:
             with self.changed:
-                self.current = self._next()
-                while self.current is None and not self.closed:
-                    self.changed.notify_all()
-                    self.changed.wait()
-                    self.current = self._next()
-                if self.closed:
+                job = self._awaited()
+                if job is None:
                     return
-                job = self.current
-                assert job is not None
+                self.current = job
                 self.stop.clear()
                 self.superseded = False
                 key, part = self.done.get(job.picture, (None, 0))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bokeh.models import HoverTool, Span
+from bokeh.models import HoverTool
+from bokeh.plotting import figure
 
 from hybrid.explorer.figures.base import States, blank, empty, look_at, source, zero_line
 from hybrid.orbits.continuation.branch import Branch
@@ -30,8 +31,8 @@ class DiagramFigures:
 
     Attributes
     ----------
-    above, below
-        The figures, with one axis of the parameter.
+    above, pointer, below
+        The figures, with one axis of the parameter: diagram, mark of the present value, exponent.
     """
 
     def __init__(self, system: HybridSystem, states: States) -> None:
@@ -49,7 +50,8 @@ class DiagramFigures:
         )
         self.in_plane = [
             self.above.scatter(
-                "parameter", component, source=self.points, size=2, marker="square", color="#404040"
+                "parameter", component,
+                source=self.points, size=1.5, marker="square", fill_color="#404040", line_color=None,
             ),
             self.above.line("parameter", component, source=self.stable, color=colour, line_width=2.5),
             self.above.line(
@@ -68,11 +70,20 @@ class DiagramFigures:
             "parameter", "low", "parameter", "high", source=self.largest, color=colour, alpha=0.5
         )
         self.below.yaxis.axis_label = "largest exponent"
-        self.here = []
-        for made in (self.above, self.below):
-            span = Span(location=None, dimension="height", line_color=COLOURS[2], line_width=2)
-            self.here.append(span)
-            made.add_layout(span)
+        # A figure of its own: the mark moves with each drag, and the diagram takes long to draw.
+        self.here = source("parameter", "y")
+        self.pointer = figure(
+            height=22, name="pointer", sizing_mode="stretch_width", toolbar_location=None,
+            x_range=self.above.x_range, y_range=(0, 1), outline_line_color=None, tools="",
+        )  # fmt: skip
+        self.pointer.xaxis.visible = self.pointer.yaxis.visible = self.pointer.grid.visible = False
+        self.pointer.min_border = 0
+        self.pointer.scatter(
+            "parameter", "y", source=self.here, marker="inverted_triangle", size=14, color=COLOURS[2]
+        )
+        # The frames of all three must stand one above the other.
+        for made in (self.above, self.pointer, self.below):
+            made.min_border_left, made.min_border_right = 70, 10
 
     def choose(self, component: str, over: str) -> None:
         """Draw this component over this parameter."""
@@ -83,8 +94,7 @@ class DiagramFigures:
 
     def show_here(self, value: float) -> None:
         """Mark the value that the parameter has."""
-        for span in self.here:
-            span.location = value
+        self.here.data = {"parameter": [value], "y": [0.5]}
 
     def begin(self) -> None:
         """Begin another diagram."""
