@@ -58,6 +58,11 @@ class Status:
         """Whether the result is complete and valid."""
         return self.code == StatusCode.SUCCESS
 
+    def noting(self, *sentences: str) -> Status:
+        """The status of a complete run with more to say of it, before what it says already."""
+        rest = self.message.removeprefix(PLAIN).strip()
+        return attrs.evolve(self, message=" ".join(filter(None, [PLAIN, *sentences, rest])))
+
     @property
     def brief(self) -> str:
         """The code, and the first sentence of what a complete run has to say besides having ended."""

@@ -106,7 +106,8 @@ class HybridSystem(Portable):
         fit them; no run uses them.
     laws
         What the author knows of the runs, such as a conserved energy: `Laws`. The checks of
-        `hybrid.testing` use them, and say so if one does not fit the system; no calculation does.
+        `hybrid.testing` use them, and say so if one does not fit the system. `periodic_orbit` holds what is
+        conserved at its value at the guess; no other calculation uses laws.
 
     Raises
     ------
