@@ -7,6 +7,7 @@ import numpy as np
 
 from hybrid.orbits.rest import EPSILON, Drift
 from hybrid.status import Status
+from hybrid.system.periodicity import closed_change
 
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
@@ -60,6 +61,7 @@ class Shot:
     ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``drift``
     knows how far components at rest are carried. ``beyond`` names the transitions whose guards the start lies
     beyond. ``departure`` is how far the start is from the values of conserved quantities that are held.
+    ``lengths (n,)`` are those of a turn of angles, 0 for other components.
     """
 
     point: Point
@@ -75,11 +77,14 @@ class Shot:
     drift: Drift | None = None
     beyond: tuple[str, ...] = ()
     departure: Departure | None = None
+    lengths: np.ndarray | None = None
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance ``(n,)`` from the start to the end."""
+        """Distance ``(n,)`` from the start to the end, without whole turns of angles."""
         gap = self.end - self.point.x
+        if self.lengths is not None:
+            gap = closed_change(gap, self.lengths)
         if self.drift is not None:
             gap[self.drift.components] = self.drift.moved
         return gap

@@ -68,9 +68,9 @@ def periodic_orbit(
     Returns
     -------
     PeriodicOrbit
-        With a status that says how far the method came if it did not converge. An equilibrium of a forced
-        system counts as an orbit, because it repeats after each forcing period; an equilibrium of an
-        autonomous system does not.
+        It closes up to whole turns of the angles that the system declares. If Newton's method did not
+        converge the status says how far it came. An equilibrium of a forced system counts as an orbit,
+        because it repeats after each forcing period; an equilibrium of an autonomous system does not.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def periodic_orbit(
         point = Point(guess, t0, periods * forcing)
         compile_system(system)
         with CTRL_C:
-            return _kept(shooting.newton(point, False, tolerance, max_iterations))
+            return _kept(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
@@ -117,7 +117,8 @@ def periodic_orbit(
         raise arguments.refusal("period", "be a time that the clock can reach twice", length)
     compile_system(system)
     with CTRL_C:
-        return _kept(shooting.autonomous(Point(guess, t0, length), tolerance, max_iterations))
+        point = Point(guess, t0, length)
+        return _kept(shooting.hinted(shooting.autonomous(point, tolerance, max_iterations), point))
 
 
 def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:

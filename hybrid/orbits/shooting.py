@@ -12,7 +12,7 @@ from hybrid.orbits.closing import advance_to_close, same_time
 from hybrid.orbits.factors import fundamental_eigenvalues
 from hybrid.orbits.held import Held, held_by
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, turns_over
 from hybrid.orbits.periodic_schur import ProductEigenvalues
 from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc
@@ -23,7 +23,8 @@ from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, functions_of
+from hybrid.system.periodicity import angle_fault_at, closed_change
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
@@ -55,6 +56,8 @@ NEARER = 0.5
 NEARLY_SINGULAR = 1e-5
 # A multiplier may be 1 if it is this near: of a double one that is the root of its error.
 NEAR_ONE = 1e-3
+# The turn of an angle that is not declared.
+TURN = 2.0 * np.pi
 FAMILY = "The orbit is one of a family"
 HOLD_IT = (
     "If the system conserves a quantity, declare it with HybridSystem(laws=Laws(conserved=...)): the search "
@@ -98,6 +101,7 @@ class Shooting:
             carried,
             trajectory.beyond,
             None if self.held is None else self.held.departure(point.t, point.x, magnitude),
+            self.system.turn_lengths,
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -203,6 +207,31 @@ class Shooting:
             return orbit
         return self._nearest(orbit, guess)
 
+    def hinted(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
+        """The orbit, with a remedy for a search that failed since a component counts turns."""
+        if orbit.status.code != StatusCode.NOT_CONVERGED:
+            return orbit
+        moved = self._follow(guess, guess.period, self.mode).x[-1] - guess.x
+        for i in np.flatnonzero(np.abs(moved) > 0.5 * TURN).tolist():
+            if self.system.turn_lengths[i] == 0.0 and self._is_same_after_a_turn(i, guess):
+                name = self.system.state_names[i]
+                hint = (
+                    f"{name!r} moves by {moved[i]:.6g}, and a turn of 2 pi changes no function: if it is an "
+                    f"angle, declare it with HybridSystem(angles={{{name!r}: 2 * np.pi}})."
+                )
+                status = attrs.evolve(orbit.status, remedy=f"{orbit.status.remedy} {hint}".strip())
+                return attrs.evolve(orbit, status=status)
+        return orbit
+
+    def _is_same_after_a_turn(self, i: int, guess: Point) -> bool:
+        """Whether no function changes where a component is larger by 2 pi."""
+        system, values = self.system, self.system.parameter_values(self.parameters)
+        lengths = TURN * (np.arange(system.dimension) == i)
+        return all(
+            angle_fault_at(system.variables, function, guess.t, guess.x, values, lengths) is None
+            for _, function in functions_of(system)
+        )
+
     def _quiet_time(self, guess: Point) -> float:
         """Time after the guess at which neither it nor one period later is close to a jump."""
         arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
@@ -230,7 +259,8 @@ class Shooting:
         if not arc.status.ok:
             return guess.period
         extent = np.ptp(arc.x, axis=0)
-        gaps = np.linalg.norm((arc(guess.t + times) - guess.x) / np.where(extent > 0, extent, 1.0), axis=1)
+        apart = [closed_change(each, self.system.turn_lengths) for each in arc(guess.t + times) - guess.x]
+        gaps = np.linalg.norm(apart / np.where(extent > 0, extent, 1.0), axis=1)
         nearest = int(np.argmin(gaps))
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
 
@@ -266,6 +296,7 @@ class Shooting:
             signature=(shot.mode, *(jump.target for jump in jumps if jump.target is not None)),
             transitions=tuple(jump.transition for jump in jumps),
             status=status,
+            turns=turns_over(self.system, shot.end - shot.point.x),
         )
 
     def _all_parameters(self) -> dict[str, float]:
