@@ -58,11 +58,6 @@ class Status:
         """Whether the result is complete and valid."""
         return self.code == StatusCode.SUCCESS
 
-    def noting(self, *sentences: str) -> Status:
-        """The status of a complete run with more to say of it, before what it says already."""
-        rest = self.message.removeprefix(PLAIN).strip()
-        return attrs.evolve(self, message=" ".join(filter(None, [PLAIN, *sentences, rest])))
-
     @property
     def brief(self) -> str:
         """The code, and the first sentence of what a complete run has to say besides having ended."""
@@ -74,6 +69,12 @@ class Status:
     def __str__(self) -> str:
         text = f"{self.code.name}: {self.message}"
         return f"{text} {self.remedy}" if self.remedy else text
+
+
+def noting(status: Status, *sentences: str) -> Status:
+    """The status of a complete run with more to say of it, before what it says already."""
+    rest = status.message.removeprefix(PLAIN).strip()
+    return attrs.evolve(status, message=" ".join(filter(None, [PLAIN, *sentences, rest])))
 
 
 NAME_THE_LIMIT = (

@@ -34,6 +34,11 @@ MOMENT = 1e-8
 class PeriodicOrbit:
     """A periodic orbit, or the best point that Newton's method reached.
 
+    Where ``status.ok`` is false there is no orbit. Multipliers, logarithms and the fundamental matrix are
+    then those of the run over the period from the best point; they say nothing of the stability of an orbit.
+    What builds on orbits (`continue_orbit`, `sensitivity`,
+    `lyapunov.floquet_exponents`) refuses such a point.
+
     Attributes
     ----------
     system, parameters

@@ -22,7 +22,7 @@ from hybrid.simulation.periods import split_time
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
-from hybrid.status import Status, StatusCode
+from hybrid.status import Status, StatusCode, noting
 from hybrid.system.graph import HybridSystem, functions_of
 from hybrid.system.periodicity import angle_fault_at, closed_change
 
@@ -365,7 +365,7 @@ class Shooting:
             told.append(f"{FAMILY}: a multiplier is 1{besides}, and the guess decides which one is found.")
             remedy = f"{status.remedy} {HOLD_IT}".strip()
             status = attrs.evolve(status, remedy=remedy)
-        return status.noting(*told)
+        return noting(status, *told)
 
     def _is_one_of_many(self, shot: Shot, newton: Newton, multipliers: np.ndarray) -> bool:
         """Whether a direction of the start is free, beside that along an autonomous orbit.
