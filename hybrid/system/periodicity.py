@@ -62,7 +62,7 @@ def period_fault(
     return None
 
 
-def _rounding(
+def rounding(
     variables: Variables,
     function: ModelFunction,
     t: float,
@@ -128,7 +128,7 @@ def _fault(
         if near is None:
             return None
         band = band + 2.0 * shift.apart(function, there, near)
-    wrong = apart > band + _rounding(variables, function, t, x, values, here)
+    wrong = apart > band + rounding(variables, function, t, x, values, here)
     if not np.any(wrong):
         return None
     i = int(np.argmax(wrong))
