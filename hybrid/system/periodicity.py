@@ -101,13 +101,13 @@ class Shift:
 
 
 def whole_turns(change: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Whole turns ``(n,)`` in a change of the state; 0 for a component that is no angle: its length is 0."""
-    turns = np.divide(change, lengths, out=np.zeros(len(change)), where=lengths > 0.0)
+    """Whole turns ``(..., n)`` in changes of the state; 0 for components whose length is 0: no angles."""
+    turns = np.divide(change, lengths, out=np.zeros(np.shape(change)), where=lengths > 0.0)
     return np.asarray(np.round(turns))
 
 
 def closed_change(change: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """A change of the state ``(n,)`` without whole turns of its angles."""
+    """Changes of the state ``(..., n)`` without whole turns of its angles."""
     return np.asarray(change - lengths * whole_turns(change, lengths))
 
 
