@@ -28,6 +28,7 @@ from hybrid import (
     from_equations,
     periodic_orbit,
     simulate,
+    switch_branch,
 )
 from lyapunov import LyapunovSpectrum, kaplan_yorke_dimension, lyapunov_spectrum
 
@@ -194,6 +195,53 @@ def buck_converter() -> list[Number]:
     return [against("first period doubling, V", NOT_OPENED, flip.value, voltage, 10)]
 
 
+def compass_field(t, x, p):
+    """Rates of the angles of the swing leg ``n`` and the support leg ``s``, point masses on both and the hip."""
+    b, c, s = p.beta, np.cos(x.s - x.n), np.sin(x.s - x.n)
+    m11, m12, m22 = b**2, -(1 + b) * b * c, (1 + b) ** 2 * (p.mu + 1) + 1
+    first = -(1 + b) * b * s * x.ds**2 - p.g * b * np.sin(x.n)
+    second = (1 + b) * b * s * x.dn**2 + p.g * ((p.mu + 1) * (1 + b) + 1) * np.sin(x.s)
+    det = m11 * m22 - m12**2
+    return x.dn, x.ds, (m22 * first - m12 * second) / det, (m11 * second - m12 * first) / det
+
+
+def compass_strike(t, x, p):
+    """The legs exchange their roles: angular momentum about the new foot, of the old leg about the hip."""
+    b, c = p.beta, np.cos(x.s - x.n)
+    first = -b * x.dn + (-b + (p.mu * (1 + b) ** 2 + 2 * (1 + b)) * c) * x.ds
+    second = -b * x.ds
+    m11, m12 = b * (b - (1 + b) * c), (1 + b) * (1 + b - b * c) + 1 + p.mu * (1 + b) ** 2
+    m21, m22 = b**2, -b * (1 + b) * c
+    det = m11 * m22 - m12 * m21
+    return x.s, x.n, (m22 * first - m12 * second) / det, (m11 * second - m21 * first) / det
+
+
+def compass_gait() -> list[Number]:
+    def ground(t, x, p):
+        return x.n + x.s + p.slope * np.pi / 90.0
+
+    # Gravity over the length of the lower part of a leg, slope in degrees.
+    given = {"mu": 2.0, "beta": 1.0, "g": 9.81 / 0.5}
+    compass = HybridSystem(
+        state=("n", "s", "dn", "ds"),
+        parameters={**given, "slope": 3.0},
+        modes=[Mode("behind", compass_field), Mode("ahead", compass_field)],
+        transitions=[
+            Transition("behind", "ahead", Guard(ground, +1), name="passing"),
+            Transition("ahead", "behind", Guard(ground, -1), Reset(compass_strike), name="heelstrike"),
+        ],
+    )
+    x0 = (-0.3234, 0.2187, -0.3774, -1.0924)
+    orbit = periodic_orbit(compass, x0, mode="behind", period=0.73)
+    (first,) = continue_orbit(orbit, "slope", (2.5, 6.0)).bifurcations
+    _, second = continue_orbit(switch_branch(first), "slope", (4.0, 5.0)).bifurcations
+    slope = exact.compass_flip(compass_field, compass_strike, given)
+    return [
+        against("first period doubling, degrees", NOT_OPENED, first.value, slope, 9),
+        Number("second period doubling", NOT_OPENED, f"{second.value:.9f}", "", ""),
+    ]
+
+
 def exponents(system: str, spectrum: LyapunovSpectrum, required: str) -> list[Number]:
     """The first and the last exponent, with two standard errors, and what all of them sum to."""
     dimension = kaplan_yorke_dimension(spectrum.exponents)
@@ -234,8 +282,9 @@ ROWS = [
     Row(4, hopper),
     Row(5, three_disks),
     Row(6, buck_converter),
-    Row(7, jerk_circuit, quick=False),
-    Row(8, double_scroll, quick=False),
+    Row(7, compass_gait),
+    Row(8, jerk_circuit, quick=False),
+    Row(9, double_scroll, quick=False),
 ]
 
 

@@ -1,11 +1,16 @@
-"""Independent values for the page of published numbers: thirty digits, without any solver of the library."""
+"""Independent values for the page of published numbers: no solver of the library takes part in them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import mpmath as mp
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve, root_scalar
 
 DIGITS = 30
 mp.mp.dps = DIGITS + 10
@@ -123,3 +128,42 @@ def converter_flip(guess: tuple[float, float]) -> mp.mpf:
         return height, mp.det(whole + mp.eye(2))
 
     return mp.findroot(parts, guess)[1]
+
+
+def compass_flip(field: Callable[..., Any], strike: Callable[..., Any], given: Mapping[str, float]) -> float:
+    """Slope at which a multiplier of the compass gait is -1: SciPy's DOP853, differences of the step map."""
+
+    def step(free: np.ndarray, slope: float) -> np.ndarray:
+        """One step on the section of heelstrikes, where the two angles add up to minus twice the slope."""
+        ground = -2.0 * np.radians(slope)
+        start = [ground - free[0], free[0], free[1], free[2]]
+        p = SimpleNamespace(**given)
+
+        def rates(t: float, x: np.ndarray) -> Any:
+            return field(t, SimpleNamespace(n=x[0], s=x[1], dn=x[2], ds=x[3]), p)
+
+        def height(t: float, x: np.ndarray) -> float:
+            return x[0] + x[1] - ground
+
+        height.terminal, height.direction = True, -1  # type: ignore[attr-defined]
+        # The swing foot has passed the ground near mid-stance by then.
+        first = solve_ivp(rates, (0.0, 0.4), start, "DOP853", rtol=1e-13, atol=1e-14)
+        last = solve_ivp(rates, (0.4, 2.0), first.y[:, -1], "DOP853", events=height, rtol=1e-13, atol=1e-14)
+        n, s, dn, ds = last.y_events[0][0]
+        return np.array(strike(0.0, SimpleNamespace(n=n, s=s, dn=dn, ds=ds), p)[1:])
+
+    gait = [np.array([0.22, -0.38, -1.1])]
+
+    def distance(slope: float) -> float:
+        gait[0] = fsolve(lambda free: step(free, slope) - free, gait[0], xtol=1e-13)
+        h = 1e-4 * np.eye(3)
+        # Two differences, of the steps h and h / 2, without their error of second order.
+        coarse, fine = (
+            np.transpose(
+                [(step(gait[0] + e, slope) - step(gait[0] - e, slope)) / (2 * e.sum()) for e in each]
+            )
+            for each in (h, h / 2)
+        )
+        return float(np.linalg.det((4 * fine - coarse) / 3 + np.eye(3)))
+
+    return float(root_scalar(distance, x0=4.3, x1=4.4, xtol=1e-10).root)
