@@ -196,7 +196,7 @@ def buck_converter() -> list[Number]:
 
 
 def compass_field(t, x, p):
-    """Rates of the angles of the swing leg ``n`` and the support leg ``s``, point masses on both and the hip."""
+    """Rates of the swing leg ``n`` and the support leg ``s``; point masses on both and on the hip."""
     b, c, s = p.beta, np.cos(x.s - x.n), np.sin(x.s - x.n)
     m11, m12, m22 = b**2, -(1 + b) * b * c, (1 + b) ** 2 * (p.mu + 1) + 1
     first = -(1 + b) * b * s * x.ds**2 - p.g * b * np.sin(x.n)
