@@ -6,7 +6,7 @@ import pytest
 from scipy.special import ellipk
 
 import models
-from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition, periodic_orbit
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition, continue_orbit, periodic_orbit
 
 FAMILY = "The orbit is one of a family: a multiplier is 1"
 
@@ -51,6 +51,16 @@ class TestPendulum:
         assert orbit.status.ok
         amplitude = np.arccos(-energy(0.0, np.rec.array(tuple(orbit.x0), names="q, v"), None))
         assert 4 * ellipk(np.sin(amplitude / 2) ** 2) == pytest.approx(8.0, rel=1e-9)
+
+
+def test_a_branch_of_such_orbits_says_that_nothing_is_held():
+    field = Mode("swing", lambda t, x, p: (x.v, -p.k * np.sin(x.q)))
+    swing = HybridSystem(state=("q", "v"), parameters={"k": 1.0}, modes=[field])
+    branch = continue_orbit(periodic_orbit(swing, (1.2, 0.0), period=6.9), "k", (0.9, 1.1))
+    assert branch.status.ok
+    assert "no conserved quantity is held" in branch.status.message
+    alone = continue_orbit(periodic_orbit(kicked(), (1.9, 0.1), period=3.9), "e", (0.45, 0.55))
+    assert "held" not in alone.status.message
 
 
 def test_a_particle_between_two_disks_keeps_the_speed_of_the_guess():
